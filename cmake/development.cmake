@@ -1,0 +1,19 @@
+# What only our own targets get: strict warnings and the default build type. Nothing here reaches a consumer.
+if(cfp_is_top_level AND NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
+endif()
+
+option(CFP_WARNINGS_AS_ERRORS "Treat warnings in cfp's own targets as errors" ON)
+set(CFP_SANITIZE "" CACHE STRING "Sanitizers for cfp's own targets, for example address,undefined")
+
+add_library(cfp_development INTERFACE)
+target_link_libraries(cfp_development INTERFACE cfp::cfp)
+if(MSVC)
+  target_compile_options(cfp_development INTERFACE /W4 /bigobj $<$<BOOL:${CFP_WARNINGS_AS_ERRORS}>:/WX>)
+else()
+  target_compile_options(cfp_development INTERFACE -Wall -Wextra -Wconversion -Wshadow $<$<BOOL:${CFP_WARNINGS_AS_ERRORS}>:-Werror>)
+endif()
+if(CFP_SANITIZE)
+  target_compile_options(cfp_development INTERFACE -fsanitize=${CFP_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(cfp_development INTERFACE -fsanitize=${CFP_SANITIZE})
+endif()

@@ -1,0 +1,132 @@
+/// @file span.hpp
+/// Views over the caller's memory: `span<T>` (contiguous) and `PointSpan<Scalar, Dim>` (points inside any array).
+/// Neither owns anything: the memory must outlive the view, and no cfp function keeps a view after it returns.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <type_traits>
+#include <utility>
+
+#include <Eigen/Core>
+
+#include "cfp/core/assert.hpp"
+
+namespace cfp {
+
+template <typename T>
+class span;
+
+namespace detail {
+
+template <typename C, typename = void>
+struct is_strided_eigen : std::false_type {};
+// An Eigen block has data() and size() too, but its coefficients need not be adjacent; only plain objects are.
+template <typename C>
+struct is_strided_eigen<C, std::void_t<typename C::PlainObject>> : std::bool_constant<!std::is_same_v<typename C::PlainObject, C>> {};
+
+template <typename C, typename T, typename = void>
+struct is_contiguous_of : std::false_type {};
+template <typename C, typename T>
+struct is_contiguous_of<C, T, std::void_t<decltype(std::declval<C&>().data()), decltype(std::declval<C&>().size())>>
+    : std::bool_constant<std::is_convertible_v<std::remove_pointer_t<decltype(std::declval<C&>().data())> (*)[], T (*)[]> &&
+                         !is_strided_eigen<std::remove_const_t<C>>::value> {};
+
+template <typename T>
+struct is_span : std::false_type {};
+template <typename T>
+struct is_span<span<T>> : std::true_type {};
+
+}  // namespace detail
+
+/// Pointer and length, as C++20's std::span with dynamic extent. Converts from arrays, std::vector, std::array, std::span,
+/// plain Eigen vectors: whatever has data() and size() over adjacent elements.
+template <typename T>
+class span {
+ public:
+  using element_type = T;
+  using value_type = std::remove_cv_t<T>;
+  using iterator = T*;
+
+  constexpr span() noexcept = default;
+  constexpr span(T* data, std::size_t size) noexcept : data_(data), size_(size) {}
+  template <std::size_t N>
+  constexpr span(T (&array)[N]) noexcept : data_(array), size_(N) {}
+  template <typename C, std::enable_if_t<!detail::is_span<std::remove_cv_t<C>>::value && detail::is_contiguous_of<C, T>::value, int> = 0>
+  constexpr span(C& container) noexcept : data_(container.data()), size_(static_cast<std::size_t>(container.size())) {}
+  template <typename C, std::enable_if_t<std::is_const_v<T> && !detail::is_span<C>::value && detail::is_contiguous_of<const C, T>::value, int> = 0>
+  constexpr span(const C& container) noexcept : data_(container.data()), size_(static_cast<std::size_t>(container.size())) {}
+  template <typename U, std::enable_if_t<std::is_convertible_v<U (*)[], T (*)[]>, int> = 0>
+  constexpr span(const span<U>& other) noexcept : data_(other.data()), size_(other.size()) {}
+
+  [[nodiscard]] constexpr T* data() const noexcept { return data_; }
+  [[nodiscard]] constexpr std::size_t size() const noexcept { return size_; }
+  [[nodiscard]] constexpr bool empty() const noexcept { return size_ == 0; }
+  [[nodiscard]] constexpr T* begin() const noexcept { return data_; }
+  [[nodiscard]] constexpr T* end() const noexcept { return data_ + size_; }
+  [[nodiscard]] constexpr T& operator[](std::size_t i) const noexcept {
+    CFP_ASSERT(i < size_);
+    return data_[i];
+  }
+  [[nodiscard]] constexpr span subspan(std::size_t first, std::size_t count) const noexcept {
+    CFP_ASSERT(first <= size_ && count <= size_ - first);
+    return span(data_ + first, count);
+  }
+
+ private:
+  T* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+namespace detail {
+
+template <typename Point, typename Scalar, int Dim, typename = void>
+struct is_point : std::false_type {};
+template <typename Scalar, int Dim>
+struct is_point<std::array<Scalar, static_cast<std::size_t>(Dim)>, Scalar, Dim> : std::true_type {};
+template <typename Scalar, int Dim, int Options>
+struct is_point<Eigen::Matrix<Scalar, Dim, 1, Options, Dim, 1>, Scalar, Dim> : std::true_type {};
+
+}  // namespace detail
+
+/// Read-only view of points that lie somewhere inside the caller's arrays: coordinate c of point i stands at
+/// `first + i * point_stride + c * coordinate_stride` (bytes). So the same view covers packed pairs (cv::Point2f), pairs
+/// inside larger records (cv::KeyPoint: stride 28), and one array per coordinate. Nothing is copied.
+template <typename Scalar, int Dim>
+class PointSpan {
+ public:
+  using Point = Eigen::Matrix<Scalar, Dim, 1>;
+
+  PointSpan() noexcept = default;
+  PointSpan(const Scalar* first, std::size_t size, std::size_t point_stride_bytes = Dim * sizeof(Scalar),
+            std::size_t coordinate_stride_bytes = sizeof(Scalar)) noexcept
+      : first_(reinterpret_cast<const unsigned char*>(first)), size_(size), point_stride_(point_stride_bytes), coordinate_stride_(coordinate_stride_bytes) {}
+  /// From any contiguous container of std::array<Scalar, Dim> or Eigen column vectors.
+  template <typename C, typename Element = std::remove_cv_t<std::remove_pointer_t<decltype(std::declval<const C&>().data())>>,
+            std::enable_if_t<detail::is_point<Element, Scalar, Dim>::value, int> = 0>
+  PointSpan(const C& points) noexcept
+      : PointSpan(reinterpret_cast<const Scalar*>(points.data()), static_cast<std::size_t>(points.size()), sizeof(Element)) {}
+  /// From an Eigen matrix with one point per column.
+  PointSpan(const Eigen::Matrix<Scalar, Dim, Eigen::Dynamic>& columns) noexcept
+      : PointSpan(columns.data(), static_cast<std::size_t>(columns.cols())) {}
+
+  [[nodiscard]] std::size_t size() const noexcept { return size_; }
+  [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
+  [[nodiscard]] Scalar operator()(std::size_t i, int c) const noexcept {
+    CFP_ASSERT(i < size_ && c >= 0 && c < Dim);
+    return *reinterpret_cast<const Scalar*>(first_ + i * point_stride_ + static_cast<std::size_t>(c) * coordinate_stride_);
+  }
+  [[nodiscard]] Point operator[](std::size_t i) const noexcept {
+    Point point;
+    for (int c = 0; c < Dim; ++c) point[c] = (*this)(i, c);
+    return point;
+  }
+
+ private:
+  const unsigned char* first_ = nullptr;
+  std::size_t size_ = 0;
+  std::size_t point_stride_ = Dim * sizeof(Scalar);
+  std::size_t coordinate_stride_ = sizeof(Scalar);
+};
+
+}  // namespace cfp

@@ -1,0 +1,57 @@
+/// @file box.hpp
+/// Axis-aligned image boxes, four scalars in pixels. x grows to the right, y downwards.
+#pragma once
+
+#include <algorithm>
+
+#include "cfp/core/numeric.hpp"
+
+namespace cfp {
+
+/// [x1, x2] x [y1, y2]. Proper when finite and x1 < x2, y1 < y2; every function below gives 0 or false for an improper one.
+template <typename Scalar>
+struct Box {
+  Scalar x1{}, y1{}, x2{}, y2{};
+
+  [[nodiscard]] constexpr Scalar width() const noexcept { return x2 - x1; }
+  [[nodiscard]] constexpr Scalar height() const noexcept { return y2 - y1; }
+};
+
+template <typename Scalar>
+[[nodiscard]] constexpr bool is_proper(const Box<Scalar>& box) noexcept {
+  return is_finite(box.x1) && is_finite(box.y1) && is_finite(box.x2) && is_finite(box.y2) && box.x1 < box.x2 && box.y1 < box.y2;
+}
+
+/// Area in px^2; 0 for an improper box.
+template <typename Scalar>
+[[nodiscard]] constexpr Scalar area(const Box<Scalar>& box) noexcept {
+  return is_proper(box) ? box.width() * box.height() : Scalar(0);
+}
+
+/// Whether (x, y) lies in the box, its border included.
+template <typename Scalar>
+[[nodiscard]] constexpr bool contains(const Box<Scalar>& box, Scalar x, Scalar y) noexcept {
+  return x >= box.x1 && x <= box.x2 && y >= box.y1 && y <= box.y2;
+}
+
+/// The common part; improper when there is none.
+template <typename Scalar>
+[[nodiscard]] constexpr Box<Scalar> intersection(const Box<Scalar>& a, const Box<Scalar>& b) noexcept {
+  return {(std::max)(a.x1, b.x1), (std::max)(a.y1, b.y1), (std::min)(a.x2, b.x2), (std::min)(a.y2, b.y2)};
+}
+
+/// Intersection over union in [0, 1]; 0 when either box is improper. Exact for boxes whose areas do not overflow.
+template <typename Scalar>
+[[nodiscard]] constexpr Scalar iou(const Box<Scalar>& a, const Box<Scalar>& b) noexcept {
+  const Scalar common = is_proper(a) && is_proper(b) ? area(intersection(a, b)) : Scalar(0);
+  const Scalar united = area(a) + area(b) - common;
+  return common > Scalar(0) && is_finite(united) ? clamp_probability(common / united) : Scalar(0);
+}
+
+/// The part of the box inside the image [0, image_width] x [0, image_height]; improper when it lies outside.
+template <typename Scalar>
+[[nodiscard]] constexpr Box<Scalar> clip(const Box<Scalar>& box, Scalar image_width, Scalar image_height) noexcept {
+  return intersection(box, Box<Scalar>{Scalar(0), Scalar(0), image_width, image_height});
+}
+
+}  // namespace cfp

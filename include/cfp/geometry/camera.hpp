@@ -1,0 +1,58 @@
+/// @file camera.hpp
+/// The camera interface: any type with the two members of PinholeCamera below (and the alias `ScalarType`) is a camera
+/// for cfp. Camera frame: x right, y down, z forward, metres; pixels with the origin of the caller's calibration.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "cfp/core/numeric.hpp"
+#include "cfp/math/so3.hpp"
+
+namespace cfp {
+
+template <typename Scalar>
+using Matrix23 = Eigen::Matrix<Scalar, 2, 3>;
+
+/// u = fx x/z + cx, v = fy y/z + cy.
+template <typename Scalar>
+struct PinholeCamera {
+  using ScalarType = Scalar;
+  Scalar fx = Scalar(1);  ///< focal length in pixels, > 0
+  Scalar fy = Scalar(1);  ///< focal length in pixels, > 0
+  Scalar cx = Scalar(0);  ///< principal point in pixels
+  Scalar cy = Scalar(0);
+
+  /// Projects a point of the camera frame. Returns whether the projection is valid: z > Tolerance::min_depth and a finite
+  /// pixel; otherwise pixel and jacobian are left as they were. jacobian, when asked for: d pixel / d point.
+  bool project(const Vector3<Scalar>& point, Vector2<Scalar>& pixel, Matrix23<Scalar>* jacobian = nullptr) const noexcept {
+    if (!(point.z() > Scalar(Tolerance<Scalar>::min_depth))) return false;
+    const Scalar inv_z = Scalar(1) / point.z();
+    const Scalar x = point.x() * inv_z;
+    const Scalar y = point.y() * inv_z;
+    const Scalar u = fx * x + cx;
+    const Scalar v = fy * y + cy;
+    if (!is_finite(u) || !is_finite(v)) return false;
+    pixel << u, v;
+    if (jacobian != nullptr) *jacobian << fx * inv_z, Scalar(0), -fx * x * inv_z, Scalar(0), fy * inv_z, -fy * y * inv_z;
+    return true;
+  }
+
+  /// The ray through a pixel, scaled to z = 1: a point at depth d is d * ray. False, and ray untouched, for a pixel or an
+  /// intrinsic that is not finite.
+  bool unproject(const Vector2<Scalar>& pixel, Vector3<Scalar>& ray) const noexcept {
+    const Scalar x = (pixel.x() - cx) / fx;
+    const Scalar y = (pixel.y() - cy) / fy;
+    if (!is_finite(x) || !is_finite(y)) return false;
+    ray << x, y, Scalar(1);
+    return true;
+  }
+
+  /// The intrinsic matrix.
+  [[nodiscard]] Matrix3<Scalar> matrix() const noexcept {
+    Matrix3<Scalar> K;
+    K << fx, Scalar(0), cx, Scalar(0), fy, cy, Scalar(0), Scalar(0), Scalar(1);
+    return K;
+  }
+};
+
+}  // namespace cfp

@@ -1,0 +1,112 @@
+/// @file so3.hpp
+/// Rotations: hat, exponential, logarithm, left Jacobian. A rotation is a plain 3x3 matrix (no alignment demands, see
+/// DESIGN: public structs have one layout under all vector flags); rotation vectors are in radians.
+/// Source: Sola, Deray, Atchuthan: "A micro Lie theory for state estimation in robotics", 2018, eqs. (69), (132)-(145).
+#pragma once
+
+#include <cmath>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "cfp/core/numeric.hpp"
+
+namespace cfp {
+
+template <typename Scalar>
+using Vector2 = Eigen::Matrix<Scalar, 2, 1>;
+template <typename Scalar>
+using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
+template <typename Scalar>
+using Vector6 = Eigen::Matrix<Scalar, 6, 1>;
+template <typename Scalar>
+using Matrix2 = Eigen::Matrix<Scalar, 2, 2>;
+template <typename Scalar>
+using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+template <typename Scalar>
+using Matrix6 = Eigen::Matrix<Scalar, 6, 6>;
+
+/// The skew-symmetric matrix with hat(a) b = a x b.
+template <typename Scalar>
+[[nodiscard]] Matrix3<Scalar> hat(const Vector3<Scalar>& a) noexcept {
+  Matrix3<Scalar> m;
+  m << Scalar(0), -a.z(), a.y(), a.z(), Scalar(0), -a.x(), -a.y(), a.x(), Scalar(0);
+  return m;
+}
+
+/// exp: rotation vector (axis times angle, rad) to rotation matrix: I + a hat(w) + b hat(w)^2 with
+/// a = sin(t)/t, b = (1 - cos t)/t^2, t = |w|; Taylor expansion below Tolerance::small_angle. Never divides by zero.
+template <typename Scalar>
+[[nodiscard]] Matrix3<Scalar> so3_exp(const Vector3<Scalar>& w) noexcept {
+  using std::cos;
+  using std::sin;
+  using std::sqrt;
+  const Scalar t2 = w.squaredNorm();
+  const Matrix3<Scalar> W = hat(w);
+  Scalar a, b;
+  if (t2 > Scalar(Tolerance<Scalar>::small_angle) * Scalar(Tolerance<Scalar>::small_angle)) {
+    const Scalar t = sqrt(t2);
+    const Scalar half = sin(t * Scalar(0.5));
+    a = sin(t) / t;
+    b = Scalar(2) * half * half / t2;
+  } else {
+    a = Scalar(1) - t2 / Scalar(6);
+    b = Scalar(0.5) - t2 / Scalar(24);
+  }
+  Matrix3<Scalar> R = a * W;
+  R.noalias() += b * (W * W);
+  R.diagonal().array() += Scalar(1);
+  return R;
+}
+
+/// log: rotation matrix to rotation vector with angle in [0, pi] (at pi one of the two axes). Goes through the quaternion,
+/// so it is exact near 0 and near pi; a matrix that is not quite a rotation gives the vector of a nearby one.
+template <typename Scalar>
+[[nodiscard]] Vector3<Scalar> so3_log(const Matrix3<Scalar>& R) noexcept {
+  using std::atan2;
+  using std::sqrt;
+  Eigen::Quaternion<Scalar> q(R);
+  if (q.w() < Scalar(0)) q.coeffs() = -q.coeffs();
+  const Vector3<Scalar> v = q.vec();
+  const Scalar n2 = v.squaredNorm();
+  if (n2 > Scalar(Tolerance<Scalar>::small_angle) * Scalar(Tolerance<Scalar>::small_angle)) {
+    const Scalar n = sqrt(n2);
+    return (Scalar(2) * atan2(n, q.w()) / n) * v;
+  }
+  const Scalar inv_w = Scalar(1) / q.w();
+  return (Scalar(2) * inv_w - Scalar(2) / Scalar(3) * n2 * inv_w * inv_w * inv_w) * v;
+}
+
+/// Left Jacobian of SO(3): exp(w + d) ~ exp(J_l(w) d) exp(w); also the factor between the translational tangent and the
+/// translation in the SE(3) exponential. I + b hat(w) + c hat(w)^2, c = (t - sin t)/t^3.
+template <typename Scalar>
+[[nodiscard]] Matrix3<Scalar> so3_left_jacobian(const Vector3<Scalar>& w) noexcept {
+  using std::sin;
+  using std::sqrt;
+  const Scalar t2 = w.squaredNorm();
+  const Matrix3<Scalar> W = hat(w);
+  Scalar b, c;
+  // The difference t - sin t cancels well above small_angle; its own threshold keeps the error below rounding.
+  if (t2 > Scalar(100) * Scalar(Tolerance<Scalar>::small_angle)) {
+    const Scalar t = sqrt(t2);
+    const Scalar half = sin(t * Scalar(0.5));
+    b = Scalar(2) * half * half / t2;
+    c = (t - sin(t)) / (t2 * t);
+  } else {
+    b = Scalar(0.5) - t2 / Scalar(24) * (Scalar(1) - t2 / Scalar(30));
+    c = Scalar(1) / Scalar(6) - t2 / Scalar(120) * (Scalar(1) - t2 / Scalar(42));
+  }
+  Matrix3<Scalar> J = b * W;
+  J.noalias() += c * (W * W);
+  J.diagonal().array() += Scalar(1);
+  return J;
+}
+
+/// The rotation nearest to R in first order (one step of the polar iteration after normalisation of the quaternion):
+/// removes the drift that products of many rotations collect.
+template <typename Scalar>
+[[nodiscard]] Matrix3<Scalar> normalized_rotation(const Matrix3<Scalar>& R) noexcept {
+  return Eigen::Quaternion<Scalar>(R).normalized().toRotationMatrix();
+}
+
+}  // namespace cfp

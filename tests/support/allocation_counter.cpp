@@ -1,0 +1,61 @@
+#include "support/allocation_counter.hpp"
+
+#include <cerrno>
+#include <cstdlib>
+#include <new>
+
+namespace {
+thread_local std::size_t count = 0;
+}
+
+namespace cfp_test {
+std::size_t allocation_count() noexcept { return count; }
+}  // namespace cfp_test
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define CFP_TEST_SANITIZED 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+#define CFP_TEST_SANITIZED 1
+#endif
+#endif
+
+// Eigen allocates dynamic storage with malloc, the containers with operator new, which glibc's allocator serves through
+// malloc as well: interposing malloc catches both. The sanitizers own malloc; under them only operator new is counted.
+#if defined(__GLIBC__) && !defined(CFP_TEST_SANITIZED)
+extern "C" {
+void* __libc_malloc(std::size_t size);
+void* __libc_calloc(std::size_t n, std::size_t size);
+void* __libc_realloc(void* pointer, std::size_t size);
+void* __libc_memalign(std::size_t alignment, std::size_t size);
+void* malloc(std::size_t size) {
+  ++count;
+  return __libc_malloc(size);
+}
+void* calloc(std::size_t n, std::size_t size) {
+  ++count;
+  return __libc_calloc(n, size);
+}
+void* realloc(void* pointer, std::size_t size) {
+  ++count;
+  return __libc_realloc(pointer, size);
+}
+void* aligned_alloc(std::size_t alignment, std::size_t size) {
+  ++count;
+  return __libc_memalign(alignment, size);
+}
+int posix_memalign(void** pointer, std::size_t alignment, std::size_t size) {
+  ++count;
+  *pointer = __libc_memalign(alignment, size);
+  return *pointer != nullptr ? 0 : ENOMEM;
+}
+}
+#else
+void* operator new(std::size_t size) {
+  ++count;
+  if (void* pointer = std::malloc(size == 0 ? 1 : size)) return pointer;
+  throw std::bad_alloc();
+}
+void operator delete(void* pointer) noexcept { std::free(pointer); }
+void operator delete(void* pointer, std::size_t) noexcept { std::free(pointer); }
+#endif
