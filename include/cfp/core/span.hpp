@@ -37,6 +37,14 @@ struct is_span : std::false_type {};
 template <typename T>
 struct is_span<span<T>> : std::true_type {};
 
+template <typename T>
+struct same_type {
+  using type = T;
+};
+/// T, not deduced: a parameter span<non_deduced<Scalar>> takes whatever converts, the scalar being given by another one.
+template <typename T>
+using non_deduced = typename same_type<T>::type;
+
 }  // namespace detail
 
 /// Pointer and length, as C++20's std::span with dynamic extent. Converts from arrays, std::vector, std::array, std::span,
