@@ -1,0 +1,82 @@
+/// @file reprojection.hpp
+/// Reprojection distance, the projection constraint of paper section IV-D: a keypoint of the previous frame is
+/// back-projected with its depth, moved by T_cur_prev, projected, and compared with its match in the current frame.
+///
+/// The distance is in pixels, >= 0 and finite, or `no_distance` (-1): no valid depth, behind the camera (or outside what
+/// the camera model can project), or a pixel that is not finite.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+#include <Eigen/Core>
+
+#include "cfp/core/chunk.hpp"
+#include "cfp/core/numeric.hpp"
+#include "cfp/core/span.hpp"
+#include "cfp/geometry/camera.hpp"
+#include "cfp/geometry/distance.hpp"
+#include "cfp/math/se3.hpp"
+
+namespace cfp {
+
+/// d_T = || pixel_cur - project(T_cur_prev * depth_prev * ray(pixel_prev)) ||, depth along z in metres.
+template <typename Camera, typename Scalar>
+[[nodiscard]] Scalar reprojection_distance(const Camera& camera, const SE3<Scalar>& T_cur_prev, const Vector2<Scalar>& pixel_prev,
+                                           const detail::non_deduced<Scalar>& depth_prev, const Vector2<Scalar>& pixel_cur) noexcept {
+  using std::sqrt;
+  Vector3<Scalar> ray;
+  Vector2<Scalar> projected;
+  if (!is_valid_depth(depth_prev) || !camera.unproject(pixel_prev, ray)) return Scalar(no_distance<double>);
+  const Vector3<Scalar> point = ray * depth_prev;
+  if (!camera.project(T_cur_prev * point, projected)) return Scalar(no_distance<double>);
+  const Vector2<Scalar> difference = projected - pixel_cur;
+  const Scalar distance = sqrt(difference.squaredNorm());
+  return has_distance(distance) ? distance : Scalar(no_distance<double>);
+}
+
+/// reprojection_distance of every correspondence, for any camera. Allocates nothing.
+template <typename Camera>
+void reprojection_distances(const Camera& camera, const SE3<typename Camera::ScalarType>& T_cur_prev,
+                            const PointSpan<typename Camera::ScalarType, 2>& prev, span<const typename Camera::ScalarType> depth_prev,
+                            const PointSpan<typename Camera::ScalarType, 2>& cur, span<typename Camera::ScalarType> out) noexcept {
+  CFP_ASSERT(prev.size() == out.size() && depth_prev.size() == out.size() && cur.size() == out.size());
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = reprojection_distance(camera, T_cur_prev, prev[i], depth_prev[i], cur[i]);
+}
+
+/// The same for the pinhole camera, vectorised: depth * (K R K^-1) (u, v, 1) + K t, divided by its last component. Equal to
+/// the scalar function up to rounding; the result of a keypoint does not depend on its place in the arrays.
+template <typename Scalar>
+void reprojection_distances(const PinholeCamera<Scalar>& camera, const SE3<detail::non_deduced<Scalar>>& T_cur_prev,
+                            const PointSpan<detail::non_deduced<Scalar>, 2>& prev, span<const detail::non_deduced<Scalar>> depth_prev,
+                            const PointSpan<detail::non_deduced<Scalar>, 2>& cur, span<detail::non_deduced<Scalar>> out) noexcept {
+  CFP_ASSERT(prev.size() == out.size() && depth_prev.size() == out.size() && cur.size() == out.size());
+  const Matrix3<Scalar> R = T_cur_prev.rotation;
+  const Vector3<Scalar> t = T_cur_prev.translation;
+  const Scalar inv_fx = Scalar(1) / camera.fx;
+  const Scalar inv_fy = Scalar(1) / camera.fy;
+  const Scalar largest = (std::numeric_limits<Scalar>::max)();
+  using Chunk = detail::Chunk<Scalar>;
+  detail::for_each_chunk(out.size(), [&](std::size_t first, std::size_t count) {
+    Chunk u_prev, v_prev, u, v, depth;
+    detail::load_chunk(prev, first, count, u_prev, v_prev);
+    detail::load_chunk(cur, first, count, u, v);
+    detail::load_chunk(depth_prev, first, count, depth);
+    const Chunk x = (u_prev - camera.cx) * inv_fx;
+    const Chunk y = (v_prev - camera.cy) * inv_fy;
+    const Chunk z = depth * (R(2, 0) * x + R(2, 1) * y + R(2, 2)) + t.z();
+    const Chunk inv_z = z.inverse();
+    const Chunk du = camera.fx * (depth * (R(0, 0) * x + R(0, 1) * y + R(0, 2)) + t.x()) * inv_z + (camera.cx - u);
+    const Chunk dv = camera.fy * (depth * (R(1, 0) * x + R(1, 1) * y + R(1, 2)) + t.y()) * inv_z + (camera.cy - v);
+    Chunk distance = (du * du + dv * dv).sqrt();
+    for (Eigen::Index i = 0; i < distance.size(); ++i) {
+      const bool valid = static_cast<bool>(static_cast<int>(depth[i] > Scalar(0)) & static_cast<int>(depth[i] <= largest) &
+                                           static_cast<int>(z[i] > Tolerance<Scalar>::min_depth) & static_cast<int>(distance[i] <= largest));
+      distance[i] = valid ? distance[i] : no_distance<Scalar>;
+    }
+    detail::store_chunk(distance, first, count, out);
+  });
+}
+
+}  // namespace cfp
