@@ -86,15 +86,15 @@ template <typename Scalar>
   const Scalar t2 = w.squaredNorm();
   const Matrix3<Scalar> W = hat(w);
   Scalar b, c;
-  // The difference t - sin t cancels well above small_angle; its own threshold keeps the error below rounding.
-  if (t2 > Scalar(100) * Scalar(Tolerance<Scalar>::small_angle)) {
+  // The difference t - sin t cancels well above small_angle. Below 0.1 rad the four-term series is exact for both scalars.
+  if (t2 > Scalar(1e-2)) {
     const Scalar t = sqrt(t2);
     const Scalar half = sin(t * Scalar(0.5));
     b = Scalar(2) * half * half / t2;
     c = (t - sin(t)) / (t2 * t);
   } else {
-    b = Scalar(0.5) - t2 / Scalar(24) * (Scalar(1) - t2 / Scalar(30));
-    c = Scalar(1) / Scalar(6) - t2 / Scalar(120) * (Scalar(1) - t2 / Scalar(42));
+    b = Scalar(0.5) - t2 / Scalar(24) * (Scalar(1) - t2 / Scalar(30) * (Scalar(1) - t2 / Scalar(56)));
+    c = Scalar(1) / Scalar(6) - t2 / Scalar(120) * (Scalar(1) - t2 / Scalar(42) * (Scalar(1) - t2 / Scalar(72)));
   }
   Matrix3<Scalar> J = b * W;
   J.noalias() += c * (W * W);
@@ -102,8 +102,8 @@ template <typename Scalar>
   return J;
 }
 
-/// The rotation nearest to R in first order (one step of the polar iteration after normalisation of the quaternion):
-/// removes the drift that products of many rotations collect.
+/// The rotation of R's normalised quaternion: to first order the nearest one to an R that is nearly a rotation. Removes the
+/// drift that products of many rotations collect.
 template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> normalized_rotation(const Matrix3<Scalar>& R) noexcept {
   return Eigen::Quaternion<Scalar>(R).normalized().toRotationMatrix();
