@@ -22,7 +22,7 @@ template <typename Scalar>
   return is_finite(box.x1) && is_finite(box.y1) && is_finite(box.x2) && is_finite(box.y2) && box.x1 < box.x2 && box.y1 < box.y2;
 }
 
-/// Area in px^2; 0 for an improper box.
+/// Area in px^2; 0 for an improper box, infinite when the product overflows.
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar area(const Box<Scalar>& box) noexcept {
   return is_proper(box) ? box.width() * box.height() : Scalar(0);
@@ -31,24 +31,26 @@ template <typename Scalar>
 /// Whether (x, y) lies in the box, its border included.
 template <typename Scalar>
 [[nodiscard]] constexpr bool contains(const Box<Scalar>& box, Scalar x, Scalar y) noexcept {
-  return x >= box.x1 && x <= box.x2 && y >= box.y1 && y <= box.y2;
+  return x >= box.x1 && x <= box.x2 && y >= box.y1 && y <= box.y2 && is_proper(box);
 }
 
-/// The common part; improper when there is none.
+/// The common part; improper when there is none or either box is improper.
 template <typename Scalar>
 [[nodiscard]] constexpr Box<Scalar> intersection(const Box<Scalar>& a, const Box<Scalar>& b) noexcept {
+  if (!is_proper(a) || !is_proper(b)) return {};
   return {(std::max)(a.x1, b.x1), (std::max)(a.y1, b.y1), (std::min)(a.x2, b.x2), (std::min)(a.y2, b.y2)};
 }
 
-/// Intersection over union in [0, 1]; 0 when either box is improper. Exact for boxes whose areas do not overflow.
+/// Intersection over union in [0, 1]; 0 when either box is improper or the areas overflow. Symmetric; 1 for equal boxes.
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar iou(const Box<Scalar>& a, const Box<Scalar>& b) noexcept {
-  const Scalar common = is_proper(a) && is_proper(b) ? area(intersection(a, b)) : Scalar(0);
+  const Scalar common = area(intersection(a, b));
   const Scalar united = area(a) + area(b) - common;
   return common > Scalar(0) && is_finite(united) ? clamp_probability(common / united) : Scalar(0);
 }
 
-/// The part of the box inside the image [0, image_width] x [0, image_height]; improper when it lies outside.
+/// The part of the box inside the image [0, image_width] x [0, image_height]; improper when it lies outside or the image
+/// has no size.
 template <typename Scalar>
 [[nodiscard]] constexpr Box<Scalar> clip(const Box<Scalar>& box, Scalar image_width, Scalar image_height) noexcept {
   return intersection(box, Box<Scalar>{Scalar(0), Scalar(0), image_width, image_height});
