@@ -1,0 +1,90 @@
+#include "cfp/probability/map_point.hpp"
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "cfp/core/options.hpp"
+#include "support/catch.hpp"
+
+namespace {
+
+cfp::MapPointOptions with(cfp::MapPointPolicy policy) {
+  cfp::MapPointOptions options;
+  options.policy = policy;
+  return options;
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("Each map-point policy is its formula", "[probability]", float, double) {
+  const TestType m = TestType(0.6), k = TestType(0.1);
+  CHECK(cfp::updated_map_point(m, k, with(cfp::MapPointPolicy::copy)) == k);
+  cfp::MapPointOptions options = with(cfp::MapPointPolicy::exponential_mean);
+  options.rate = 0.25;
+  CHECK_THAT(cfp::updated_map_point(m, k, options), WithinAbs(0.475, 1e-6));
+  options = with(cfp::MapPointPolicy::log_odds);
+  options.rate = 1;
+  // Odds multiply: (0.6 / 0.4) (0.1 / 0.9) = 1/6, probability 1/7.
+  CHECK_THAT(cfp::updated_map_point(m, k, options), WithinAbs(1.0 / 7.0, 1e-6));
+}
+
+TEST_CASE("The mean converges to a constant K, the log-odds to its bound", "[probability]") {
+  double mean = 1, odds = 1;
+  for (int i = 0; i < 200; ++i) {
+    mean = cfp::updated_map_point(mean, 0.4, with(cfp::MapPointPolicy::exponential_mean));
+    odds = cfp::updated_map_point(odds, 0.4, with(cfp::MapPointPolicy::log_odds));
+  }
+  CHECK_THAT(mean, WithinAbs(0.4, 1e-12));
+  CHECK_THAT(odds, WithinAbs(0.02, 1e-12));
+}
+
+TEST_CASE("Deletion and mismatch happen at the paper's and our thresholds", "[probability]") {
+  const cfp::MapPointOptions options;
+  CHECK(cfp::is_deletable(0.2999, options));
+  CHECK_FALSE(cfp::is_deletable(0.3, options));
+  CHECK(cfp::is_mismatch(1.0, 0.49, options));
+  CHECK(cfp::is_mismatch(0.2, 0.71, options));
+  CHECK_FALSE(cfp::is_mismatch(0.25, 0.75, options));
+  CHECK(cfp::is_mismatch(std::numeric_limits<double>::quiet_NaN(), 0.5, options));
+  CHECK(cfp::is_deletable(std::numeric_limits<double>::quiet_NaN(), options));
+}
+
+TEST_CASE("The weight rules are what they are called", "[probability]") {
+  CHECK_THAT(cfp::observation_weight(0.5, 0.8, cfp::WeightRule::product), WithinAbs(0.4, 1e-15));
+  CHECK(cfp::observation_weight(0.5, 0.8, cfp::WeightRule::minimum) == 0.5);
+  CHECK_THAT(cfp::observation_weight(0.5, 0.8, cfp::WeightRule::mean), WithinAbs(0.65, 1e-15));
+}
+
+TEMPLATE_TEST_CASE("Map points and weights keep their range for hostile input", "[probability]", float, double) {
+  using Limits = std::numeric_limits<TestType>;
+  const std::vector<TestType> hostile = {TestType(0), TestType(1), TestType(-3), TestType(7), Limits::denorm_min(), Limits::max(), Limits::infinity(), -Limits::infinity(), Limits::quiet_NaN()};
+  for (const TestType m : hostile) {
+    for (const TestType k : hostile) {
+      for (const auto policy : {cfp::MapPointPolicy::copy, cfp::MapPointPolicy::exponential_mean, cfp::MapPointPolicy::log_odds}) {
+        const TestType updated = cfp::updated_map_point(m, k, with(policy));
+        CHECK((updated >= 0 && updated <= 1));
+      }
+      for (const auto rule : {cfp::WeightRule::product, cfp::WeightRule::minimum, cfp::WeightRule::mean}) {
+        const TestType w = cfp::observation_weight(k, m, rule);
+        CHECK((w >= 0 && w <= 1));
+      }
+    }
+  }
+}
+
+TEST_CASE("Map-point options outside their range are named", "[probability]") {
+  cfp::MapPointOptions options;
+  CHECK(cfp::invalid_field(options) == nullptr);
+  options.rate = 0;
+  CHECK_THROWS_WITH(cfp::validate(options), Catch::Matchers::Contains("rate"));
+  options = {};
+  options.evidence_limit = 0.5;
+  CHECK(cfp::invalid_field(options) == std::string("evidence_limit"));
+  options = {};
+  options.deletion_threshold = -0.1;
+  CHECK(cfp::invalid_field(options) == std::string("deletion_threshold"));
+  options = {};
+  options.mismatch_threshold = 0;
+  CHECK(cfp::invalid_field(options) == std::string("mismatch_threshold"));
+}
