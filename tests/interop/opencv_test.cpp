@@ -1,0 +1,165 @@
+#include "cfp/interop/opencv.hpp"
+
+#include <cmath>
+#include <limits>
+#include <type_traits>
+
+#include <opencv2/core.hpp>
+
+#include "support/allocation_counter.hpp"
+#include "support/catch.hpp"
+
+namespace {
+
+template <typename Scalar>
+cfp::SE3<Scalar> some_pose() {
+  cfp::Vector6<Scalar> xi;
+  xi << Scalar(0.4), Scalar(-1.5), Scalar(2.25), Scalar(0.3), Scalar(-0.7), Scalar(0.2);
+  return cfp::se3_exp(xi);
+}
+
+template <typename Vector, typename = void>
+struct CanView : std::false_type {};
+template <typename Vector>
+struct CanView<Vector, std::void_t<decltype(cfp::view(std::declval<Vector>()))>> : std::true_type {};
+
+}  // namespace
+
+TEST_CASE("Views read OpenCV's points in place", "[interop]") {
+  std::vector<cv::Point2f> pixels{{1.5F, 2.5F}, {-3.0F, 4.0F}};
+  const cfp::PointSpan<float, 2> view = cfp::view(pixels);
+  REQUIRE(view.size() == 2);
+  CHECK(view(1, 0) == -3.0F);
+  pixels[1].x = 7.0F;
+  CHECK(view(1, 0) == 7.0F);
+
+  const std::vector<cv::Point3d> points{{1, 2, 3}, {4, 5, 6}};
+  CHECK(cfp::view(points)[1] == Eigen::Vector3d(4, 5, 6));
+  CHECK(cfp::view(std::as_const(pixels))[0] == Eigen::Vector2f(1.5F, 2.5F));
+  const std::vector<cv::Point2f> none;
+  CHECK(cfp::view(none).empty());
+}
+
+TEST_CASE("A keypoint view steps over the other fields", "[interop]") {
+  std::vector<cv::KeyPoint> keypoints;
+  for (int i = 0; i < 5; ++i) keypoints.emplace_back(static_cast<float>(i), static_cast<float>(10 * i), 31.0F, 45.0F, 0.5F, 2, 3);
+  const cfp::PointSpan<float, 2> view = cfp::view(keypoints);
+  REQUIRE(view.size() == 5);
+  for (std::size_t i = 0; i < 5; ++i) CHECK(view[i] == Eigen::Vector2f(keypoints[i].pt.x, keypoints[i].pt.y));
+}
+
+TEST_CASE("A temporary vector cannot be viewed", "[interop]") {
+  STATIC_REQUIRE(CanView<std::vector<cv::KeyPoint>&>::value);
+  STATIC_REQUIRE(!CanView<std::vector<cv::KeyPoint>>::value);
+  STATIC_REQUIRE(!CanView<std::vector<cv::Point2f>>::value);
+  STATIC_REQUIRE(!CanView<const std::vector<cv::Point3f>>::value);
+}
+
+TEMPLATE_TEST_CASE("A rectangle and its box have the same area", "[interop]", float, double) {
+  const cv::Rect rectangle(10, 20, 30, 40);
+  const cfp::Box<TestType> box = cfp::to_box<TestType>(rectangle);
+  CHECK(box.x1 == TestType(10));
+  CHECK(box.y2 == TestType(60));
+  CHECK(cfp::area(box) == TestType(rectangle.area()));
+  CHECK(!cfp::is_proper(cfp::to_box<TestType>(cv::Rect(5, 5, 0, 3))));
+}
+
+TEST_CASE("Depth is sampled at the nearest pixel, in metres", "[interop]") {
+  cv::Mat whole(6, 9, CV_16UC1, cv::Scalar(9999));
+  cv::Mat depth = whole(cv::Rect(2, 1, 4, 3));  // rows further apart than they are long
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) depth.at<unsigned short>(row, column) = static_cast<unsigned short>(1000 * row + 10 * column + 5000);
+  }
+  depth.at<unsigned short>(0, 0) = 0;
+  const std::vector<cv::Point2f> pixels{{2.4F, 1.4F}, {2.6F, 0.6F}, {-0.5F, 2.0F}, {3.49F, 2.49F}, {0, 0}, {-0.6F, 0}, {3.5F, 0}, {0, 2.5F}};
+  std::vector<float> metres(pixels.size());
+  CHECK(cfp::sample_depth(depth, cfp::view(pixels), 1.0 / 5000, metres) == cfp::Status::ok);
+  const std::vector<float> expected{6020.0F / 5000, 6030.0F / 5000, 7000.0F / 5000, 7030.0F / 5000, -1, -1, -1, -1};
+  for (std::size_t i = 0; i < pixels.size(); ++i) CHECK_THAT(metres[i], WithinAbs(static_cast<double>(expected[i]), 1e-6));
+
+  cv::Mat in_metres;
+  depth.convertTo(in_metres, CV_32F, 1.0 / 5000);
+  std::vector<float> again(pixels.size());
+  for (const int type : {CV_32F, CV_64F}) {
+    depth.convertTo(in_metres, type, 1.0 / 5000);
+    cfp::Status status{};
+    CHECK(cfp_test::allocations_in([&] { status = cfp::sample_depth(in_metres, cfp::view(pixels), 1.0, again); }) == 0);
+    CHECK(status == cfp::Status::ok);
+    for (std::size_t i = 0; i < pixels.size(); ++i) CHECK_THAT(again[i], WithinAbs(static_cast<double>(metres[i]), 1e-6));
+  }
+}
+
+TEST_CASE("Hostile depth and pixels give -1", "[interop]") {
+  constexpr float inf = std::numeric_limits<float>::infinity(), nan = std::numeric_limits<float>::quiet_NaN();
+  const cv::Mat depth = (cv::Mat_<float>(1, 6) << nan, inf, -inf, -2.0F, 0.0F, 1e-45F);
+  const std::vector<cv::Point2f> pixels{{0, 0}, {1, 0}, {2, 0}, {3, 0}, {4, 0}, {nan, 0}, {0, inf}, {1e30F, 0}, {-1e30F, 0}};
+  std::vector<float> metres(pixels.size(), 5.0F);
+  CHECK(cfp::sample_depth(depth, cfp::view(pixels), 1.0, metres) == cfp::Status::not_enough_data);
+  for (const float value : metres) CHECK(value == -1.0F);
+
+  const std::vector<cv::Point2f> tiny{{5, 0}};
+  std::vector<float> one(1);
+  CHECK(cfp::sample_depth(depth, cfp::view(tiny), 1e-300, one) == cfp::Status::not_enough_data);
+  CHECK(one[0] == -1.0F);
+  CHECK(cfp::sample_depth(depth, cfp::view(tiny), 1e300, one) == cfp::Status::not_enough_data);
+  CHECK(one[0] == -1.0F);
+
+  for (const double scale : {0.0, -1.0, static_cast<double>(nan), static_cast<double>(inf)}) {
+    metres.assign(pixels.size(), 5.0F);
+    CHECK(cfp::sample_depth(depth, cfp::view(pixels), scale, metres) == cfp::Status::invalid_input);
+    for (const float value : metres) CHECK(value == -1.0F);
+  }
+  for (const cv::Mat& wrong : {cv::Mat(), cv::Mat(2, 2, CV_8UC1, cv::Scalar(1)), cv::Mat(2, 2, CV_32FC3, cv::Scalar(1))}) {
+    CHECK(cfp::sample_depth(wrong, cfp::view(pixels), 1.0, metres) == cfp::Status::invalid_input);
+  }
+  const std::vector<cv::Point2f> none;
+  CHECK(cfp::sample_depth(depth, cfp::view(none), 1.0, {}) == cfp::Status::not_enough_data);
+}
+
+TEMPLATE_TEST_CASE("A pose survives the way through OpenCV and back", "[interop]", float, double) {
+  const cfp::SE3<TestType> pose = some_pose<TestType>();
+  for (const int rows : {3, 4}) {
+    for (const int type : {CV_32F, CV_64F}) {
+      cv::Mat matrix(rows, 4, type, cv::Scalar(-9));
+      REQUIRE(cfp::write_pose(pose, matrix) == cfp::Status::ok);
+      cfp::SE3<TestType> back;
+      REQUIRE(cfp::to_se3(matrix, back) == cfp::Status::ok);
+      CHECK((back.rotation - pose.rotation).norm() < TestType(1e-6));
+      CHECK((back.translation - pose.translation).norm() < TestType(1e-6));
+      if (rows == 4) {
+        cv::Mat last_row;
+        matrix.row(3).convertTo(last_row, CV_64F);
+        CHECK(cv::Vec4d(last_row.ptr<double>()) == cv::Vec4d(0, 0, 0, 1));
+      }
+    }
+  }
+}
+
+TEST_CASE("to_se3 normalises drift and refuses what is no pose", "[interop]") {
+  const cfp::SE3<double> pose = some_pose<double>();
+  cv::Mat matrix(4, 4, CV_64F);
+  REQUIRE(cfp::write_pose(pose, matrix) == cfp::Status::ok);
+  cfp::SE3<double> read;
+
+  cv::Mat drifted = matrix.clone();
+  drifted.at<double>(0, 0) += 1e-3;
+  REQUIRE(cfp::to_se3(drifted, read) == cfp::Status::ok);
+  CHECK((read.rotation * read.rotation.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-14);
+  CHECK((read.rotation - pose.rotation).norm() < 2e-3);
+
+  const cfp::SE3<double> before = read;
+  cv::Mat scaled = matrix * 1.1, mirrored = matrix.clone(), with_nan = matrix.clone();
+  mirrored.row(0) *= -1;
+  with_nan.at<double>(1, 3) = std::numeric_limits<double>::quiet_NaN();
+  for (const cv::Mat& wrong : {scaled, mirrored, with_nan, cv::Mat(), cv::Mat(matrix.rowRange(0, 2)), cv::Mat(4, 4, CV_8UC1, cv::Scalar(1))}) {
+    CHECK(cfp::to_se3(wrong, read) == cfp::Status::invalid_input);
+    CHECK(read.rotation == before.rotation);
+    CHECK(read.translation == before.translation);
+  }
+  cv::Mat small(3, 3, CV_64F);
+  CHECK(cfp::write_pose(pose, small) == cfp::Status::invalid_input);
+  cv::Mat beyond_float = matrix.clone();
+  beyond_float.at<double>(2, 3) = 1e300;
+  cfp::SE3<float> narrow;
+  CHECK(cfp::to_se3(beyond_float, narrow) == cfp::Status::invalid_input);
+}
