@@ -21,8 +21,15 @@ std::size_t allocation_count() noexcept { return count; }
 #endif
 
 // Eigen allocates dynamic storage with malloc, the containers with operator new, which glibc's allocator serves through
-// malloc as well: interposing malloc catches both. The sanitizers own malloc; under them only operator new is counted.
-#if defined(__GLIBC__) && !defined(CFP_TEST_SANITIZED)
+// malloc as well: interposing malloc catches both. The sanitizers own malloc and offer a hook instead. Elsewhere only
+// operator new is counted.
+#if defined(CFP_TEST_SANITIZED)
+#include <sanitizer/allocator_interface.h>
+namespace {
+[[maybe_unused]] const int installed =
+    __sanitizer_install_malloc_and_free_hooks([](const volatile void*, std::size_t) { ++count; }, [](const volatile void*) {});
+}
+#elif defined(__GLIBC__)
 extern "C" {
 void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t n, std::size_t size);
