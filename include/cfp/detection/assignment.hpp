@@ -49,8 +49,13 @@ struct AssignmentWorkspace {
   std::vector<double> row_saving;     ///< a_i >= 0, one per row
   std::vector<double> column_saving;  ///< b_j >= 0, one per column
 
-  std::vector<double> costs, price, open_price, distance, closed_distance;
-  std::vector<std::ptrdiff_t> column_of_row, row_of_column, parent, queue, closed;
+  struct Visit {
+    std::ptrdiff_t row, column;
+    double distance, offset;
+  };
+  std::vector<double> costs, price, open_price, distance;
+  std::vector<std::ptrdiff_t> column_of_row, row_of_column, queue;
+  std::vector<Visit> visits;
 };
 
 /// Fills column_of_row (size rows) with the optimal column of each row, or `unassigned`. Exact up to the rounding of double.

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include <Eigen/Core>
+
 #include "cfp/core/numeric.hpp"
 #include "cfp/detection/assignment.hpp"
 
@@ -18,55 +20,63 @@ inline constexpr std::ptrdiff_t nobody = -1;
 
 inline constexpr double assignment_largest_cost = 1e200;  // sums over any matrix stay finite
 
-/// The cost in double, or infinity for a forbidden pair.
-template <typename Scalar>
-[[nodiscard]] double gated_cost(Scalar cost, double max_cost) noexcept {
-  const double c = static_cast<double>(cost);
-  const bool allowed = static_cast<int>(c < max_cost) & static_cast<int>(std::abs(c) <= assignment_largest_cost);
-  return allowed ? c : infinity;
-}
+[[nodiscard]] inline double smaller(double a, double b) noexcept { return a < b ? a : b; }
+[[nodiscard]] inline double larger(double a, double b) noexcept { return a > b ? a : b; }
 
-/// Smallest and largest allowed cost, in lanes so that compilers vectorise the loop without reordering permission.
-struct CostRange {
-  double low[assignment_lanes], high[assignment_lanes];
-
-  CostRange() noexcept {
-    std::fill(low, low + assignment_lanes, infinity);
-    std::fill(high, high + assignment_lanes, -infinity);
+/// The two smallest of some numbers. Four of these side by side keep the processor busy where one would wait for itself.
+struct TwoLeast {
+  double first = infinity, second = infinity;
+  void add(double x) noexcept {
+    second = smaller(second, larger(first, x));
+    first = smaller(first, x);
   }
-  /// Writes gated costs (padded with infinity to a multiple of the lanes) and takes them into the range.
-  template <typename Scalar>
-  void copy(const Scalar* costs, std::size_t step, std::size_t size, double max_cost, double* gated) noexcept {
-    std::size_t j = 0;
-    if (step == 1) {
-      for (; j + assignment_lanes <= size; j += assignment_lanes) {
-        for (std::size_t l = 0; l < assignment_lanes; ++l) gated[j + l] = gated_cost(costs[j + l], max_cost);
-        include(gated + j);
-      }
-    }
-    for (; j < size; j += assignment_lanes) {
-      for (std::size_t l = 0; l < assignment_lanes; ++l) gated[j + l] = j + l < size ? gated_cost(costs[(j + l) * step], max_cost) : infinity;
-      include(gated + j);
-    }
-  }
-  void include(const double* gated) noexcept {
-    for (std::size_t l = 0; l < assignment_lanes; ++l) {
-      const double allowed = gated[l] < infinity ? gated[l] : -infinity;
-      low[l] = gated[l] < low[l] ? gated[l] : low[l];
-      high[l] = allowed > high[l] ? allowed : high[l];
-    }
-  }
-  /// The gate that is really used for n pairs at most; -infinity: no pair is allowed. Above the bound below a gate means
-  /// "as many pairs as possible" anyway, and a needlessly large one would only cost digits.
-  [[nodiscard]] double gate(double max_cost, std::size_t n) const noexcept {
-    const double least = *std::min_element(low, low + assignment_lanes);
-    const double most = *std::max_element(high, high + assignment_lanes);
-    if (!(least <= most)) return -infinity;
-    // The magnitude takes part so that the bound exceeds `most` even after rounding when all costs are (nearly) equal.
-    const double width = (std::max)({most - least, (std::max)(-least, most) / 4, (std::numeric_limits<double>::min)()});
-    return (std::min)(max_cost, most + static_cast<double>(n) * width);
+  void add(const TwoLeast& other) noexcept {
+    second = smaller(smaller(second, other.second), larger(first, other.first));
+    first = smaller(first, other.first);
   }
 };
+
+/// What a cost has to be to allow its pair, as two comparisons that NaN fails.
+struct CostLimits {
+  double low = -assignment_largest_cost;  // inclusive
+  double high;                            // exclusive
+
+  explicit CostLimits(double max_cost) noexcept : high((std::min)(max_cost, std::nextafter(assignment_largest_cost, infinity))) {}
+  /// The cost in double, or infinity for a forbidden pair.
+  template <typename Scalar>
+  [[nodiscard]] double operator()(Scalar cost) const noexcept {
+    const double c = static_cast<double>(cost);
+    const double below = c < high ? c : infinity;
+    return c >= low ? below : infinity;
+  }
+};
+
+/// Copies a row of costs, and takes it into the least and the most allowed cost of each column (no reduction along the row, so
+/// that compilers vectorise the loop).
+template <typename Scalar>
+void copy_costs(const Scalar* source, std::size_t step, std::size_t size, CostLimits limits, double* costs, double* least, double* most) noexcept {
+  const auto copy = [&](std::size_t j, Scalar value) {
+    const double c = limits(value);
+    const double allowed = c < infinity ? c : -infinity;
+    costs[j] = c;
+    least[j] = c < least[j] ? c : least[j];
+    most[j] = allowed > most[j] ? allowed : most[j];
+  };
+  if (step == 1) {
+    for (std::size_t j = 0; j < size; ++j) copy(j, source[j]);
+  } else {
+    for (std::size_t j = 0; j < size; ++j) copy(j, source[j * step]);
+  }
+}
+
+/// The gate that is really used for n pairs at most; -infinity: no pair is allowed. Above the bound below a gate means "as
+/// many pairs as possible" anyway, and a needlessly large one would only cost digits.
+[[nodiscard]] inline double effective_gate(double max_cost, double least, double most, std::size_t n) noexcept {
+  if (!(least <= most)) return -infinity;
+  // The magnitude takes part so that the bound exceeds `most` even after rounding when all costs are (nearly) equal.
+  const double width = (std::max)({most - least, (std::max)(-least, most) / 4, (std::numeric_limits<double>::min)()});
+  return (std::min)(max_cost, most + static_cast<double>(n) * width);
+}
 
 /// One solve over the workspace, rows <= columns. Notation: price p_j <= 0, reduced cost c_ij - p_j, gate g. A row of a pair
 /// always holds its column at its smallest reduced cost, which is at most g; a column without a row has price 0.
@@ -78,7 +88,7 @@ class AssignmentSolver {
   static std::size_t padded(std::size_t cols) noexcept { return (cols + assignment_lanes - 1) / assignment_lanes * assignment_lanes; }
 
   void solve() noexcept {
-    const std::size_t left = bid();
+    const std::size_t left = bid(greet());
     for (std::size_t k = 0; k < left; ++k) augment(w_.queue[k]);
   }
   /// The smallest reduced cost of a row, its dummy included.
@@ -101,43 +111,65 @@ class AssignmentSolver {
   [[nodiscard]] Offer offer(std::ptrdiff_t row) const noexcept {
     const double* c = costs(row);
     const double* p = w_.price.data();
-    double first[assignment_lanes], second[assignment_lanes];
-    std::fill(first, first + assignment_lanes, infinity);
-    std::fill(second, second + assignment_lanes, infinity);
+    TwoLeast t0, t1, t2, t3;
     for (std::size_t j = 0; j < stride_; j += assignment_lanes) {
-      for (std::size_t l = 0; l < assignment_lanes; ++l) {
-        const double r = c[j + l] - p[j + l];
-        const double larger = r > first[l] ? r : first[l];
-        second[l] = larger < second[l] ? larger : second[l];
-        first[l] = r < first[l] ? r : first[l];
-      }
+      t0.add(c[j] - p[j]);
+      t1.add(c[j + 1] - p[j + 1]);
+      t2.add(c[j + 2] - p[j + 2]);
+      t3.add(c[j + 3] - p[j + 3]);
     }
-    Offer o{first[0], second[0], nobody, nobody};
-    for (std::size_t l = 1; l < assignment_lanes; ++l) {
-      o.second = (std::min)((std::max)(o.best, first[l]), (std::min)(o.second, second[l]));
-      o.best = (std::min)(o.best, first[l]);
-    }
+    t0.add(t1);
+    t2.add(t3);
+    t0.add(t2);
+    Offer o{t0.first, t0.second, nobody, nobody};
     if (!(o.best < gate_)) return o;
-    std::size_t j = 0;
-    while (c[j] - p[j] != o.best) ++j;
-    o.column = static_cast<std::ptrdiff_t>(j);
-    if (!(o.second < gate_)) {
-      o.second = gate_;
-    } else if (o.second == o.best) {
-      do ++j;
-      while (c[j] - p[j] != o.best);
-      o.second_column = static_cast<std::ptrdiff_t>(j);
-    }
+    const bool tied = o.second == o.best;
+    if (!(o.second < gate_)) o.second = gate_;
+    o.column = find(c, p, o.best, 0);
+    if (tied) o.second_column = find(c, p, o.best, o.column + 1);
     return o;
+  }
+
+  /// The first column from `j` on with the least reduced cost; there is one. (One comparison by order, not equality, which
+  /// would look for NaN, too.)
+  [[nodiscard]] static std::ptrdiff_t find(const double* c, const double* p, double reduced, std::ptrdiff_t j) noexcept {
+    for (; j % 4 != 0; ++j) {
+      if (c[j] - p[j] <= reduced) return j;
+    }
+    while (static_cast<int>(c[j] - p[j] > reduced) & static_cast<int>(c[j + 1] - p[j + 1] > reduced) & static_cast<int>(c[j + 2] - p[j + 2] > reduced) &
+           static_cast<int>(c[j + 3] - p[j + 3] > reduced)) {
+      j += 4;
+    }
+    while (c[j] - p[j] > reduced) ++j;
+    return j;
+  }
+
+  /// Every row takes its cheapest column while that is free. Returns how many rows are left in the queue. In a frame of boxes
+  /// that barely overlap this settles nearly all.
+  std::size_t greet() noexcept {
+    std::size_t left = 0;
+    for (std::size_t k = 0; k < rows_; ++k) {
+      const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(k);
+      const double least = Eigen::Map<const Eigen::ArrayXd>(costs(row), static_cast<Eigen::Index>(stride_)).minCoeff();
+      if (!(least < gate_)) continue;
+      const std::ptrdiff_t j = find(costs(row), w_.price.data(), least, 0);
+      if (at(w_.row_of_column, j) != nobody) {
+        w_.queue[left++] = row;
+        continue;
+      }
+      at(w_.row_of_column, j) = row;
+      at(w_.column_of_row, row) = j;
+    }
+    return left;
   }
 
   /// Rows bid for their best column, lowering its price by what the second best leaves. Returns how many rows are left in
   /// the queue: those of a tie, and what the bounded number of bids did not settle.
-  std::size_t bid() noexcept {
+  std::size_t bid(std::size_t waiting) noexcept {
     std::size_t left = 0;
     std::size_t bids = 4 * rows_;
-    for (std::size_t k = 0; k < rows_; ++k) {
-      std::ptrdiff_t row = static_cast<std::ptrdiff_t>(k);
+    for (std::size_t k = 0; k < waiting; ++k) {
+      std::ptrdiff_t row = w_.queue[k];
       while (row != nobody) {
         if (bids == 0) {
           w_.queue[left++] = row;
@@ -168,26 +200,26 @@ class AssignmentSolver {
     const double* c = costs(row);
     const double* p = w_.open_price.data();  // -infinity where closed, so that the sum below is infinite there
     double* d = w_.distance.data();
-    std::ptrdiff_t* parent = w_.parent.data();
-    double least[assignment_lanes];
-    std::fill(least, least + assignment_lanes, infinity);
+    double l0 = infinity, l1 = infinity, l2 = infinity, l3 = infinity;
     for (std::size_t j = 0; j < stride_; j += assignment_lanes) {
-      for (std::size_t l = 0; l < assignment_lanes; ++l) {
-        const double through = (c[j + l] - p[j + l]) + offset;
-        const bool shorter = through < d[j + l];
-        d[j + l] = shorter ? through : d[j + l];
-        parent[j + l] = shorter ? row : parent[j + l];
-        least[l] = d[j + l] < least[l] ? d[j + l] : least[l];
-      }
+      d[j] = smaller(d[j], (c[j] - p[j]) + offset);
+      d[j + 1] = smaller(d[j + 1], (c[j + 1] - p[j + 1]) + offset);
+      d[j + 2] = smaller(d[j + 2], (c[j + 2] - p[j + 2]) + offset);
+      d[j + 3] = smaller(d[j + 3], (c[j + 3] - p[j + 3]) + offset);
+      l0 = smaller(l0, d[j]);
+      l1 = smaller(l1, d[j + 1]);
+      l2 = smaller(l2, d[j + 2]);
+      l3 = smaller(l3, d[j + 3]);
     }
-    return (std::min)((std::min)(least[0], least[1]), (std::min)(least[2], least[3]));
+    return smaller(smaller(l0, l1), smaller(l2, l3));
   }
 
   /// The open column at that distance: the first free one, else the first.
   [[nodiscard]] std::ptrdiff_t nearest(double distance) const noexcept {
+    const double* d = w_.distance.data();
     std::ptrdiff_t first = nobody;
-    for (std::size_t j = 0; j < cols_; ++j) {
-      if (w_.distance[j] != distance) continue;
+    for (std::size_t j = 0; j < stride_; ++j) {
+      if (d[j] != distance) continue;
       if (w_.row_of_column[j] == nobody) return static_cast<std::ptrdiff_t>(j);
       if (first == nobody) first = static_cast<std::ptrdiff_t>(j);
     }
@@ -198,46 +230,55 @@ class AssignmentSolver {
   void augment(std::ptrdiff_t start) noexcept {
     std::fill(w_.distance.begin(), w_.distance.begin() + static_cast<std::ptrdiff_t>(stride_), infinity);
     std::copy(w_.price.begin(), w_.price.begin() + static_cast<std::ptrdiff_t>(stride_), w_.open_price.begin());
-    std::size_t closed = 0;
-    std::ptrdiff_t alone = start;  // the row whose dummy is the nearest so far
-    double dummy = gate_;
-    std::ptrdiff_t row = start;
-    double offset = 0;
+    w_.visits[0] = {start, nobody, 0, 0};
+    std::size_t visits = 1, alone = 0;  // alone: the visit whose dummy is the nearest so far
+    double dummy = gate_, length = 0;
     std::ptrdiff_t sink = nobody;
-    double length = 0;
     for (;;) {
-      const double least = relax(row, offset);
-      if (dummy < least) {
-        length = dummy;
-        break;
-      }
+      const double least = relax(w_.visits[visits - 1].row, w_.visits[visits - 1].offset);
+      length = (std::min)(least, dummy);
+      if (dummy <= least) break;
       const std::ptrdiff_t j = nearest(least);
-      if (at(w_.row_of_column, j) == nobody) {
-        length = least;
+      const std::ptrdiff_t row = at(w_.row_of_column, j);
+      if (row == nobody) {
         sink = j;
         break;
       }
-      w_.closed[closed] = j;
-      w_.closed_distance[closed++] = least;
       at(w_.open_price, j) = -infinity;
       at(w_.distance, j) = infinity;
-      row = at(w_.row_of_column, j);
-      offset = least - row_value(row);
+      const double offset = least - row_value(row);
+      w_.visits[visits] = {row, j, least, offset};
       if (gate_ + offset < dummy) {
         dummy = gate_ + offset;
-        alone = row;
+        alone = visits;
       }
+      ++visits;
     }
-    for (std::size_t k = 0; k < closed; ++k) at(w_.price, w_.closed[k]) += (std::min)(w_.closed_distance[k] - length, 0.0);
+    flip(sink, sink == nobody ? alone : visits);
+    for (std::size_t k = 1; k < visits; ++k) at(w_.price, w_.visits[k].column) += (std::min)(w_.visits[k].distance - length, 0.0);
+  }
+
+  /// Swaps the pairs along the shortest path that ends in column `sink`, or in the dummy of visit `end` when there is no sink.
+  void flip(std::ptrdiff_t sink, std::size_t end) noexcept {
     std::ptrdiff_t j = sink;
     if (sink == nobody) {
-      j = at(w_.column_of_row, alone);
-      at(w_.column_of_row, alone) = nobody;
+      at(w_.column_of_row, w_.visits[end].row) = nobody;
+      j = w_.visits[end].column;
     }
-    while (j != nobody) {
-      const std::ptrdiff_t parent = at(w_.parent, j);
-      at(w_.row_of_column, j) = parent;
-      std::swap(at(w_.column_of_row, parent), j);
+    while (j != nobody) {  // the row before a column is the one that gave it its distance, visited before the column closed
+      std::size_t best = 0;
+      double least = infinity;
+      for (std::size_t k = 0; k < end; ++k) {
+        const double through = (costs(w_.visits[k].row)[j] - at(w_.price, j)) + w_.visits[k].offset;
+        if (!(through < least)) continue;
+        least = through;
+        best = k;
+      }
+      const AssignmentWorkspace::Visit& visit = w_.visits[best];
+      at(w_.row_of_column, j) = visit.row;
+      at(w_.column_of_row, visit.row) = j;
+      j = visit.column;
+      end = best;
     }
   }
 
@@ -264,21 +305,23 @@ AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_co
   const std::size_t m = (std::max)(costs.rows, costs.cols);
   const std::size_t stride = detail::AssignmentSolver::padded(m);
   w.costs.resize(n * stride);
-  detail::CostRange range;
+  w.price.assign(stride, detail::infinity);
+  w.distance.assign(stride, -detail::infinity);
   for (std::size_t i = 0; i < n; ++i) {
-    range.copy(costs.values.data() + (tall ? i : i * costs.cols), tall ? costs.cols : 1, m, max_cost, w.costs.data() + i * stride);
+    const Scalar* source = costs.values.data() + (tall ? i : i * costs.cols);
+    detail::copy_costs(source, tall ? costs.cols : 1, m, detail::CostLimits(max_cost), w.costs.data() + i * stride, w.price.data(), w.distance.data());
+    std::fill(w.costs.data() + i * stride + m, w.costs.data() + (i + 1) * stride, detail::infinity);
   }
-  const double gate = range.gate(max_cost, n);
+  const double least = *std::min_element(w.price.begin(), w.price.end());
+  const double most = *std::max_element(w.distance.begin(), w.distance.end());
+  const double gate = detail::effective_gate(max_cost, least, most, n);
   if (!(gate > -detail::infinity)) return result;
   w.price.assign(stride, 0.0);
   w.open_price.resize(stride);
-  w.distance.resize(stride);
-  w.parent.assign(stride, detail::nobody);
   w.row_of_column.assign(stride, detail::nobody);
   w.column_of_row.assign(n, detail::nobody);
   w.queue.resize(n);
-  w.closed.resize(n);
-  w.closed_distance.resize(n);
+  w.visits.resize(n + 1);
 
   detail::AssignmentSolver solver(w, n, m, gate);
   solver.solve();
@@ -302,14 +345,17 @@ template <typename Scalar>
 double assignment_gap(const CostMatrix<Scalar>& costs, double max_cost, span<const int> column_of_row, span<const double> column_saving) noexcept {
   CFP_ASSERT(column_of_row.size() == costs.rows && column_saving.size() == costs.cols);
   if (!(max_cost == max_cost)) return detail::infinity;
-  detail::CostRange range;
-  for (const Scalar& cost : costs.values.subspan(0, costs.rows * costs.cols)) {
-    double gated[detail::assignment_lanes];
-    range.copy(&cost, 1, 1, max_cost, gated);
+  const detail::CostLimits limited(max_cost);
+  double least = detail::infinity, most = -detail::infinity;
+  for (const Scalar cost : costs.values.subspan(0, costs.rows * costs.cols)) {
+    const double c = limited(cost);
+    if (!(c < detail::infinity)) continue;
+    least = (std::min)(least, c);
+    most = (std::max)(most, c);
   }
-  const double gate = range.gate(max_cost, (std::min)(costs.rows, costs.cols));
+  const double gate = detail::effective_gate(max_cost, least, most, (std::min)(costs.rows, costs.cols));
   const auto saving_of = [&](std::size_t i, std::size_t j) {
-    const double c = detail::gated_cost(costs(i, j), max_cost);
+    const double c = limited(costs(i, j));
     return c < detail::infinity ? gate - c : -detail::infinity;
   };
   const auto price = [&](std::size_t j) { return column_saving[j] > 0 ? column_saving[j] : 0.0; };
