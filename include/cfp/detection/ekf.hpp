@@ -1,0 +1,67 @@
+/// @file ekf.hpp
+/// A small extended Kalman filter with fixed sizes: the reference of the box filter (paper IV-A names an EKF and neither
+/// state nor noise), and useful by itself. Nothing allocates.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+#include "cfp/core/numeric.hpp"
+#include "cfp/core/status.hpp"
+
+namespace cfp {
+
+/// Mean and covariance of n states. Stored without alignment demands, so that the layout does not depend on vector flags.
+template <typename Scalar, int n>
+struct EkfState {
+  Eigen::Matrix<Scalar, n, 1, Eigen::DontAlign> mean = Eigen::Matrix<Scalar, n, 1>::Zero();
+  Eigen::Matrix<Scalar, n, n, Eigen::DontAlign> covariance = Eigen::Matrix<Scalar, n, n>::Identity();
+};
+
+struct EkfUpdate {
+  Status status = Status::ok;  ///< invalid_input: something was not finite; degenerate: S was not positive definite
+  double mahalanobis_sq = 0;   ///< r' S^-1 r of the innovation r; chi-squared with m degrees of freedom when the model holds
+};
+
+/// Prediction: mean <- f(mean), P <- F P F' + Q, symmetrised. `motion(mean, F)` returns f(mean) and writes its Jacobian F at
+/// the mean (n x n). Returns false, and leaves the state as it was, when the result is not finite.
+template <typename Scalar, int n, typename Motion, typename Noise>
+[[nodiscard]] bool ekf_predict(EkfState<Scalar, n>& state, Motion&& motion, const Eigen::MatrixBase<Noise>& Q) noexcept {
+  using Square = Eigen::Matrix<Scalar, n, n>;
+  Square F;
+  const Eigen::Matrix<Scalar, n, 1> before = state.mean;
+  const Eigen::Matrix<Scalar, n, 1> mean = motion(before, F);
+  const Square P = F * state.covariance * F.transpose() + Q;
+  if (!mean.allFinite() || !P.allFinite()) return false;
+  state.mean = mean;
+  state.covariance = Scalar(0.5) * (P + P.transpose());
+  return true;
+}
+
+/// Update with a measurement z of m numbers: r = z - h(mean), S = H P H' + R, K = P H' S^-1 (an LDLT solve, never an inverse),
+/// mean <- mean + K r, P <- (I - K H) P (I - K H)' + K R K' (Joseph's form, symmetrised: P stays positive semi-definite).
+/// `measure(mean, H)` returns h(mean) and writes its Jacobian H (m x n). On any status but ok the state is left as it was.
+template <typename Scalar, int n, int m, typename Measure, typename Noise>
+EkfUpdate ekf_update(EkfState<Scalar, n>& state, const Eigen::Matrix<Scalar, m, 1>& z, Measure&& measure, const Eigen::MatrixBase<Noise>& R) noexcept {
+  using Square = Eigen::Matrix<Scalar, n, n>;
+  Eigen::Matrix<Scalar, m, n> H;
+  const Eigen::Matrix<Scalar, n, 1> before = state.mean;
+  const Square P = state.covariance;
+  const Eigen::Matrix<Scalar, m, 1> r = z - measure(before, H);
+  const Eigen::Matrix<Scalar, m, n> HP = H * P;
+  const Eigen::Matrix<Scalar, m, m> S = HP * H.transpose() + R;
+  if (!r.allFinite() || !S.allFinite()) return {Status::invalid_input, 0};
+  const Eigen::LDLT<Eigen::Matrix<Scalar, m, m>> solver(S);
+  const auto& pivots = solver.vectorD();
+  if (solver.info() != Eigen::Success || !(pivots.minCoeff() > Scalar(Tolerance<Scalar>::degenerate) * pivots.maxCoeff())) return {Status::degenerate, 0};
+  const Eigen::Matrix<Scalar, n, m> K = solver.solve(HP).transpose();
+  const Eigen::Matrix<Scalar, n, 1> mean = before + K * r;
+  const Square A = Square::Identity() - K * H;
+  const Square joseph = A * P * A.transpose() + K * R * K.transpose();
+  if (!mean.allFinite() || !joseph.allFinite()) return {Status::invalid_input, 0};
+  state.mean = mean;
+  state.covariance = Scalar(0.5) * (joseph + joseph.transpose());
+  return {Status::ok, static_cast<double>(r.dot(solver.solve(r)))};
+}
+
+}  // namespace cfp
