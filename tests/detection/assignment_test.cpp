@@ -153,6 +153,17 @@ TEST_CASE("Hostile costs end: NaN, infinities, extremes, empty", "[detection]") 
   }
 }
 
+TEST_CASE("Empty matrices need no memory", "[detection]") {
+  for (const auto& [rows, cols] : {std::pair<std::size_t, std::size_t>{0, 0}, {0, 3}, {3, 0}}) {
+    cfp::AssignmentWorkspace fresh;
+    std::vector<int> columns(rows, 5);
+    const cfp::AssignmentResult result = cfp::solve_assignment(cfp::CostMatrix(std::vector<double>{}, rows, cols), 1.0, columns, fresh);
+    CHECK(result.status == cfp::Status::ok);
+    CHECK(columns == std::vector<int>(rows, cfp::unassigned));
+    CHECK(cfp::assignment_gap(cfp::CostMatrix(std::vector<double>{}, rows, cols), 1.0, columns, fresh.column_saving) == 0);
+  }
+}
+
 TEST_CASE("Equal input gives equal assignments, and warm calls allocate nothing", "[detection]") {
   cfp::Random random(4, "assignment repeat");
   const std::vector<double> values = random_costs<double>(random, 30 * 40, Kind::integer_ties);

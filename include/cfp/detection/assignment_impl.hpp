@@ -304,6 +304,7 @@ AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_co
   const std::size_t n = (std::min)(costs.rows, costs.cols);
   const std::size_t m = (std::max)(costs.rows, costs.cols);
   const std::size_t stride = detail::AssignmentSolver::padded(m);
+  if (n == 0) return result;
   w.costs.resize(n * stride);
   w.price.assign(stride, detail::infinity);
   w.distance.assign(stride, -detail::infinity);
