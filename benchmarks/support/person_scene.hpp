@@ -1,8 +1,8 @@
 // Seeded depth scenes of people for studies of depth clustering: a jointed body of capsules before planes, boxes or another
 // person, ray-cast through a detection box, with structured-light noise. What is hard in real frames is in here on purpose:
 // limbs nearer than the body by more than the sensor's noise, walls a hand's breadth behind the back, floors and slanted walls
-// that cross the body's depth range, mixed ("flying") pixels along silhouettes, missing depth, and keypoints that crowd at
-// silhouettes. Points of a crossing plane at the body's own depth cannot be told apart by depth at all; no rule reaches 100 %.
+// that cross the body's depth range, mixed ("flying") pixels along silhouettes, missing depth, and keypoints in clumps that
+// crowd at silhouettes and leave plain parts empty. Points of a crossing plane at the body's own depth cannot be told apart by depth at all; no rule reaches 100 %.
 #pragma once
 
 #include <algorithm>
@@ -202,6 +202,10 @@ inline PersonScene draw_scene(cfp::Random& random, Scenario scenario) {
   scene.mixed_share = u(0.05, 0.25);
   scene.missing_share = u(0.0, 0.2);
   const double person_texture = std::exp(u(-0.9, 0.9)), floor_texture = u(0.1, 0.6);
+  // Keypoints come in clumps: every patch of 5 x 5 cells has its own texture, log-normal, so bodies show gaps in depth where they are plain.
+  constexpr int patch = 5, patches_per_row = columns / patch + 1;
+  std::vector<double> patch_texture(static_cast<std::size_t>(patches_per_row * (rows / patch + 1)));
+  for (double& texture : patch_texture) texture = std::exp(1.2 * random.normal());
   double sum = 0;
   for (int r = 0; r < rows; ++r) {
     for (int c = 0; c < columns; ++c) {
@@ -213,7 +217,8 @@ inline PersonScene draw_scene(cfp::Random& random, Scenario scenario) {
         if (std::abs(next.depth - seen.depth) > 0.1 + 0.03 * seen.depth) other = next.depth;
       }
       const double texture = seen.what == 0 ? person_texture : seen.what == 1 ? floor_texture : 1.0;
-      const double weight = texture * (other > 0 ? 3.0 : 1.0);
+      const double clump = patch_texture[static_cast<std::size_t>(r / patch * patches_per_row + c / patch)];
+      const double weight = texture * clump * (other > 0 ? 3.0 : 1.0);
       if (seen.what == 0) scene.far_m = (std::max)(scene.far_m, seen.depth);
       scene.cells.push_back({seen.depth, other, weight, seen.what == 0});
       scene.cumulative.push_back(sum += weight);

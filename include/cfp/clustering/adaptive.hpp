@@ -42,11 +42,11 @@ struct AdaptiveOptions {
   DbscanOptions fixed;                ///< for `fixed`, and where a rule has too few values to work on
   DepthNoise noise;
   double noise_factor = 3.0;          ///< eps of every rule but `fixed` is at least so many sigmas at the foreground's depth; >= 0
-  double min_eps_m = 0.14;            ///< foreground_density: a smaller radius tears bodies, limbs become background; > 0
+  double min_eps_m = 0.12;            ///< foreground_density: a smaller radius tears bodies, limbs become background; > 0
   double max_eps_m = 0.3;             ///< foreground_density: a larger one bridges to the wall; >= min_eps_m
-  double spacing_factor = 5.0;        ///< foreground_density: eps follows so many mean spacings, for boxes with few points; > 0
-  double layer_quantile = 0.15;       ///< the foreground's depth is read here in the ascending depths; nearer ones may be a hand or spray; (0, 1)
-  double min_density = 0.15;          ///< foreground_density: first share of the foreground's density that a core point must have; (0, 1]
+  double spacing_factor = 4.0;        ///< foreground_density: eps follows so many mean spacings, for boxes with few points; > 0
+  double min_share = 0.15;            ///< nearer depths than this share of all may be a hand or spray: the foreground's depth is read here; (0, 1)
+  double min_density = 0.2;           ///< foreground_density: first share of the foreground's density that a core point must have; (0, 1]
   double max_density = 0.6;           ///< foreground_density: last share tried; [min_density, 1]
   double body_depth_m = 0.5;          ///< foreground_density: the share is raised while the foreground reaches farther behind its depth; > 0
   double k_factor = 3.0;              ///< k_distance_median; > 0
@@ -62,7 +62,7 @@ struct AdaptiveOptions {
   if (!positive(o.min_eps_m)) return "min_eps_m";
   if (!(o.max_eps_m >= o.min_eps_m) || !is_finite(o.max_eps_m)) return "max_eps_m";
   if (!positive(o.spacing_factor)) return "spacing_factor";
-  if (!(o.layer_quantile > 0.0 && o.layer_quantile < 1.0)) return "layer_quantile";
+  if (!(o.min_share > 0.0 && o.min_share < 1.0)) return "min_share";
   if (!(o.min_density > 0.0 && o.min_density <= 1.0)) return "min_density";
   if (!(o.max_density >= o.min_density && o.max_density <= 1.0)) return "max_density";
   if (!positive(o.body_depth_m)) return "body_depth_m";
@@ -78,6 +78,12 @@ struct AdaptiveWorkspace {
 };
 
 namespace detail {
+
+// Position, among n > 0 ascending depths, of one that belongs to the foreground.
+constexpr std::size_t foreground_position(std::size_t n, const AdaptiveOptions& options) noexcept {
+  const auto at = static_cast<std::size_t>(options.min_share * static_cast<double>(n));
+  return at < n ? at : n - 1;
+}
 
 // counts[i] = how many ascending values lie within eps of value i.
 template <typename Scalar>
@@ -136,7 +142,7 @@ DbscanOptions density_options(span<const Scalar> depths, const AdaptiveOptions& 
 }  // namespace detail
 
 /// eps (metres) and min_pts for depths that are valid and ascending.
-/// The default reads the foreground's depth z at `layer_quantile`, sets eps to `spacing_factor` mean spacings around it within
+/// The default reads the foreground's depth z at `min_share`, sets eps to `spacing_factor` mean spacings around it within
 /// [min_eps_m, max_eps_m], counts the neighbours of the points up to z + eps, and asks of a core point `min_density` of the
 /// largest count. So min_pts grows with n and with the density of the foreground, not of the wall. While the foreground
 /// then reaches more than `body_depth_m` behind z, that share is raised by 1.4: what connects a body to a wall or to a
@@ -148,7 +154,7 @@ template <typename Scalar>
   CFP_ASSERT(std::is_sorted(depths.begin(), depths.end()));
   const std::size_t n = depths.size();
   if (n < 3 || options.rule == AdaptiveRule::fixed) return options.fixed;
-  const std::size_t at = (std::min)(n - 1, static_cast<std::size_t>(options.layer_quantile * static_cast<double>(n)));
+  const std::size_t at = detail::foreground_position(n, options);
   const double floor_m = options.noise_factor * options.noise.sigma_m(static_cast<double>(depths[at]));
   DbscanOptions chosen = options.fixed;
   if (options.rule == AdaptiveRule::foreground_density) {

@@ -19,7 +19,7 @@ namespace cfp {
 
 struct ForegroundOptions {
   AdaptiveOptions adaptive;
-  double min_share = 0.15;      ///< of the valid depths, that must lie at or before the end of the foreground; [0, 1)
+  double merge_gap_m = 0.2;     ///< a cluster that begins so near behind the foreground and ends within body_depth_m joins it; >= 0, 0: none
   std::size_t min_points = 6;   ///< fewer valid depths: too_few_points; >= 1
   std::size_t sure_points = 18; ///< with fewer valid depths the split must also hold for a smaller and a larger eps
   bool invalid_is_foreground = true;  ///< label of points without a valid depth: true is the safe side
@@ -27,7 +27,7 @@ struct ForegroundOptions {
 
 [[nodiscard]] constexpr const char* invalid_field(const ForegroundOptions& options) noexcept {
   if (const char* field = invalid_field(options.adaptive)) return field;
-  if (!(options.min_share >= 0.0 && options.min_share < 1.0)) return "min_share";
+  if (!(options.merge_gap_m >= 0.0) || !is_finite(options.merge_gap_m)) return "merge_gap_m";
   return options.min_points >= 1 ? nullptr : "min_points";
 }
 
@@ -73,21 +73,30 @@ namespace detail {
 
 // How many of the ascending depths belong to the foreground under these parameters; 0 for none.
 template <typename Scalar>
-std::size_t foreground_count(span<const Scalar> depths, const DbscanOptions& parameters, double min_share, ForegroundWorkspace<Scalar>& workspace,
-                             std::size_t& clusters) {
+std::size_t foreground_count(span<const Scalar> depths, const DbscanOptions& parameters, const ForegroundOptions& options,
+                             ForegroundWorkspace<Scalar>& workspace, std::size_t& clusters) {
   const std::size_t n = depths.size();
   workspace.labels.resize(n);
   clusters = dbscan_ascending(depths, parameters, workspace.dbscan, span<int>(workspace.labels)).clusters;
-  const double least = min_share * static_cast<double>(n);
-  std::size_t count = 0;
-  int label = dbscan_noise;
-  for (std::size_t i = 0; i < n; ++i) {
-    if (workspace.labels[i] < 0) continue;
-    if (workspace.labels[i] != label && static_cast<double>(count) >= least && count > 0) break;
-    label = workspace.labels[i];
-    count = i + 1;
+  const std::size_t at = foreground_position(n, options.adaptive);
+  const double limit = static_cast<double>(depths[at]) + options.adaptive.body_depth_m;
+  std::size_t count = 0;  // up to the end of the last cluster taken
+  for (std::size_t i = 0; i < n;) {
+    if (workspace.labels[i] == dbscan_noise) {
+      ++i;
+      continue;
+    }
+    std::size_t end = i + 1;
+    for (std::size_t j = end; j < n && workspace.labels[j] <= workspace.labels[i]; ++j) end = workspace.labels[j] == workspace.labels[i] ? j + 1 : end;
+    const bool enough = count > at;
+    if (enough && !(static_cast<double>(depths[i]) - static_cast<double>(depths[count - 1]) <= options.merge_gap_m &&
+                    static_cast<double>(depths[end - 1]) <= limit)) {
+      break;
+    }
+    count = end;
+    i = end;
   }
-  return static_cast<double>(count) >= least ? count : 0;
+  return count > at ? count : 0;
 }
 
 }  // namespace detail
@@ -113,13 +122,13 @@ ForegroundResult depth_foreground(span<const Scalar> depths_m, const ForegroundO
   std::size_t count = 0;
   if (n >= options.min_points && n > 0) {
     result.dbscan = adaptive_options(depths, options.adaptive, workspace.adaptive);
-    count = detail::foreground_count(depths, result.dbscan, options.min_share, workspace, result.clusters);
+    count = detail::foreground_count(depths, result.dbscan, options, workspace, result.clusters);
     result.status = count > 0 ? ForegroundStatus::ok : ForegroundStatus::no_cluster;
     if (count > 0 && n < options.sure_points) {
       for (const double factor : {0.7, 1.4}) {
         std::size_t clusters = 0;
         const std::size_t other =
-            detail::foreground_count(depths, {result.dbscan.eps * factor, result.dbscan.min_pts}, options.min_share, workspace, clusters);
+            detail::foreground_count(depths, {result.dbscan.eps * factor, result.dbscan.min_pts}, options, workspace, clusters);
         if (10 * (other > count ? other - count : count - other) > n) result.status = ForegroundStatus::unstable;
       }
     }

@@ -1,0 +1,145 @@
+// Which keypoints in a person's box are on the person? Red: foreground, green: background, grey: no depth, as in the paper's figure.
+//
+//   02_depth_foreground image RGB.png DEPTH.png UNITS_PER_METRE OUT.png X1 Y1 X2 Y2 [X1 Y1 X2 Y2 ...]
+//   02_depth_foreground sequence TUM_FOLDER OUT_FOLDER [UNITS_PER_METRE = 5000]
+//
+// A TUM folder has rgb.txt, depth.txt (timestamp filename) and detections.txt (timestamp class score x1 y1 x2 y2). One picture is
+// written per frame, and a contact sheet of nine.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "cfp/clustering/depth_foreground.hpp"
+#include "cfp/geometry/box.hpp"
+
+namespace {
+
+using Box = cfp::Box<float>;
+
+cv::Mat annotate(const cv::Mat& rgb, const cv::Mat& depth, double units_per_metre, const std::vector<Box>& boxes) {
+  std::vector<cv::KeyPoint> keypoints;
+  cv::ORB::create(1500)->detect(rgb, keypoints);
+  cv::Mat picture = rgb.clone();
+  cfp::ForegroundWorkspace<float> workspace;
+  for (const Box& box : boxes) {
+    std::vector<cv::Point2f> points;
+    std::vector<float> depths;
+    for (const cv::KeyPoint& keypoint : keypoints) {
+      if (!cfp::contains(box, keypoint.pt.x, keypoint.pt.y)) continue;
+      points.push_back(keypoint.pt);
+      depths.push_back(static_cast<float>(depth.at<std::uint16_t>(cvRound(keypoint.pt.y), cvRound(keypoint.pt.x)) / units_per_metre));
+    }
+    // README: depth_foreground
+    std::vector<char> foreground(depths.size());
+    const cfp::ForegroundResult result = cfp::depth_foreground<float>(depths, {}, workspace, foreground);
+    // README: end
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const cv::Scalar colour = depths[i] <= 0 ? cv::Scalar(160, 160, 160) : foreground[i] != 0 ? cv::Scalar(0, 0, 255) : cv::Scalar(0, 220, 0);
+      cv::circle(picture, points[i], 2, colour, cv::FILLED, cv::LINE_AA);
+    }
+    char text[160];
+    std::snprintf(text, sizeof text, "%.2f-%.2f m", result.near_m, result.far_m);
+    cv::rectangle(picture, cv::Point2f(box.x1, box.y1), cv::Point2f(box.x2, box.y2), cv::Scalar(255, 160, 0), 1);
+    cv::putText(picture, text, cv::Point2f(box.x1 + 2, box.y1 + 12), cv::FONT_HERSHEY_SIMPLEX, 0.4, cv::Scalar(255, 255, 255), 1, cv::LINE_AA);
+    std::printf("box %.0f %.0f %.0f %.0f: %s, foreground %zu (%.2f to %.2f m), background %zu, without depth %zu, eps %.3f m, min_pts %zu\n",
+                static_cast<double>(box.x1), static_cast<double>(box.y1), static_cast<double>(box.x2), static_cast<double>(box.y2), to_string(result.status),
+                result.foreground, result.near_m, result.far_m, result.background, result.invalid, result.dbscan.eps, result.dbscan.min_pts);
+  }
+  return picture;
+}
+
+struct Stamped {
+  double time;
+  std::string rest;
+};
+
+std::vector<Stamped> read_stamped(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  std::vector<Stamped> lines;
+  for (std::string line; std::getline(in, line);) {
+    std::istringstream words(line);
+    Stamped stamped{};
+    if (line.empty() || line[0] == '#' || !(words >> stamped.time >> std::ws)) continue;
+    std::getline(words, stamped.rest);
+    lines.push_back(stamped);
+  }
+  return lines;
+}
+
+int run_sequence(const std::filesystem::path& folder, const std::filesystem::path& out, double units_per_metre) {
+  const std::vector<Stamped> images = read_stamped(folder / "rgb.txt"), depths = read_stamped(folder / "depth.txt"), detections = read_stamped(folder / "detections.txt");
+  if (images.empty() || depths.empty() || detections.empty()) {
+    std::fprintf(stderr, "%s: needs rgb.txt, depth.txt and detections.txt with at least one line each\n", folder.c_str());
+    return 1;
+  }
+  std::filesystem::create_directories(out);
+  std::vector<cv::Mat> sheet;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const Stamped& image = images[i];
+    const auto nearest = std::min_element(depths.begin(), depths.end(),
+                                          [&](const Stamped& a, const Stamped& b) { return std::abs(a.time - image.time) < std::abs(b.time - image.time); });
+    const cv::Mat rgb = cv::imread((folder / image.rest).string()), depth = cv::imread((folder / nearest->rest).string(), cv::IMREAD_UNCHANGED);
+    if (rgb.empty() || depth.type() != CV_16U || depth.size() != rgb.size()) {
+      std::fprintf(stderr, "frame %s: no colour image, or no 16-bit depth image of its size\n", image.rest.c_str());
+      continue;
+    }
+    std::vector<Box> boxes;
+    for (const Stamped& detection : detections) {
+      std::istringstream words(detection.rest);
+      std::string name;
+      double score = 0;
+      Box box;
+      if (std::abs(detection.time - image.time) < 0.005 && words >> name >> score >> box.x1 >> box.y1 >> box.x2 >> box.y2 && name == "person") boxes.push_back(box);
+    }
+    std::printf("%s\n", image.rest.c_str());
+    const cv::Mat picture = annotate(rgb, depth, units_per_metre, boxes);
+    cv::imwrite((out / std::filesystem::path(image.rest).filename()).string(), picture);
+    if (sheet.size() < 9 && i >= sheet.size() * images.size() / 9) sheet.push_back(picture);
+  }
+  std::vector<cv::Mat> rows;
+  for (std::size_t i = 0; i + 3 <= sheet.size(); i += 3) {
+    rows.emplace_back();
+    cv::hconcat(sheet.data() + i, 3, rows.back());
+  }
+  if (!rows.empty()) {
+    cv::Mat all;
+    cv::vconcat(rows, all);
+    cv::imwrite((out / "contact_sheet.png").string(), all);
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char* argv[]) {
+  const std::string mode = argc > 1 ? argv[1] : "";
+  if (mode == "sequence" && argc >= 4) return run_sequence(argv[2], argv[3], argc > 4 ? std::atof(argv[4]) : 5000.0);
+  if (mode == "image" && argc >= 10 && (argc - 6) % 4 == 0) {
+    const cv::Mat rgb = cv::imread(argv[2]), depth = cv::imread(argv[3], cv::IMREAD_UNCHANGED);
+    if (rgb.empty() || depth.type() != CV_16U || depth.size() != rgb.size()) {
+      std::fprintf(stderr, "needs a colour image and a 16-bit depth image of its size\n");
+      return 1;
+    }
+    std::vector<Box> boxes;
+    for (int i = 6; i + 3 < argc; i += 4) {
+      boxes.push_back({std::strtof(argv[i], nullptr), std::strtof(argv[i + 1], nullptr), std::strtof(argv[i + 2], nullptr), std::strtof(argv[i + 3], nullptr)});
+    }
+    return cv::imwrite(argv[5], annotate(rgb, depth, std::atof(argv[4]), boxes)) ? 0 : 1;
+  }
+  std::fprintf(stderr,
+               "usage: %s image RGB.png DEPTH.png UNITS_PER_METRE OUT.png X1 Y1 X2 Y2 [...]\n"
+               "       %s sequence TUM_FOLDER OUT_FOLDER [UNITS_PER_METRE]\n",
+               argv[0], argv[0]);
+  return 2;
+}
