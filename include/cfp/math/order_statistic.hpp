@@ -23,6 +23,7 @@ namespace cfp {
 /// product that exceeds a whole number by its rounding error alone counts as that number: quantile_rank(0.1, 30) is 3,
 /// though 0.1 * 30 = 3.0000000000000004. q <= 0 and NaN give 1, q >= 1 gives n. Pass q as a double: 0.1F is not 0.1.
 [[nodiscard]] inline std::size_t quantile_rank(double q, std::size_t n) noexcept {
+  if (q >= 1) return n;
   const double size = static_cast<double>(n);
   const double position = std::ceil(q * size * (1.0 - 4 * std::numeric_limits<double>::epsilon()));
   if (!(position > 1)) return (std::min)(n, std::size_t(1));

@@ -1,0 +1,118 @@
+#include "cfp/math/chi_squared.hpp"
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "data/chi_squared_table.hpp"
+#include "support/allocation_counter.hpp"
+#include "support/catch.hpp"
+#include "support/numbers.hpp"
+
+using cfp::chi_squared_density;
+using cfp::chi_squared_mode_density;
+using cfp::chi_squared_survival;
+using cfp_test::relative_difference;
+
+TEST_CASE("chi-squared agrees with the reference table", "[math]") {
+  for (const cfp_test::ChiSquaredRow& row : cfp_test::chi_squared_table) {
+    CAPTURE(row.k, row.x);
+    CHECK(relative_difference(chi_squared_density(row.x, row.k), row.density) < 1e-12);
+    CHECK(relative_difference(chi_squared_survival(row.x, row.k), row.survival) < 1e-12);
+  }
+}
+
+TEST_CASE("chi-squared in float agrees with the reference table", "[math]") {
+  for (const cfp_test::ChiSquaredRow& row : cfp_test::chi_squared_table) {
+    if (row.density < 1e-30 || row.survival < 1e-30 || row.density > 1e30) continue;
+    CAPTURE(row.k, row.x);
+    const double tolerance = 1e-6 + 1e-7 * (row.x + row.k);  // of rounding x to float
+    CHECK(relative_difference<double>(chi_squared_density(static_cast<float>(row.x), row.k), row.density) < tolerance);
+    CHECK(relative_difference<double>(chi_squared_survival(static_cast<float>(row.x), row.k), row.survival) < tolerance);
+  }
+}
+
+TEST_CASE("the density is minus the derivative of the survival function", "[math]") {
+  for (const double k : {0.3, 1.0, 1.7, 2.0, 3.0, 4.5, 30.0, 34.0, 200.0}) {
+    for (const double factor : {0.2, 0.7, 1.0, 1.3}) {
+      const double x = k * factor + 0.05;
+      const double h = 1e-5 * x;
+      const double slope = (chi_squared_survival(x - h, k) - chi_squared_survival(x + h, k)) / (2 * h);
+      CAPTURE(k, x);
+      const double rounding = 4 * std::numeric_limits<double>::epsilon() / (2 * h);  // of the two values, which are near 1
+      CHECK_THAT(slope, WithinAbs(chi_squared_density(x, k), 1e-7 * chi_squared_density(x, k) + rounding));
+    }
+  }
+}
+
+TEST_CASE("the general formulas meet the closed forms at k = 1 and 2, and one branch the next", "[math]") {
+  for (const double x : {1e-6, 0.3, 0.999, 1.0, 1.001, 1.999, 2.0, 2.001, 5.0, 80.0}) {
+    CAPTURE(x);
+    CHECK(relative_difference(cfp::detail::gamma_upper_tail(x / 2, 0.5), std::erfc(std::sqrt(x / 2))) < 1e-13);
+    CHECK(relative_difference(cfp::detail::gamma_upper_tail(x / 2, 1.0), std::exp(-x / 2)) < 1e-13);
+    // Q(x; k + 2) = Q(x; k) + 2 density(x; k + 2), across a = 1 and across the two forms of the density at k = 32.
+    for (const double k : {0.2, 1.9, 2.0, 31.0, 31.99, 200.0}) {
+      CAPTURE(k);
+      const double expected = chi_squared_survival(x, k) + 2 * chi_squared_density(x, k + 2);
+      CHECK(relative_difference(chi_squared_survival(x, k + 2), expected) < 1e-12);
+    }
+  }
+}
+
+TEST_CASE("the mode density bounds the density for k >= 2 and is infinite below", "[math]") {
+  CHECK(chi_squared_mode_density(2) == 0.5);
+  CHECK(chi_squared_mode_density(1) == std::numeric_limits<double>::infinity());
+  CHECK(chi_squared_mode_density(1.999) == std::numeric_limits<double>::infinity());
+  for (const double k : {2.0, 2.5, 3.0, 10.0, 32.0, 500.0}) {
+    for (int i = 0; i < 400; ++i) CHECK(chi_squared_density(i * k / 100, k) <= chi_squared_mode_density(k) * (1 + 1e-14));
+  }
+  CHECK(chi_squared_mode_density(std::numeric_limits<double>::quiet_NaN()) == 0);
+}
+
+TEMPLATE_TEST_CASE("chi-squared at the borders of its domain", "[math]", float, double) {
+  using limits = std::numeric_limits<TestType>;
+  for (const double k : {0.4, 1.0, 2.0, 3.3, 40.0, 1e8}) {
+    CAPTURE(k);
+    CHECK(chi_squared_survival(TestType(0), k) == 1);
+    CHECK(chi_squared_survival(TestType(-3), k) == 1);
+    CHECK(chi_squared_survival(-limits::infinity(), k) == 1);
+    CHECK(chi_squared_survival(limits::infinity(), k) == 0);
+    CHECK(chi_squared_survival(limits::quiet_NaN(), k) == 0);
+    CHECK(chi_squared_density(TestType(-3), k) == 0);
+    CHECK(chi_squared_density(limits::infinity(), k) == 0);
+    CHECK(chi_squared_density(limits::quiet_NaN(), k) == 0);
+    CHECK(chi_squared_density(TestType(0), k) == (k < 2 ? (limits::max)() : TestType(k == 2 ? 0.5 : 0)));
+    for (const TestType x : cfp_test::hostile_numbers<TestType>()) {
+      const TestType survival = chi_squared_survival(x, k);
+      const TestType density = chi_squared_density(x, k);
+      CHECK((survival >= 0 && survival <= 1));
+      CHECK((density >= 0 && density <= (limits::max)()));
+    }
+  }
+  for (const double k : {0.0, -1.0, 1.1e8, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+    CHECK(chi_squared_survival(TestType(1), k) == 0);
+    CHECK(chi_squared_density(TestType(1), k) == 0);
+  }
+}
+
+TEMPLATE_TEST_CASE("chi-squared of an array equals the scalar function", "[math]", float, double) {
+  std::vector<TestType> x;
+  for (int i = -20; i < 180; ++i) x.push_back(TestType(i) * TestType(0.37));
+  for (const TestType value : cfp_test::hostile_numbers<TestType>()) x.push_back(value);
+  const TestType tolerance = 8 * std::numeric_limits<TestType>::epsilon();
+  for (const double k : {1.0, 2.0, 3.5}) {
+    std::vector<TestType> survival(x.size()), density(x.size());
+    CHECK(cfp_test::allocations_in([&] {
+            chi_squared_survival(cfp::span<const TestType>(x), k, cfp::span<TestType>(survival));
+            chi_squared_density(cfp::span<const TestType>(x), k, cfp::span<TestType>(density));
+          }) == 0);
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      CAPTURE(k, x[i]);
+      CHECK_THAT(survival[i], WithinAbs(chi_squared_survival(x[i], k), tolerance));
+      if (x[i] != 0 || k != 1) CHECK_THAT(density[i], WithinAbs(chi_squared_density(x[i], k), tolerance * (1 + density[i])));
+    }
+    std::vector<TestType> in_place = x;
+    chi_squared_survival(cfp::span<const TestType>(in_place), k, cfp::span<TestType>(in_place));
+    CHECK(in_place == survival);
+  }
+}

@@ -1,0 +1,119 @@
+#include "cfp/math/order_statistic.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "cfp/core/random.hpp"
+#include "support/allocation_counter.hpp"
+#include "support/catch.hpp"
+#include "support/numbers.hpp"
+
+using cfp::span;
+
+namespace {
+
+/// Value sets that stress the buckets: wide, narrow, clustered, tied, of both signs, with extremes.
+template <typename Scalar>
+std::vector<std::vector<Scalar>> value_sets(std::size_t n) {
+  cfp::Random random(n, "order statistic");
+  std::vector<std::vector<Scalar>> sets(9, std::vector<Scalar>(n));
+  for (std::size_t i = 0; i < n; ++i) {
+    sets[0][i] = static_cast<Scalar>(random.uniform());
+    sets[1][i] = static_cast<Scalar>(random.normal());
+    sets[2][i] = static_cast<Scalar>(std::exp(20 * random.normal()));
+    sets[3][i] = Scalar(1) + static_cast<Scalar>(random.index(50)) * std::numeric_limits<Scalar>::epsilon();
+    sets[4][i] = Scalar(7);
+    sets[5][i] = static_cast<Scalar>(random.index(3));
+    sets[6][i] = i % 97 == 0 ? std::numeric_limits<Scalar>::max() : static_cast<Scalar>(random.index(1000)) * std::numeric_limits<Scalar>::denorm_min();
+    sets[7][i] = i % 2 == 0 ? Scalar(0.0) : Scalar(-0.0);
+    sets[8][i] = static_cast<Scalar>(i);
+  }
+  if (n > 3) sets[1][n / 2] = std::numeric_limits<Scalar>::infinity();
+  if (n > 3) sets[1][n / 3] = -std::numeric_limits<Scalar>::infinity();
+  return sets;
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("order_statistic equals the sorted array's element", "[math]", float, double) {
+  for (const std::size_t n : {1UL, 2UL, 3UL, 10UL, 48UL, 49UL, 50UL, 333UL, 1000UL, 4097UL}) {
+    for (const std::vector<TestType>& values : value_sets<TestType>(n)) {
+      std::vector<TestType> sorted = values;
+      std::sort(sorted.begin(), sorted.end());
+      std::vector<TestType> scratch(n);
+      for (const std::size_t rank : {std::size_t(0), n / 10, n / 3, n / 2, n - 1 - n / 5, n - 1}) {
+        scratch = values;
+        CAPTURE(n, rank);
+        TestType selected{};
+        const std::size_t allocations = cfp_test::allocations_in([&] { selected = cfp::order_statistic(span<TestType>(scratch), rank); });
+        CHECK(selected == sorted[rank]);
+        CHECK(allocations == 0);
+      }
+      CHECK(cfp::minimum(span<const TestType>(values)) == sorted.front());
+    }
+  }
+}
+
+TEMPLATE_TEST_CASE("select_quantiles gives the three values of the object probability", "[math]", float, double) {
+  for (const std::size_t n : {1UL, 2UL, 9UL, 10UL, 11UL, 30UL, 100UL, 777UL, 3000UL}) {
+    for (const std::vector<TestType>& values : value_sets<TestType>(n)) {
+      std::vector<TestType> sorted = values;
+      std::sort(sorted.begin(), sorted.end());
+      for (const std::array<double, 3>& quantiles : {std::array<double, 3>{0.1, 0.2, 0.3}, {0.0, 0.5, 1.0}, {0.8, 0.8, 0.8}}) {
+        std::vector<TestType> scratch = values;
+        const std::array<TestType, 3> selected = cfp::select_quantiles(span<TestType>(scratch), quantiles);
+        for (std::size_t i = 0; i < 3; ++i) CHECK(selected[i] == sorted[cfp::quantile_rank(quantiles[i], n) - 1]);
+      }
+    }
+  }
+}
+
+TEST_CASE("quantile_rank is the exact ceiling of the decimal product", "[math]") {
+  for (std::size_t n = 1; n <= 3000; ++n) {
+    for (std::size_t tenths = 1; tenths <= 10; ++tenths) {
+      const std::size_t exact = (tenths * n + 9) / 10;
+      CAPTURE(n, tenths);
+      REQUIRE(cfp::quantile_rank(static_cast<double>(tenths) / 10, n) == exact);
+      REQUIRE(cfp::quantile_rank(0.1 * static_cast<double>(tenths), n) == exact);
+    }
+  }
+  CHECK(cfp::quantile_rank(0.1, 30) == 3);
+  CHECK(cfp::quantile_rank(0.1, 31) == 4);
+}
+
+TEST_CASE("quantile_rank stays within 1 and n for any q", "[math]") {
+  for (const double q : cfp_test::hostile_numbers<double>()) {
+    for (const std::size_t n : {std::size_t(1), std::size_t(2), std::size_t(1000), std::numeric_limits<std::size_t>::max()}) {
+      const std::size_t rank = cfp::quantile_rank(q, n);
+      CHECK((rank >= 1 && rank <= n));
+      if (!(q > 0)) CHECK(rank == 1);
+      if (q >= 1) CHECK(rank == n);
+    }
+    CHECK(cfp::quantile_rank(q, 0) == 0);
+  }
+}
+
+TEMPLATE_TEST_CASE("no values give 0", "[math]", float, double) {
+  CHECK(cfp::minimum(span<const TestType>()) == 0);
+  CHECK(cfp::select_quantiles(span<TestType>(), std::array<double, 2>{0.1, 0.9}) == std::array<TestType, 2>{});
+}
+
+TEMPLATE_TEST_CASE("order_statistic ends and stays in memory when values are NaN", "[math]", float, double) {
+  cfp::Random random(3, "NaN");
+  for (int round = 0; round < 200; ++round) {
+    const std::uint32_t share = 1U + random.index(4);
+    std::vector<TestType> values(40 + random.index(400));
+    for (TestType& value : values) {
+      value = static_cast<TestType>(random.normal());
+      if (random.index(4) < share) value = round % 2 == 0 ? std::numeric_limits<TestType>::quiet_NaN() : -std::numeric_limits<TestType>::quiet_NaN();
+    }
+    const std::size_t rank = random.index(static_cast<std::uint32_t>(values.size()));
+    (void)cfp::order_statistic(span<TestType>(values), rank);
+    (void)cfp::select_quantiles(span<TestType>(values), std::array<double, 3>{0.1, 0.5, 0.9});
+  }
+  SUCCEED();
+}
