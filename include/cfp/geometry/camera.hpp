@@ -32,7 +32,9 @@ struct PinholeCamera {
     const Scalar u = fx * x + cx;
     const Scalar v = fy * y + cy;
     if (!is_finite(u) || !is_finite(v)) return false;
-    pixel << u, v;
+    // Not a comma initialiser: g++ 12.2 at -O3 -DNDEBUG loses the second coordinate of one inlined into a loop.
+    pixel[0] = u;
+    pixel[1] = v;
     if (jacobian != nullptr) *jacobian << fx * inv_z, Scalar(0), -fx * x * inv_z, Scalar(0), fy * inv_z, -fy * y * inv_z;
     return true;
   }

@@ -91,7 +91,9 @@ struct RadialTangentialCamera {
     const Scalar u = fx * distorted.x() + cx;
     const Scalar v = fy * distorted.y() + cy;
     if (!is_finite(u) || !is_finite(v)) return false;
-    pixel << u, v;
+    // Not a comma initialiser: g++ 12.2 at -O3 -DNDEBUG loses the second coordinate of one inlined into a loop.
+    pixel[0] = u;
+    pixel[1] = v;
     if (jacobian != nullptr) {
       D.row(0) *= fx * inv_z;
       D.row(1) *= fy * inv_z;
