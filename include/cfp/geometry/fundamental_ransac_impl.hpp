@@ -1,0 +1,212 @@
+/// @file fundamental_ransac_impl.hpp
+/// The search of fundamental_ransac.hpp and its check for homographies. Not an interface.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/SVD>
+
+#include "cfp/geometry/camera.hpp"
+#include "cfp/geometry/fundamental_kernels_impl.hpp"
+#include "cfp/geometry/homography_impl.hpp"
+#include "cfp/math/sampling.hpp"
+
+namespace cfp::detail {
+
+struct FundamentalCandidate {
+  Matrix3<double> F = Matrix3<double>::Zero();
+  double cost = std::numeric_limits<double>::infinity();
+};
+
+// One call of fundamental_ransac: the pairs, the limits in scaled units, and the steps in their order.
+struct FundamentalSearch {
+  const PairArrays& pairs;
+  const FundamentalRansacOptions& options;
+  MinimalSampler& sampler;
+  std::vector<std::uint32_t>& list;  // scratch, as long as the pairs
+  double limit;                      // squared Sampson threshold
+  Random random;
+  std::size_t iterations = 0;
+  bool confident = false;
+
+  // Transfer distances have two degrees of freedom and the noise of both images: 95 % of chi-squared is there at 3 times the
+  // squared threshold that holds 95 % of the Sampson distances.
+  [[nodiscard]] double transfer_limit() const noexcept { return 3 * limit; }
+
+  // Scales of the refinement loss in squared thresholds, wide in the search and near the inliers' spread in the end.
+  static constexpr double search_scale = 4, final_scale = 2.5;
+
+  void local_optimization(FundamentalCandidate& candidate) const noexcept {
+    const float* in[5] = {pairs.fast_array(0), pairs.fast_array(1), pairs.fast_array(2), pairs.fast_array(3), pairs.fast_array(4)};
+    FundamentalCandidate refined = candidate;
+    refine_scaled<float>(pairs, in, search_scale * limit, 5, 1e-3, refined.F);
+    refined.cost = msac_cost(pairs, refined.F, limit, candidate.cost);
+    if (refined.cost < candidate.cost) candidate = refined;
+  }
+
+  [[nodiscard]] std::size_t iterations_needed(const Matrix3<double>& F) const noexcept {
+    const auto is_inlier = [&](std::size_t i) { return scaled_sampson_sq(pairs, F, i) <= limit; };
+    if (sampler.sampling() == Sampling::progressive) {
+      return progressive_ransac_iterations(sampler.order(), is_inlier, 7, options.confidence, options.max_iterations);
+    }
+    const bool by_weight = sampler.sampling() == Sampling::weighted;
+    double inliers = 0;
+    for (std::size_t i = 0; i < pairs.size; ++i) inliers += is_inlier(i) ? (by_weight ? pairs.weights()[i] : 1.0) : 0.0;
+    return ransac_iterations(inliers / (by_weight ? pairs.total_weight : static_cast<double>(pairs.size)), 7, options.confidence, options.max_iterations);
+  }
+
+  FundamentalCandidate run() noexcept {
+    FundamentalCandidate best, best_sample;
+    best_sample.cost = pairs.total_weight;
+    std::size_t needed = options.max_iterations;
+    while (iterations < (std::max)(needed, options.min_iterations)) {
+      ++iterations;
+      std::uint32_t sample[7] = {};
+      sampler.draw(random, sample);
+      double p[7][2], q[7][2];
+      for (int k = 0; k < 7; ++k) {
+        for (std::size_t c = 0; c < 2; ++c) p[k][c] = pairs.array(c)[sample[k]], q[k][c] = pairs.array(2 + c)[sample[k]];
+      }
+      Matrix3<double> solutions[3];
+      const int count = solve_seven_point(p, q, solutions);
+      for (int k = 0; k < count; ++k) {
+        if (!is_oriented(solutions[k], p, q)) continue;
+        const double cost = msac_cost(pairs, solutions[k], limit, best_sample.cost);
+        if (!(cost < best_sample.cost)) continue;
+        best_sample = {solutions[k], cost};
+        FundamentalCandidate refined = best_sample;
+        local_optimization(refined);
+        if (!(refined.cost < best.cost)) continue;
+        best = refined;
+        needed = iterations_needed(best.F);
+      }
+    }
+    confident = needed < options.max_iterations;
+    return best;
+  }
+
+  void polish(FundamentalCandidate& candidate) const noexcept {
+    const double* in[5] = {pairs.array(0), pairs.array(1), pairs.array(2), pairs.array(3), pairs.array(4)};
+    refine_scaled<double>(pairs, in, final_scale * limit, 15, 1e-5, candidate.F);
+  }
+
+  // The homography that explains most of the inliers of F, refined on all pairs. False when none explains `share` of them, by weight.
+  bool dominant_homography(const Matrix3<double>& F, double share, Matrix3<double>& H) noexcept {
+    list.clear();
+    double inlier_weight = 0;
+    for (std::size_t i = 0; i < pairs.size; ++i) {
+      if (!(scaled_sampson_sq(pairs, F, i) <= limit)) continue;
+      list.push_back(static_cast<std::uint32_t>(i));
+      inlier_weight += pairs.weights()[i];
+    }
+    if (list.size() < 4) return false;
+    constexpr int samples = 16;  // 99.8 % to hit a plane with 70 % of the inliers
+    double best = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < samples; ++k) {
+      const std::uint32_t n = static_cast<std::uint32_t>(list.size());
+      const std::uint32_t sample[3] = {list[random.index(n)], list[random.index(n)], list[random.index(n)]};
+      Matrix3<double> candidate;
+      if (!homography_from_fundamental(pairs, F, sample, candidate)) continue;
+      const double cost = transfer_cost(pairs, candidate, transfer_limit());
+      if (cost < best) best = cost, H = candidate;
+    }
+    // Three noisy points carry a homography only so far: a third of the wanted support is enough to go on and refine.
+    if (!(pairs.total_weight - best > share / 3 * inlier_weight)) return false;
+    refine_homography(pairs, 4 * transfer_limit(), 5, H);
+    refine_homography(pairs, transfer_limit(), 5, H);
+    double explained = 0;
+    for (const std::uint32_t i : list) explained += transfer_sq(pairs, H, i) <= transfer_limit() ? pairs.weights()[i] : 0.0;
+    return explained >= share * inlier_weight;
+  }
+
+  // Plane and parallax: with H known, two pairs off the plane give the epipole and F = [e']x H. Improves candidate when it can.
+  // Source: Chum, Werner, Matas: "Two-view geometry estimation unaffected by a dominant plane", CVPR 2005.
+  void complete_from_plane(const Matrix3<double>& H, FundamentalCandidate& candidate) noexcept {
+    list.clear();
+    for (std::size_t i = 0; i < pairs.size; ++i) {
+      if (transfer_sq(pairs, H, i) > transfer_limit()) list.push_back(static_cast<std::uint32_t>(i));
+    }
+    if (list.size() < 2) return;
+    constexpr int samples = 100;  // 99 % for parallax in a fifth of the pairs off the plane
+    FundamentalCandidate best;
+    for (int k = 0; k < samples; ++k) {
+      Vector3<double> lines[2];
+      for (Vector3<double>& line : lines) {
+        const std::uint32_t i = list[random.index(static_cast<std::uint32_t>(list.size()))];
+        line = Vector3<double>(pairs.array(2)[i], pairs.array(3)[i], 1).cross(H * Vector3<double>(pairs.array(0)[i], pairs.array(1)[i], 1));
+      }
+      const Vector3<double> epipole = lines[0].cross(lines[1]);
+      const Matrix3<double> F = hat(epipole) * H;
+      const double norm = F.norm();
+      if (!(norm > 1e-12 * H.norm()) || !is_finite(norm)) continue;
+      const double cost = msac_cost(pairs, F / norm, limit, best.cost);
+      if (cost < best.cost) best = {F / norm, cost};
+    }
+    if (!is_finite(best.cost)) return;
+    local_optimization(best);
+    if (best.cost < candidate.cost) candidate = best;
+  }
+
+  // Whether F explains clearly more of the pairs off the plane than lines in random directions through H p would: those catch a
+  // pair at distance d with probability 2/pi asin(sqrt(2) T / d), T the Sampson threshold (noise of both images). Two pairs
+  // fix the epipole; five standard deviations make up for the best epipole having been searched.
+  [[nodiscard]] bool has_parallax(const Matrix3<double>& H, const Matrix3<double>& F) const noexcept {
+    double expected = 2, variance = 1, found = 0;
+    for (std::size_t i = 0; i < pairs.size; ++i) {
+      const double d2 = transfer_sq(pairs, H, i);
+      if (!(d2 > transfer_limit())) continue;
+      const double chance = 2 / pi<double> * std::asin(std::sqrt((std::min)(1.0, 2 * limit / d2)));
+      expected += chance;
+      variance += chance * (1 - chance);
+      found += scaled_sampson_sq(pairs, F, i) <= limit ? 1 : 0;
+    }
+    return found >= expected + 5 * std::sqrt(variance);
+  }
+
+  // Share of the pairs explained by H that `other` explains, too.
+  [[nodiscard]] double explained_by(const Matrix3<double>& other, const Matrix3<double>& H) const noexcept {
+    double both = 0, all = 0;
+    for (std::size_t i = 0; i < pairs.size; ++i) {
+      if (!(transfer_sq(pairs, H, i) <= transfer_limit())) continue;
+      all += pairs.weights()[i];
+      both += transfer_sq(pairs, other, i) <= transfer_limit() ? pairs.weights()[i] : 0.0;
+    }
+    return all > 0 ? both / all : 0;
+  }
+
+  // What motion a homography of pixels stands for. The rotation that fits the rays of its pairs best, and then the identity, is
+  // taken in its place when it explains nine tenths of the same pairs.
+  FundamentalReason classify(const PinholeCamera<double>* camera, Matrix3<double>& H) const noexcept {
+    constexpr double same = 0.9;
+    const auto scaled = [&](const Matrix3<double>& G) -> Matrix3<double> { return pairs.scale_cur.matrix() * G * pairs.scale_prev.matrix().inverse(); };
+    const Matrix3<double> identity = scaled(Matrix3<double>::Identity());
+    if (explained_by(identity, H) >= same) {
+      H = identity;
+      return FundamentalReason::no_motion;
+    }
+    if (camera == nullptr) return FundamentalReason::homography;
+    const Matrix3<double> K = camera->matrix();
+    const Matrix3<double> K_inverse = K.inverse();
+    const Matrix3<double> ray_prev = K_inverse * pairs.scale_prev.matrix().inverse(), ray_cur = K_inverse * pairs.scale_cur.matrix().inverse();
+    Matrix3<double> M = Matrix3<double>::Zero();
+    for (std::size_t i = 0; i < pairs.size; ++i) {
+      if (!(transfer_sq(pairs, H, i) <= transfer_limit())) continue;
+      const Vector3<double> p = ray_prev * Vector3<double>(pairs.array(0)[i], pairs.array(1)[i], 1), q = ray_cur * Vector3<double>(pairs.array(2)[i], pairs.array(3)[i], 1);
+      M += pairs.weights()[i] * q.normalized() * p.normalized().transpose();
+    }
+    if (!M.allFinite()) return FundamentalReason::homography;
+    const Eigen::JacobiSVD<Matrix3<double>> svd(M, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    Matrix3<double> U = svd.matrixU();
+    if (U.determinant() * svd.matrixV().determinant() < 0) U.col(2) = -U.col(2);
+    const Matrix3<double> rotation = scaled(K * (U * svd.matrixV().transpose()) * K_inverse);
+    if (!(explained_by(rotation, H) >= same)) return FundamentalReason::planar;
+    H = rotation;
+    return FundamentalReason::pure_rotation;
+  }
+};
+
+}  // namespace cfp::detail
