@@ -1,0 +1,129 @@
+/// @file robust_loss.hpp
+/// Robust losses rho(s) of the squared normalised residual s = |r|^2 / sigma^2 >= 0, with rho(0) = 0 and rho'(0) = 1, so
+/// that every loss is least squares near the truth. All are non-decreasing, concave and finite for finite s; rho' lies in
+/// [0, 1]. `delta` > 0 is the scale in units of r / sigma: 1 % to 5 % tail of a Gaussian residual, for example sqrt(5.991).
+/// A weight belongs outside: cost = sum of w rho(s), gradient weight w rho'(s).
+/// s = +inf gives the limit (rho' = 0); a negative or NaN s is the caller's to exclude. Nothing allocates.
+/// Sources: Huber 1964; Cauchy/Lorentzian and Geman, McClure 1985 as in Zhang: "Parameter estimation techniques", 1997,
+/// table 1, rescaled to rho'(0) = 1; truncated least squares as in Yang, Antonante, Tzoumas, Carlone 2020.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "cfp/core/numeric.hpp"
+
+namespace cfp {
+
+/// Least squares: rho = s.
+template <typename Scalar>
+struct Trivial {
+  Scalar delta = Scalar(1);  ///< not used
+
+  [[nodiscard]] Scalar value(const Scalar& s) const noexcept { return s; }
+  [[nodiscard]] Scalar first(const Scalar&) const noexcept { return Scalar(1); }
+  [[nodiscard]] Scalar second(const Scalar&) const noexcept { return Scalar(0); }
+};
+
+/// rho = s up to delta^2, 2 delta sqrt(s) - delta^2 beyond; rho and rho' are continuous, rho'' jumps (at delta^2: 0).
+template <typename Scalar>
+struct Huber {
+  Scalar delta = Scalar(1);
+
+  [[nodiscard]] Scalar value(const Scalar& s) const noexcept {
+    using std::sqrt;
+    return s <= delta * delta ? s : Scalar(2) * delta * sqrt(s) - delta * delta;
+  }
+  [[nodiscard]] Scalar first(const Scalar& s) const noexcept {
+    using std::sqrt;
+    return s <= delta * delta ? Scalar(1) : delta / sqrt(s);
+  }
+  [[nodiscard]] Scalar second(const Scalar& s) const noexcept {
+    return s <= delta * delta ? Scalar(0) : Scalar(-0.5) * first(s) / s;
+  }
+};
+
+/// rho = delta^2 log(1 + s / delta^2), rho' = 1 / (1 + s / delta^2), rho''(0) = -1 / delta^2.
+template <typename Scalar>
+struct Cauchy {
+  Scalar delta = Scalar(1);
+
+  [[nodiscard]] Scalar value(const Scalar& s) const noexcept {
+    using std::log1p;
+    return delta * delta * log1p(s / (delta * delta));
+  }
+  [[nodiscard]] Scalar first(const Scalar& s) const noexcept { return Scalar(1) / (Scalar(1) + s / (delta * delta)); }
+  [[nodiscard]] Scalar second(const Scalar& s) const noexcept { return -first(s) * first(s) / (delta * delta); }
+};
+
+/// rho = s / (1 + s / delta^2), bounded by delta^2; rho' = 1 / (1 + s / delta^2)^2, rho''(0) = -2 / delta^2.
+template <typename Scalar>
+struct GemanMcClure {
+  Scalar delta = Scalar(1);
+
+  [[nodiscard]] Scalar value(const Scalar& s) const noexcept {
+    // Two forms of one quotient: the first is exact at 0, the second at infinity.
+    return s <= delta * delta ? s / (Scalar(1) + s / (delta * delta)) : delta * delta / (Scalar(1) + delta * delta / s);
+  }
+  [[nodiscard]] Scalar first(const Scalar& s) const noexcept {
+    const Scalar u = Scalar(1) / (Scalar(1) + s / (delta * delta));
+    return u * u;
+  }
+  [[nodiscard]] Scalar second(const Scalar& s) const noexcept {
+    const Scalar u = Scalar(1) / (Scalar(1) + s / (delta * delta));
+    return Scalar(-2) * u * u * u / (delta * delta);
+  }
+};
+
+/// rho = min(s, delta^2); rho' = 1 up to and at delta^2, 0 beyond; rho'' = 0. A hard cut: only for a nearby start.
+template <typename Scalar>
+struct Truncated {
+  Scalar delta = Scalar(1);
+
+  [[nodiscard]] Scalar value(const Scalar& s) const noexcept { return s <= delta * delta ? s : delta * delta; }
+  [[nodiscard]] Scalar first(const Scalar& s) const noexcept { return s <= delta * delta ? Scalar(1) : Scalar(0); }
+  [[nodiscard]] Scalar second(const Scalar&) const noexcept { return Scalar(0); }
+};
+
+/// The losses by name, for options.
+enum class LossType : std::uint8_t { trivial, huber, cauchy, geman_mcclure, truncated };
+
+/// Calls `work` with the loss of that name and scale, so that a loop over residuals is compiled once per loss and never
+/// asks inside: `with_loss<double>(type, delta, [&](const auto& loss) { … loss.first(s) … });`. Returns what work returns.
+template <typename Scalar, typename Work>
+auto with_loss(LossType type, const Scalar& delta, Work&& work) {
+  switch (type) {
+    case LossType::huber: return work(Huber<Scalar>{delta});
+    case LossType::cauchy: return work(Cauchy<Scalar>{delta});
+    case LossType::geman_mcclure: return work(GemanMcClure<Scalar>{delta});
+    case LossType::truncated: return work(Truncated<Scalar>{delta});
+    case LossType::trivial: break;
+  }
+  return work(Trivial<Scalar>{delta});
+}
+
+/// A loss chosen at run time, with the members of the others; as fast as a predictable branch.
+template <typename Scalar>
+struct RobustLoss {
+  LossType type = LossType::huber;
+  Scalar delta = Scalar(1);
+
+  [[nodiscard]] Scalar value(const Scalar& s) const noexcept {
+    return with_loss(type, delta, [&s](const auto& loss) { return loss.value(s); });
+  }
+  [[nodiscard]] Scalar first(const Scalar& s) const noexcept {
+    return with_loss(type, delta, [&s](const auto& loss) { return loss.first(s); });
+  }
+  [[nodiscard]] Scalar second(const Scalar& s) const noexcept {
+    return with_loss(type, delta, [&s](const auto& loss) { return loss.second(s); });
+  }
+};
+
+/// The first field of a loss outside its range, or nullptr.
+template <typename Scalar>
+[[nodiscard]] const char* invalid_field(const RobustLoss<Scalar>& loss) noexcept {
+  if (!(static_cast<unsigned>(loss.type) <= static_cast<unsigned>(LossType::truncated))) return "type";
+  return loss.delta > Scalar(0) && is_finite(loss.delta) ? nullptr : "delta";
+}
+
+}  // namespace cfp
