@@ -73,3 +73,27 @@ TEST_CASE("Losses: an invalid scale or name is reported", "[optimization]") {
     CHECK(invalid_field(cfp::RobustLoss<double>{cfp::LossType::cauchy, delta}) == std::string("delta"));
   CHECK(invalid_field(cfp::RobustLoss<double>{static_cast<cfp::LossType>(77), 1}) == std::string("type"));
 }
+
+TEMPLATE_TEST_CASE("Losses: a packet of residuals gives the scalar results", "[optimization]", float, double) {
+  using Scalar = TestType;
+  using P = cfp::Packet<Scalar>;
+  constexpr int lanes = cfp::lanes_of<P>;
+  for (const cfp::LossType type : all_types) {
+    for (Scalar base = 0; base < Scalar(100); base += Scalar(1.37)) {
+      Scalar s[lanes], value[lanes], first[lanes], second[lanes];
+      for (int i = 0; i < lanes; ++i) s[i] = base * static_cast<Scalar>(i + 1);
+      cfp::with_loss<P>(type, P(Scalar(2.5)), [&](const auto& loss) {
+        cfp::store(value, loss.value(cfp::load<P>(s)));
+        cfp::store(first, loss.first(cfp::load<P>(s)));
+        cfp::store(second, loss.second(cfp::load<P>(s)));
+      });
+      const cfp::RobustLoss<Scalar> loss{type, Scalar(2.5)};
+      for (int i = 0; i < lanes; ++i) {
+        const Scalar epsilon = 8 * std::numeric_limits<Scalar>::epsilon();
+        REQUIRE(value[i] == Approx(loss.value(s[i])).epsilon(epsilon));
+        REQUIRE(first[i] == Approx(loss.first(s[i])).epsilon(epsilon));
+        REQUIRE(second[i] == Approx(loss.second(s[i])).epsilon(epsilon));
+      }
+    }
+  }
+}

@@ -3,6 +3,7 @@
 /// that every loss is least squares near the truth. All are non-decreasing, concave and finite for finite s; rho' lies in
 /// [0, 1]. `delta` > 0 is the scale in units of r / sigma: 1 % to 5 % tail of a Gaussian residual, for example sqrt(5.991).
 /// A weight belongs outside: cost = sum of w rho(s), gradient weight w rho'(s).
+/// Scalar is float, double, a dual number such as ceres::Jet, or a Packet (core/packet.hpp: many residuals at once).
 /// s = +inf gives the limit (rho' = 0); a negative or NaN s is the caller's to exclude. Nothing allocates.
 /// Sources: Huber 1964; Cauchy/Lorentzian and Geman, McClure 1985 as in Zhang: "Parameter estimation techniques", 1997,
 /// table 1, rescaled to rho'(0) = 1; truncated least squares as in Yang, Antonante, Tzoumas, Carlone 2020.
@@ -12,6 +13,7 @@
 #include <cstdint>
 
 #include "cfp/core/numeric.hpp"
+#include "cfp/core/packet.hpp"
 
 namespace cfp {
 
@@ -32,14 +34,14 @@ struct Huber {
 
   [[nodiscard]] Scalar value(const Scalar& s) const noexcept {
     using std::sqrt;
-    return s <= delta * delta ? s : Scalar(2) * delta * sqrt(s) - delta * delta;
+    return select(s <= delta * delta, s, Scalar(2) * delta * sqrt(s) - delta * delta);
   }
   [[nodiscard]] Scalar first(const Scalar& s) const noexcept {
     using std::sqrt;
-    return s <= delta * delta ? Scalar(1) : delta / sqrt(s);
+    return select(s <= delta * delta, Scalar(1), delta / sqrt(s));
   }
   [[nodiscard]] Scalar second(const Scalar& s) const noexcept {
-    return s <= delta * delta ? Scalar(0) : Scalar(-0.5) * first(s) / s;
+    return select(s <= delta * delta, Scalar(0), Scalar(-0.5) * first(s) / s);
   }
 };
 
@@ -63,7 +65,7 @@ struct GemanMcClure {
 
   [[nodiscard]] Scalar value(const Scalar& s) const noexcept {
     // Two forms of one quotient: the first is exact at 0, the second at infinity.
-    return s <= delta * delta ? s / (Scalar(1) + s / (delta * delta)) : delta * delta / (Scalar(1) + delta * delta / s);
+    return select(s <= delta * delta, s / (Scalar(1) + s / (delta * delta)), delta * delta / (Scalar(1) + delta * delta / s));
   }
   [[nodiscard]] Scalar first(const Scalar& s) const noexcept {
     const Scalar u = Scalar(1) / (Scalar(1) + s / (delta * delta));
@@ -80,8 +82,8 @@ template <typename Scalar>
 struct Truncated {
   Scalar delta = Scalar(1);
 
-  [[nodiscard]] Scalar value(const Scalar& s) const noexcept { return s <= delta * delta ? s : delta * delta; }
-  [[nodiscard]] Scalar first(const Scalar& s) const noexcept { return s <= delta * delta ? Scalar(1) : Scalar(0); }
+  [[nodiscard]] Scalar value(const Scalar& s) const noexcept { return select(s <= delta * delta, s, Scalar(delta * delta)); }
+  [[nodiscard]] Scalar first(const Scalar& s) const noexcept { return select(s <= delta * delta, Scalar(1), Scalar(0)); }
   [[nodiscard]] Scalar second(const Scalar&) const noexcept { return Scalar(0); }
 };
 
