@@ -1,0 +1,127 @@
+/// @file alignment.hpp
+/// The rigid or similarity transformation that maps one set of points onto another with least squares (Horn; Umeyama).
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include <Eigen/Core>
+#include <Eigen/SVD>
+
+#include "cfp/core/span.hpp"
+#include "cfp/core/status.hpp"
+#include "cfp/math/so3.hpp"
+
+namespace cfp {
+
+/// What is removed from an estimated trajectory before its absolute error is taken.
+enum class AlignmentMode : std::uint8_t {
+  none,        ///< nothing: the poses are compared as they are
+  first_pose,  ///< the first matched pose of the estimate is put onto that of the truth
+  rigid,       ///< rotation and translation, SE(3): the TUM scripts, RGB-D and stereo
+  similarity   ///< and scale, Sim(3): monocular
+};
+
+/// The enumerator's name, for reports.
+[[nodiscard]] constexpr const char* to_string(AlignmentMode mode) noexcept {
+  switch (mode) {
+    case AlignmentMode::none: return "none";
+    case AlignmentMode::first_pose: return "first pose";
+    case AlignmentMode::rigid: return "SE(3)";
+    case AlignmentMode::similarity: return "Sim(3)";
+  }
+  return "unknown";
+}
+
+/// p_a = scale * rotation * p_b + translation.
+struct Similarity {
+  double scale = 1;
+  Matrix3<double> rotation = Matrix3<double>::Identity();
+  Vector3<double> translation = Vector3<double>::Zero();
+
+  [[nodiscard]] Vector3<double> operator*(const Vector3<double>& point) const noexcept {
+    return scale * (rotation * point) + translation;
+  }
+};
+
+struct AlignmentResult {
+  Similarity S_to_from;     ///< maps the points `from` onto `to`
+  std::size_t used = 0;     ///< pairs with finite coordinates
+  std::size_t skipped = 0;  ///< pairs without
+  Status status = Status::not_enough_data;
+};
+
+/// argmin over (s, R, t) of sum |to_i − (s R from_i + t)|², s = 1 unless with_scale. With the centred points a_i (from) and b_i
+/// (to) and the SVD sum b_i a_iᵀ = U D Vᵀ: R = U S Vᵀ, S = diag(1, 1, det(U Vᵀ)), s = tr(D S) / sum |a_i|², t = mean(to) − s R mean(from).
+/// The scale is that of Umeyama, not the symmetric one of Horn. Points are scaled by their largest coordinate first, so that no
+/// finite input overflows. Allocates nothing.
+///
+/// Degenerate input: no finite pair → identity and not_enough_data. Points that do not fix the rotation (fewer than three,
+/// or on one line) → one of the minimisers, a proper rotation, and degenerate; a scale that is not determined (all of `from`
+/// equal) or zero (all of `to` equal) is 1.
+/// Source: Umeyama, "Least-squares estimation of transformation parameters between two point patterns", PAMI 1991, eqs. (34)–(43).
+template <typename Scalar>
+[[nodiscard]] AlignmentResult align_points(PointSpan<Scalar, 3> from, PointSpan<Scalar, 3> to, bool with_scale = false) noexcept {
+  CFP_ASSERT(from.size() == to.size());
+  const auto finite = [&](std::size_t i) {
+    for (int c = 0; c < 3; ++c) {
+      if (!is_finite(from(i, c)) || !is_finite(to(i, c))) return false;
+    }
+    return true;
+  };
+  AlignmentResult result;
+  double from_size = 0, to_size = 0;
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    if (!finite(i)) continue;
+    ++result.used;
+    for (int c = 0; c < 3; ++c) {
+      from_size = (std::max)(from_size, std::abs(static_cast<double>(from(i, c))));
+      to_size = (std::max)(to_size, std::abs(static_cast<double>(to(i, c))));
+    }
+  }
+  result.skipped = from.size() - result.used;
+  if (result.used == 0) return result;
+
+  // A common unit keeps a rigid motion rigid; the product with 1/unit would overflow for a subnormal unit, so divide.
+  const double unit = (std::max)((std::max)(from_size, to_size), (std::numeric_limits<double>::min)());
+  const auto scaled = [unit](const PointSpan<Scalar, 3>& points, std::size_t i) -> Vector3<double> {
+    return points[i].template cast<double>() / unit;
+  };
+  const double n = static_cast<double>(result.used);
+  Vector3<double> from_mean = Vector3<double>::Zero(), to_mean = Vector3<double>::Zero();
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    if (!finite(i)) continue;
+    from_mean += scaled(from, i) / n;
+    to_mean += scaled(to, i) / n;
+  }
+  Matrix3<double> H = Matrix3<double>::Zero();
+  double from_spread = 0;
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    if (!finite(i)) continue;
+    const Vector3<double> a = scaled(from, i) - from_mean;
+    H += (scaled(to, i) - to_mean) * a.transpose();
+    from_spread += a.squaredNorm();
+  }
+  const Eigen::JacobiSVD<Matrix3<double>> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Vector3<double> sign(1, 1, 1);
+  if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0) sign.z() = -1;
+  Similarity& S = result.S_to_from;
+  S.rotation = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
+  const Vector3<double>& d = svd.singularValues();
+  if (with_scale) {
+    const double scale = d.dot(sign) / from_spread;
+    if (scale > 0 && is_finite(scale)) S.scale = scale;
+  }
+  const Vector3<double> shift = to_mean - S.scale * (S.rotation * from_mean);
+  for (int c = 0; c < 3; ++c) {
+    const double t = shift[c] * unit;
+    S.translation[c] = is_finite(t) ? t : 0;
+  }
+  result.status = d[1] > Tolerance<double>::degenerate * d[0] ? Status::ok : Status::degenerate;
+  return result;
+}
+
+}  // namespace cfp

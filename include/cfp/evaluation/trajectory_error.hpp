@@ -1,0 +1,216 @@
+/// @file trajectory_error.hpp
+/// Absolute trajectory error (ATE) and relative pose error (RPE), with the protocol in the result: a figure without its
+/// alignment, matched poses, coverage and gaps cannot be compared. Equal to evaluate_ate.py and evaluate_rpe.py of the TUM RGB-D
+/// benchmark (Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012); departures are named below.
+/// Both functions take unsorted trajectories with duplicates and broken poses (see time_order) and allocate nothing after the
+/// first call of a size.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "cfp/core/options.hpp"
+#include "cfp/core/status.hpp"
+#include "cfp/evaluation/alignment.hpp"
+#include "cfp/evaluation/error_statistics.hpp"
+#include "cfp/evaluation/trajectory.hpp"
+#include "cfp/evaluation/trajectory_coverage.hpp"
+#include "cfp/evaluation/trajectory_error_impl.hpp"
+
+namespace cfp {
+
+struct AbsoluteErrorOptions {
+  AssociationOptions association;
+  AlignmentMode alignment = AlignmentMode::rigid;
+  std::size_t expected_poses = 0;  ///< frames the estimate should have; 0: as many as it has usable poses
+};
+
+[[nodiscard]] inline const char* invalid_field(const AbsoluteErrorOptions& options) noexcept {
+  if (!(options.association.max_difference_s > 0)) return "association.max_difference_s";
+  return is_finite(options.association.offset_s) ? nullptr : "association.offset_s";
+}
+
+struct AbsoluteErrorResult {
+  ErrorStatistics translation_m;  ///< |t_truth − S t_estimate| after alignment; the field's "ATE" is its rmse
+  ErrorStatistics rotation_deg;   ///< angle of R_truthᵀ S.R R_estimate; not in the TUM script
+  Similarity S_truth_estimate;    ///< the alignment
+  AlignmentMode alignment = AlignmentMode::rigid;
+  TrajectoryCoverage coverage;
+  Status status = Status::not_enough_data;  ///< degenerate: the matched poses do not fix the alignment's rotation; errors valid
+};
+
+enum class DeltaUnit : std::uint8_t {
+  seconds,  ///< the paper's and the field's RPE per second
+  frames    ///< poses of the estimate
+};
+
+[[nodiscard]] constexpr const char* to_string(DeltaUnit unit) noexcept { return unit == DeltaUnit::seconds ? "s" : "frames"; }
+
+struct RelativeErrorOptions {
+  double delta = 1;                      ///< length of the interval, > 0
+  DeltaUnit unit = DeltaUnit::seconds;   ///< of delta
+  double offset_s = 0;                   ///< added to the stamps of the estimate
+  double scale = 1;                      ///< multiplies the translations of the estimate, > 0
+  std::size_t expected_poses = 0;        ///< as in AbsoluteErrorOptions
+};
+
+[[nodiscard]] inline const char* invalid_field(const RelativeErrorOptions& options) noexcept {
+  if (!(options.delta > 0) || !is_finite(options.delta)) return "delta";
+  if (!is_finite(options.offset_s)) return "offset_s";
+  if (!(options.scale > 0) || !is_finite(options.scale)) return "scale";
+  return nullptr;
+}
+
+struct RelativeErrorResult {
+  ErrorStatistics translation_m;  ///< per interval, not divided by its length
+  ErrorStatistics rotation_deg;
+  double delta = 1;
+  DeltaUnit unit = DeltaUnit::seconds;
+  TrajectoryCoverage coverage;    ///< matched: poses that begin or end a pair
+  Status status = Status::not_enough_data;
+};
+
+/// Scratch of both errors, and the errors one by one, for plots over time: entry k belongs to the estimated pose with index
+/// pose[k] (for RPE: the first of the pair), in order of time.
+struct TrajectoryErrorWorkspace {
+  std::vector<std::size_t> pose;
+  std::vector<double> translation_m, rotation_deg;
+  AssociationWorkspace association;
+  std::vector<TimeMatch> matches;
+  std::vector<Vector3<double>> truth_points, estimate_points;
+  std::vector<double> scratch;
+  std::vector<char> used;
+};
+
+namespace detail {
+
+inline void clear_errors(TrajectoryErrorWorkspace& workspace) noexcept {
+  workspace.pose.clear();
+  workspace.translation_m.clear();
+  workspace.rotation_deg.clear();
+}
+
+inline void summarise(TrajectoryErrorWorkspace& workspace, ErrorStatistics& translation, ErrorStatistics& rotation) {
+  workspace.scratch.assign(workspace.translation_m.begin(), workspace.translation_m.end());
+  translation = error_statistics(workspace.scratch);
+  workspace.scratch.assign(workspace.rotation_deg.begin(), workspace.rotation_deg.end());
+  rotation = error_statistics(workspace.scratch);
+}
+
+}  // namespace detail
+
+/// ATE: associates by time (see associate), aligns the matched estimated positions to the true ones, and takes the distances.
+/// status is not_enough_data without a match (errors 0), invalid_input for options that invalid_field refuses.
+/// Departure: the script stops with an error below two matches, and aligns rigidly only.
+template <typename Scalar>
+[[nodiscard]] AbsoluteErrorResult absolute_trajectory_error(span<const StampedPose<Scalar>> truth, span<const StampedPose<Scalar>> estimate,
+                                                            const AbsoluteErrorOptions& options, TrajectoryErrorWorkspace& workspace) {
+  AbsoluteErrorResult result;
+  result.alignment = options.alignment;
+  detail::clear_errors(workspace);
+  if (invalid_field(options) != nullptr) {
+    result.status = Status::invalid_input;
+    return result;
+  }
+  auto& matches = workspace.matches;
+  associate(truth, estimate, options.association, workspace.association, matches);
+  workspace.truth_points.clear();
+  workspace.estimate_points.clear();
+  for (const TimeMatch& m : matches) {
+    workspace.truth_points.push_back(truth[m.first].T_world_cam.translation.template cast<double>());
+    workspace.estimate_points.push_back(estimate[m.second].T_world_cam.translation.template cast<double>());
+  }
+  result.coverage = trajectory_coverage(truth, estimate, workspace.association.first_order, workspace.association.second_order, matches,
+                                        options.expected_poses, options.association.offset_s);
+  if (matches.empty()) return result;
+
+  result.status = Status::ok;
+  Similarity& S = result.S_truth_estimate;
+  if (options.alignment == AlignmentMode::first_pose) {
+    S.rotation = detail::double_pose(truth[matches[0].first]).rotation * detail::double_pose(estimate[matches[0].second]).rotation.transpose();
+    S.translation = workspace.truth_points[0] - S.rotation * workspace.estimate_points[0];
+  } else if (options.alignment != AlignmentMode::none) {
+    const AlignmentResult aligned = align_points(PointSpan<double, 3>(workspace.estimate_points), PointSpan<double, 3>(workspace.truth_points),
+                                                 options.alignment == AlignmentMode::similarity);
+    S = aligned.S_to_from;
+    result.status = aligned.status;
+  }
+  for (std::size_t k = 0; k < matches.size(); ++k) {
+    workspace.pose.push_back(matches[k].second);
+    workspace.translation_m.push_back(detail::finite_norm(workspace.truth_points[k] - S * workspace.estimate_points[k]));
+    const Matrix3<double> R_truth = detail::double_pose(truth[matches[k].first]).rotation;
+    const Matrix3<double> R_estimate = detail::double_pose(estimate[matches[k].second]).rotation;
+    workspace.rotation_deg.push_back(detail::angle_deg(R_truth.transpose() * S.rotation * R_estimate));
+  }
+  detail::summarise(workspace, result.translation_m, result.rotation_deg);
+  return result;
+}
+
+/// RPE with a fixed delta (`--fixed_delta`): for every estimated pose i, j is the estimated pose whose stamp (or index) is nearest
+/// to that of i + delta. With P the estimated poses and Q the true ones nearest to them in time, the pair's error is
+/// E = (P_j⁻¹ P_i)⁻¹ (Q_j⁻¹ Q_i): its translation's length and its rotation's angle. Needs no alignment.
+///
+/// As in the script: a pair whose j is the last pose is left out (near the end every i would get it); so is a pair with a truth
+/// farther than twice the median true interval; of two stamps equally near the script's bisection decides; a pair with
+/// i = j, which a gap of more than 2 delta makes, counts with error 0.
+/// status is not_enough_data below two pairs (errors 0; the script stops), invalid_input for options that invalid_field refuses.
+/// Departures: of more than 10000 pairs the script draws 10000 at random, here all count; the angle comes from so3_log instead of
+/// the arc cosine of the trace, which loses half the digits of small angles.
+template <typename Scalar>
+[[nodiscard]] RelativeErrorResult relative_pose_error(span<const StampedPose<Scalar>> truth, span<const StampedPose<Scalar>> estimate,
+                                                      const RelativeErrorOptions& options, TrajectoryErrorWorkspace& workspace) {
+  RelativeErrorResult result;
+  result.delta = options.delta;
+  result.unit = options.unit;
+  detail::clear_errors(workspace);
+  if (invalid_field(options) != nullptr) {
+    result.status = Status::invalid_input;
+    return result;
+  }
+  auto& truth_order = workspace.association.first_order;
+  auto& order = workspace.association.second_order;
+  auto& matches = workspace.matches;
+  time_order(truth, truth_order);
+  time_order(estimate, order);
+  const std::size_t n = truth_order.empty() ? 0 : order.size();
+  const auto truth_stamp = [&](std::size_t i) { return truth[truth_order[i]].time_s; };
+  const auto stamp = [&](std::size_t i) { return estimate[order[i]].time_s; };
+  matches.clear();
+  for (std::size_t i = 0; i < n; ++i) {
+    matches.push_back({truth_order[detail::closest_index(truth_order.size(), stamp(i) + options.offset_s, truth_stamp)], order[i]});
+  }
+  const double max_difference_s = 2 * detail::median_interval(truth, truth_order, workspace.scratch);
+  const auto has_truth = [&](std::size_t i) {
+    return std::abs(truth[matches[i].first].time_s - (stamp(i) + options.offset_s)) <= max_difference_s;
+  };
+  workspace.used.assign(n, 0);
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::size_t j = options.unit == DeltaUnit::seconds
+                              ? detail::closest_index(n, stamp(i) + options.delta, stamp)
+                              : detail::closest_index(n, static_cast<double>(i) + options.delta, [](std::size_t k) { return static_cast<double>(k); });
+    if (j + 1 == n || !has_truth(i) || !has_truth(j)) continue;
+    SE3<double> P = detail::double_pose(estimate[order[j]]).inverse() * detail::double_pose(estimate[order[i]]);
+    const SE3<double> Q = detail::double_pose(truth[matches[j].first]).inverse() * detail::double_pose(truth[matches[i].first]);
+    P.translation *= options.scale;
+    const SE3<double> E = P.inverse() * Q;
+    workspace.used[i] = workspace.used[j] = 1;
+    workspace.pose.push_back(order[i]);
+    workspace.translation_m.push_back(detail::finite_norm(E.translation));
+    workspace.rotation_deg.push_back(detail::angle_deg(E.rotation));
+  }
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (workspace.used[i] != 0) matches[kept++] = matches[i];
+  }
+  matches.resize(kept);
+  result.coverage = trajectory_coverage(truth, estimate, truth_order, order, matches, options.expected_poses, options.offset_s);
+  if (workspace.pose.size() < 2) return result;
+  result.status = Status::ok;
+  detail::summarise(workspace, result.translation_m, result.rotation_deg);
+  return result;
+}
+
+}  // namespace cfp
