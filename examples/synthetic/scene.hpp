@@ -1,0 +1,125 @@
+// The room: x to the right, y away from the camera, z up, metres; the floor is z = 0 and the desk stands around the origin. Near
+// structure (desk, chairs, side table) lies 2 to 3 m from the camera, the partition at 3.5 m, cabinets at 5 m, the walls beyond the
+// depth range.
+#pragma once
+
+#include <vector>
+
+#include "surfaces.hpp"
+#include "textures.hpp"
+
+namespace synthetic {
+
+struct Scene {
+  std::vector<Texture> textures;
+  std::vector<Surface> surfaces;  ///< static ones
+  int shirts[2]{}, trousers[2]{}, heads[2]{}, skins[2]{}, shoes = 0;
+};
+
+constexpr double seat_height = 0.46;
+constexpr double chair_x[2] = {-0.95, 0.95};
+constexpr double chair_y = -0.62;
+
+class SceneBuilder {
+ public:
+  explicit SceneBuilder(std::uint64_t seed) : random_(seed, "textures") {}
+
+  /// Textures of the people and, when furnished, the room; otherwise only the chairs (for composing into a real recording).
+  Scene build(bool furnished) {
+    for (int person = 0; person < 2; ++person) {
+      const cv::Scalar skin = person == 0 ? cv::Scalar(125, 155, 205) : cv::Scalar(150, 180, 225);
+      scene_.skins[person] = add(plain(random_, 256, skin, 4));
+      scene_.heads[person] = add(head(random_, 256, skin, person == 0 ? cv::Scalar(25, 30, 40) : cv::Scalar(70, 120, 150)));
+    }
+    scene_.shirts[0] = add(collage(random_, 512, {70, 60, 50}, 260, 0.25));
+    scene_.shirts[1] = add(plaid(random_, 512, {190, 180, 160}));
+    scene_.trousers[0] = add(blots(random_, 512, {70, 105, 110}));
+    scene_.trousers[1] = add(collage(random_, 512, {110, 70, 45}, 180, 0.12));
+    scene_.shoes = add(plain(random_, 128, {45, 45, 50}, 8));
+    const int wood = add(collage(random_, 1024, {120, 170, 205}, 90, 0.06));
+    for (int side = 0; side < 2; ++side) chair(chair_x[side], chair_y, side == 0 ? 0.6 : -0.6, wood);
+    if (furnished) furnish(wood);
+    return std::move(scene_);
+  }
+
+ private:
+  int add(const cv::Mat& image) {
+    scene_.textures.emplace_back(image);
+    return static_cast<int>(scene_.textures.size()) - 1;
+  }
+
+  /// A box by its centre on the ground plane, the height of its underside, its size and its turn about the vertical.
+  Surface& box(double x, double y, double bottom, const Vector3d& size, int texture, double tile_m, double yaw = 0) {
+    Surface s;
+    s.half = size / 2;
+    s.centre = Vector3d(x, y, bottom + s.half.z());
+    s.A = Eigen::AngleAxisd(-yaw, Vector3d::UnitZ()).toRotationMatrix();
+    s.texture = texture;
+    s.tile_m = tile_m;
+    s.shift = Vector3d(random_.uniform(), random_.uniform(), random_.uniform()) * tile_m;
+    scene_.surfaces.push_back(s);
+    return scene_.surfaces.back();
+  }
+
+  void chair(double x, double y, double yaw, int wood) {
+    const Matrix3d R = Eigen::AngleAxisd(yaw, Vector3d::UnitZ()).toRotationMatrix();
+    const auto part = [&](double dx, double dy, double bottom, const Vector3d& size) {
+      const Vector3d at = R * Vector3d(dx, dy, 0);
+      box(x + at.x(), y + at.y(), bottom, size, wood, 0.5, yaw);
+    };
+    part(0, 0, seat_height - 0.04, {0.42, 0.42, 0.04});
+    part(0, -0.2, seat_height + 0.12, {0.42, 0.03, 0.3});
+    for (const double dx : {-0.18, 0.18}) {
+      part(dx, 0.18, 0, {0.03, 0.03, seat_height - 0.04});
+      part(dx, -0.2, 0, {0.03, 0.03, seat_height + 0.12});
+    }
+  }
+
+  void furnish(int wood) {
+    const int wall = add(collage(random_, 1024, {200, 205, 210}, 420, 0.22));
+    const int brown = add(collage(random_, 1024, {110, 150, 180}, 320, 0.2));
+    const int grey = add(collage(random_, 1024, {140, 135, 130}, 380, 0.16));
+    const int screen = add(collage(random_, 512, {35, 30, 30}, 160, 0.3));
+    const int books = add(collage(random_, 1024, {90, 90, 110}, 700, 0.12));
+
+    Surface room;
+    room.shape = Shape::room;
+    room.half = Vector3d(4.2, 5.2, 1.6);
+    room.centre = Vector3d(0, 0.4, 1.6);
+    room.texture = wall;
+    room.tile_m = 3;
+    scene_.surfaces.push_back(room);
+    box(0, 0.4, -0.02, {8.4, 10.4, 0.025}, grey, 2);
+    for (int beam = 0; beam < 4; ++beam) box(0, 0.3 + 1.4 * beam, 2.75, {8.3, 0.18, 0.3}, brown, 1.5);
+
+    // The desk: two plates on legs, with screens, books and small things.
+    for (const double side : {-1.0, 1.0}) {
+      box(0.82 * side, 0, 0.7, {1.6, 0.8, 0.04}, wood, 1);
+      for (const double x : {0.1, 1.55}) {
+        for (const double y : {-0.35, 0.35}) box(x * side, y, 0, {0.06, 0.06, 0.7}, grey, 0.6);
+      }
+      box(0.62 * side, 0.2, 0.86, {0.55, 0.05, 0.36}, screen, 0.6, 0.15 * side).absorbs_infrared = true;
+      box(0.62 * side, 0.22, 0.74, {0.08, 0.08, 0.14}, grey, 0.3);
+      box(0.62 * side, -0.12, 0.74, {0.42, 0.15, 0.02}, books, 0.7, 0.1);
+    }
+    for (int i = 0; i < 9; ++i) {
+      box(random_.uniform(-1.5, 1.5), random_.uniform(-0.3, 0.3), 0.74, {random_.uniform(0.06, 0.25), random_.uniform(0.06, 0.2), random_.uniform(0.02, 0.25)},
+          i % 2 == 0 ? books : brown, 0.5, random_.uniform(-0.6, 0.6));
+    }
+    box(0, 0.56, 0, {3.5, 0.05, 1.22}, brown, 1.6);                // the partition behind the desk
+    box(-2.3, 0.3, 0, {0.6, 0.9, 1.05}, books, 1.1, 0.2);          // low shelves and tables at the sides
+    box(2.25, 0.1, 0, {0.55, 0.8, 0.85}, wood, 0.9, -0.2);
+    box(2.25, 0.1, 0.85, {0.3, 0.25, 0.35}, books, 0.6, 0.4);
+    box(-2.2, -1.3, 0, {0.5, 0.5, 0.6}, brown, 0.8, 0.3);
+    box(-1.5, 2.3, 0, {1.3, 0.5, 1.95}, books, 1.3);               // cabinets at middle distance
+    box(1.3, 2.6, 0, {1.1, 0.5, 2.1}, grey, 1.4);
+    box(0.05, 3.2, 0, {0.9, 0.4, 1.6}, wood, 1.1);
+    box(3.2, 1.8, 0, {0.35, 0.35, 3.1}, brown, 1.2);               // pillars
+    box(-3.3, 1.2, 0, {0.35, 0.35, 3.1}, grey, 1.2);
+  }
+
+  cfp::Random random_;
+  Scene scene_;
+};
+
+}  // namespace synthetic

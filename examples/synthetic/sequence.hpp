@@ -1,0 +1,215 @@
+// One sequence: who does what before which camera; renders any frame of it, and writes the folder.
+#pragma once
+
+#include <atomic>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "../support/tum.hpp"
+#include "camera_motion.hpp"
+#include "detector.hpp"
+#include "people.hpp"
+#include "sensor.hpp"
+
+namespace synthetic {
+
+enum class Scenario { sitting, walking };
+inline constexpr std::array<const char*, 2> scenario_names{"sitting", "walking"};
+
+struct SequenceOptions {
+  Scenario scenario = Scenario::walking;
+  Motion motion = Motion::xyz;
+  int frames = 300;
+  double rate_hz = 30;
+  std::uint64_t seed = 1;
+  int blur_samples = 1;          ///< sub-exposures; 1: no motion blur
+  double exposure_s = 0.012;     ///< over which they are spread
+  ImageCamera camera = default_camera(640);
+  RenderOptions render;
+  SensorOptions sensor;
+  DetectorOptions detector;
+
+  /// TUM fr3's intrinsics, scaled to a width (4:3).
+  static ImageCamera default_camera(int width) {
+    ImageCamera c;
+    const double s = width / 640.0;
+    c.fx = 535.4 * s;
+    c.fy = 539.2 * s;
+    c.cx = (320.1 + 0.5) * s - 0.5;
+    c.cy = (247.6 + 0.5) * s - 0.5;
+    c.width = width;
+    c.height = width * 3 / 4;
+    return c;
+  }
+};
+
+/// A real recording with poses that stands behind the people instead of the room.
+struct Recording {
+  struct View {
+    double time_s;
+    std::filesystem::path color, depth;
+    cfp::SE3<double> T_stage_cam;  ///< the stage is the frame of scene.hpp
+  };
+  std::vector<View> views;
+  ImageCamera camera;
+  double depth_units_per_metre = 5000;
+};
+
+struct RenderedFrame {
+  Frame truth;
+  cv::Mat color, depth, label;  ///< CV_8UC3, CV_16U, CV_8U as written
+};
+
+class Sequence {
+ public:
+  explicit Sequence(const SequenceOptions& options, std::shared_ptr<const Recording> recording = nullptr)
+      : options_(options), recording_(std::move(recording)), normal_(options.seed), motion_(options.motion, options.seed) {
+    const bool furnished = recording_ == nullptr;
+    if (recording_ != nullptr) {
+      options_.camera = recording_->camera;
+      options_.sensor.depth_units_per_metre = recording_->depth_units_per_metre;
+      options_.frames = std::min(options_.frames, static_cast<int>(recording_->views.size()));
+    }
+    scene_ = SceneBuilder(options_.seed).build(furnished);
+    const double seconds = recording_ != nullptr ? time_of(options_.frames) + 1 : options_.frames / options_.rate_hz + 1;
+    for (int person = 0; person < 2; ++person) {
+      cfp::Random random(options_.seed, person == 0 ? "first person" : "second person");
+      scripts_[person] = options_.scenario == Scenario::sitting ? sitting_script(random, person, seconds) : walking_script(random, person, seconds, furnished);
+    }
+    if (!furnished && options_.scenario == Scenario::walking) scene_.surfaces.clear();  // nobody sits: no chairs
+  }
+
+  [[nodiscard]] const SequenceOptions& options() const { return options_; }
+  /// Seconds since the first frame.
+  [[nodiscard]] double time_of(int frame) const {
+    if (recording_ == nullptr) return frame / options_.rate_hz;
+    const auto last = recording_->views.size() - 1;
+    return recording_->views[std::min(static_cast<std::size_t>(frame), last)].time_s - recording_->views[0].time_s;
+  }
+  [[nodiscard]] double stamp_of(int frame) const { return (recording_ == nullptr ? 1000.0 : recording_->views[0].time_s) + time_of(frame); }
+  [[nodiscard]] cfp::SE3<double> T_world_cam(int frame) const {
+    return recording_ == nullptr ? motion_(time_of(frame)) : recording_->views[static_cast<std::size_t>(frame)].T_stage_cam;
+  }
+  [[nodiscard]] double rotation_rate(int frame) const {
+    const int other = frame == 0 ? std::min(1, options_.frames - 1) : frame - 1;
+    const double dt = std::max(1e-3, std::abs(time_of(frame) - time_of(other)));
+    return cfp::so3_log<double>(T_world_cam(other).rotation.transpose() * T_world_cam(frame).rotation).norm() / dt;
+  }
+  /// Everything in the scene at a time, people last.
+  [[nodiscard]] std::vector<Surface> surfaces_at(double time) const {
+    std::vector<Surface> surfaces = scene_.surfaces;
+    for (int person = 0; person < 2; ++person) append_person(scene_, scripts_[person], person, time, options_.render.frame_s, surfaces);
+    return surfaces;
+  }
+
+  /// A pure function of the options and the frame's number.
+  void render(int frame, Renderer& renderer, RenderedFrame& out) const {
+    const double time = time_of(frame);
+    Backdrop backdrop;
+    if (recording_ != nullptr) backdrop = load(recording_->views[static_cast<std::size_t>(frame)]);
+    const std::vector<Surface> surfaces = surfaces_at(time);
+    renderer.render(scene_, surfaces, options_.camera, T_world_cam(frame), backdrop, options_.render, out.truth);
+    if (options_.blur_samples > 1 && recording_ == nullptr) blur(time, renderer, out.truth);
+    double people = 0;
+    for (const Sighting& s : out.truth.people) people += s.pixels;
+    people /= static_cast<double>(out.truth.depth.total());
+    const cfp::Random random(options_.seed * 1000003 + static_cast<std::uint64_t>(frame), "sensor");
+    const double gain = exposure(options_.sensor, time, people);
+    out.depth = sense_depth(out.truth, surfaces, options_.sensor, normal_, random);
+    out.color = sense_color(out.truth, options_.sensor, gain, normal_, cfp::Random(cfp::Random(random)()));
+    out.label = out.truth.label;
+  }
+
+ private:
+  void blur(double time, Renderer& renderer, Frame& truth) const {
+    cv::Mat sum = cv::Mat::zeros(truth.color.size(), CV_32FC3);
+    Frame part;
+    for (int k = 0; k < options_.blur_samples; ++k) {
+      const double at = std::max(0.0, time + options_.exposure_s * ((k + 0.5) / options_.blur_samples - 0.5));
+      renderer.render(scene_, surfaces_at(at), options_.camera, motion_(at), {}, options_.render, part);
+      sum += part.color;
+    }
+    truth.color = sum / options_.blur_samples;
+  }
+
+  [[nodiscard]] Backdrop load(const Recording::View& view) const {
+    Backdrop b;
+    b.color = cv::imread(view.color.string(), cv::IMREAD_COLOR);
+    const cv::Mat depth = cv::imread(view.depth.string(), cv::IMREAD_UNCHANGED);
+    const cv::Size size(options_.camera.width, options_.camera.height);
+    if (b.color.empty()) throw std::runtime_error("cannot read the image " + view.color.string());
+    if (depth.empty() || depth.type() != CV_16U) throw std::runtime_error("cannot read a 16-bit depth image from " + view.depth.string());
+    if (b.color.size() != size || depth.size() != size) throw std::runtime_error(view.color.string() + ": size differs from camera.txt");
+    depth.convertTo(b.depth, CV_32F, 1 / recording_->depth_units_per_metre);
+    return b;
+  }
+
+  SequenceOptions options_;
+  std::shared_ptr<const Recording> recording_;
+  NormalTable normal_;
+  CameraMotion motion_;
+  Scene scene_;
+  Script scripts_[2];
+};
+
+/// Reads rgb.txt, depth.txt, groundtruth.txt (or pseudo_groundtruth.txt) and camera.txt. Frames without depth or pose within 20 ms are left out.
+/// The stage is put before the first camera: `camera_height_m` above the floor, looking the way it looks on average, upright along
+/// the mean −y axis of the cameras (nobody films upside down).
+inline Recording read_recording(const std::filesystem::path& folder, double camera_height_m) {
+  Recording recording;
+  const cfp_example::TumCamera camera = cfp_example::read_tum_camera(folder / "camera.txt");
+  recording.camera.fx = camera.fx;
+  recording.camera.fy = camera.fy;
+  recording.camera.cx = camera.cx;
+  recording.camera.cy = camera.cy;
+  recording.camera.width = camera.width;
+  recording.camera.height = camera.height;
+  recording.depth_units_per_metre = camera.depth_units_per_metre;
+  const bool pseudo = !std::filesystem::exists(folder / "groundtruth.txt");
+  const auto poses = cfp_example::read_tum_trajectory(folder / (pseudo ? "pseudo_groundtruth.txt" : "groundtruth.txt"));
+  const auto colors = cfp_example::read_tum_list(folder / "rgb.txt"), depths = cfp_example::read_tum_list(folder / "depth.txt");
+  // Lists and trajectory are all stamped; the association of the evaluation does for both.
+  const auto stamped = [](const std::vector<cfp_example::TumImage>& images) {
+    std::vector<cfp::StampedPose<double>> stamps;
+    for (const auto& image : images) stamps.push_back({image.time_s, {}});
+    return stamps;
+  };
+  using View = cfp::span<const cfp::StampedPose<double>>;
+  cfp::AssociationWorkspace workspace;
+  std::vector<cfp::TimeMatch> with_depth, with_pose;
+  cfp::associate(View(stamped(colors)), View(stamped(depths)), {}, workspace, with_depth);
+  cfp::associate(View(stamped(colors)), View(poses), {}, workspace, with_pose);
+  for (std::size_t i = 0, j = 0; i < with_depth.size(); ++i) {
+    while (j < with_pose.size() && colors[with_pose[j].first].time_s < colors[with_depth[i].first].time_s) ++j;
+    if (j == with_pose.size() || with_pose[j].first != with_depth[i].first) continue;
+    recording.views.push_back({colors[with_depth[i].first].time_s, folder / colors[with_depth[i].first].file, folder / depths[with_depth[i].second].file,
+                               poses[with_pose[j].second].T_world_cam});
+  }
+  if (recording.views.empty()) throw std::runtime_error(folder.string() + ": no frame with colour, depth and pose");
+  Eigen::Vector3d up = Eigen::Vector3d::Zero(), forward = Eigen::Vector3d::Zero();
+  for (const auto& view : recording.views) {
+    up -= view.T_stage_cam.rotation.col(1);
+    forward += view.T_stage_cam.rotation.col(2);
+  }
+  up.normalize();
+  forward = (forward - forward.dot(up) * up).normalized();
+  cfp::SE3<double> T_stage_world;
+  T_stage_world.rotation.row(0) = forward.cross(up).transpose();
+  T_stage_world.rotation.row(1) = forward.transpose();
+  T_stage_world.rotation.row(2) = up.transpose();
+  T_stage_world.translation = Eigen::Vector3d(0, -2.95, camera_height_m) - T_stage_world.rotation * recording.views[0].T_stage_cam.translation;
+  for (auto& view : recording.views) view.T_stage_cam = T_stage_world * view.T_stage_cam;
+  return recording;
+}
+
+}  // namespace synthetic

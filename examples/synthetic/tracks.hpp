@@ -1,0 +1,175 @@
+// Values over time from key frames, and the scripts of what the two people do.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "cfp/core/random.hpp"
+
+#include "scene.hpp"
+
+namespace synthetic {
+
+/// Smooth between keys (velocity zero at each), constant outside.
+class Track {
+ public:
+  explicit Track(double start = 0) { keys_.push_back({0, start}); }
+  /// Reaches value at time `to`, having kept the last one until `from`.
+  void move(double from, double to, double value) {
+    if (from > keys_.back().time) keys_.push_back({from, keys_.back().value});
+    keys_.push_back({std::max(to, from + 1e-3), value});
+  }
+  [[nodiscard]] double last() const { return keys_.back().value; }
+  [[nodiscard]] double operator()(double time) const {
+    const auto next = std::upper_bound(keys_.begin(), keys_.end(), time, [](double t, const Key& key) { return t < key.time; });
+    if (next == keys_.begin()) return keys_.front().value;
+    const Key& before = *(next - 1);
+    if (next == keys_.end()) return before.value;
+    const double s = (time - before.time) / (next->time - before.time);
+    return before.value + (next->value - before.value) * s * s * (3 - 2 * s);
+  }
+
+ private:
+  struct Key {
+    double time, value;
+  };
+  std::vector<Key> keys_;
+};
+
+/// Everything a person does over time. Angles in radians; heading 0 looks along +x.
+struct Script {
+  Track x, y, heading, distance, sit, head_yaw, lean;
+  Track arm[2];  ///< 0 hanging (or in the lap), 1 raised and gesturing; [0] left
+  double gait_offset = 0, height = 1.78;
+};
+
+/// Writes a script, action by action.
+class Director {
+ public:
+  Director(double x, double y, double heading, double sit, double height) {
+    script_.x = Track(x);
+    script_.y = Track(y);
+    script_.heading = Track(heading);
+    script_.sit = Track(sit);
+    script_.height = height;
+  }
+
+  [[nodiscard]] double now() const { return now_; }
+  Script finish() { return std::move(script_); }
+
+  void wait(double seconds) { now_ += seconds; }
+  void turn(double heading, double seconds = 0.7) {
+    const double from = script_.heading.last();
+    const double by = std::remainder(heading - from, 2 * cfp::pi<double>);
+    if (std::abs(by) < 0.05) return;
+    script_.heading.move(now_, now_ + seconds, from + by);
+    now_ += 0.6 * seconds;
+  }
+  void walk(double x, double y, double speed) {
+    const double dx = x - script_.x.last(), dy = y - script_.y.last();
+    const double length = std::hypot(dx, dy);
+    if (length < 0.05) return;
+    turn(std::atan2(dy, dx));
+    const double seconds = length / speed + 0.3;
+    script_.x.move(now_, now_ + seconds, x);
+    script_.y.move(now_, now_ + seconds, y);
+    script_.distance.move(now_, now_ + seconds, script_.distance.last() + length);
+    now_ += seconds;
+  }
+  void sit(double to, double seconds = 1.4) {
+    script_.sit.move(now_, now_ + seconds, to);
+    script_.lean.move(now_, now_ + 0.5 * seconds, 0.5);
+    script_.lean.move(now_ + 0.5 * seconds, now_ + seconds, 0);
+    now_ += seconds;
+  }
+  /// Raises an arm, gestures, lowers it; the rest of the body stays still.
+  void gesture(int arm, double seconds) {
+    script_.arm[arm].move(now_, now_ + 0.6, 1);
+    script_.arm[arm].move(now_ + 0.6 + seconds, now_ + 1.2 + seconds, 0);
+    now_ += 1.2 + seconds;
+  }
+  void look(double yaw, double seconds = 0.6) {
+    script_.head_yaw.move(now_, now_ + seconds, yaw);
+    now_ += seconds;
+  }
+  void lean(double angle, double seconds = 1) {
+    script_.lean.move(now_, now_ + seconds, angle);
+    now_ += seconds;
+  }
+
+ private:
+  Script script_;
+  double now_ = 0;
+};
+
+/// Two people on their chairs at the desk: gestures, looks, leaning, and much stillness.
+inline Script sitting_script(cfp::Random& random, int person, double seconds) {
+  const double inward = person == 0 ? 0.9 : cfp::pi<double> - 0.9;
+  const double feet = 0.42;  // in front of the chair's middle
+  Director d(chair_x[person] + feet * std::cos(inward), chair_y + feet * std::sin(inward), inward, 1, person == 0 ? 1.80 : 1.74);
+  d.wait(person == 0 ? 0.3 : 1.2);
+  while (d.now() < seconds) {
+    const double choice = random.uniform();
+    if (choice < 0.5) {
+      d.gesture(static_cast<int>(random.index(2)), random.uniform(0.8, 3));
+    } else if (choice < 0.7) {
+      d.look(random.uniform(-0.9, 0.9));
+    } else if (choice < 0.82) {
+      d.lean(random.uniform(0, 0.45));
+    } else {
+      d.wait(random.uniform(0.5, 2));
+    }
+  }
+  return d.finish();
+}
+
+/// They stand up, walk past each other before and behind the desk, stop to talk with a hand, and sit down again.
+inline Script walking_script(cfp::Random& random, int person, double seconds, bool furnished) {
+  const double side = person == 0 ? -1 : 1;
+  const double lane = person == 0 ? -1.55 : -1.2;  // y; chairs reach to about -0.9, the camera to -2.4
+  const double inward = person == 0 ? 0.9 : cfp::pi<double> - 0.9;
+  const double seat_x = chair_x[person] + 0.42 * std::cos(inward), seat_y = chair_y + 0.42 * std::sin(inward);
+  const double speed = random.uniform(0.75, 1.05);
+  const bool starts_seated = furnished && person == 0;
+  Director d(starts_seated ? seat_x : side * 1.2, starts_seated ? seat_y : lane, starts_seated ? inward : cfp::pi<double>, starts_seated ? 1 : 0,
+             person == 0 ? 1.80 : 1.74);
+  if (starts_seated) {
+    d.wait(0.6);
+    d.sit(0);
+    d.turn(-2.2, 1.0);
+    d.walk(side * 0.4, lane, speed);
+  }
+  bool left = person != 0;
+  while (d.now() < seconds) {
+    const double choice = random.uniform();
+    const double x = left ? -random.uniform(0.3, 1.6) : random.uniform(0.3, 1.6);
+    if (choice < 0.62) {
+      d.walk(x, lane + random.uniform(-0.1, 0.1), speed * random.uniform(0.8, 1.2));
+      left = !left;
+    } else if (choice < 0.78) {
+      d.turn(random.uniform(1.1, 2.0));
+      d.gesture(static_cast<int>(random.index(2)), random.uniform(0.4, 1.2));
+    } else if (choice < 0.9 || !furnished) {
+      // Around the desk, behind the partition, and back on the other side.
+      const double s = left ? -1 : 1;
+      d.walk(s * 1.85, lane + 0.1, speed);
+      d.walk(s * 1.85, 1.15 + 0.2 * person, speed);
+      d.walk(-s * 1.8, 1.15 + 0.2 * person, speed);
+      d.walk(-s * 1.85, lane, speed);
+      left = s > 0;
+    } else {
+      d.walk(side * 1.5, lane, speed);
+      d.walk(seat_x + 0.1 * side, seat_y, speed);
+      d.turn(inward);
+      d.walk(seat_x, seat_y, speed);
+      d.turn(inward);
+      d.sit(1);
+      d.gesture(person, random.uniform(0.3, 1));
+      d.sit(0);
+    }
+  }
+  return d.finish();
+}
+
+}  // namespace synthetic
