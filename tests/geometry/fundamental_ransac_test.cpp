@@ -10,6 +10,7 @@
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"
+#include "support/dynamic_scene.hpp"
 #include "support/two_view_scene.hpp"
 
 using cfp::fundamental_ransac;
@@ -277,5 +278,25 @@ TEST_CASE("Labelled real pairs: the labelled inliers fit F", "[geometry]") {
     double labelled = 0, found = 0;
     for (std::size_t i = 0; i < mask.size(); ++i) labelled += pairs.label[i], found += pairs.label[i] != 0 && mask[i] != 0 ? 1 : 0;
     CHECK(found > 0.85 * labelled);
+  }
+}
+
+TEST_CASE("A slow camera before a far wall has an F where its noise allows, and a rotation is never one", "[geometry]") {
+  // A video's parallax over a far wall is often below threshold_px; the choice must rest on the noise, not on the threshold.
+  FundamentalRansacWorkspace workspace;
+  for (const double noise_px : {0.02, 0.1, 0.3, 0.5}) {
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      for (const double translation_m : {0.0, 0.03, 0.1}) {
+        cfp_test::DynamicSceneOptions options;
+        options.people = 0;
+        options.pixel_noise_px = noise_px;
+        options.translation_m = translation_m;
+        const auto scene = cfp_test::make_dynamic_scene<double>(options, seed);
+        const auto result = fundamental_ransac<double>(scene.previous_keypoints, scene.keypoints, {}, {}, FundamentalRansacOptions{}, workspace, &scene.camera);
+        INFO("noise " << noise_px << " px, translation " << translation_m << " m, seed " << seed << ": " << to_string(result.reason));
+        if (translation_m == 0) CHECK(result.reason == FundamentalReason::pure_rotation);
+        if (translation_m == 0.1 || (translation_m > 0 && noise_px <= 0.1)) CHECK(result.has_fundamental());
+      }
+    }
   }
 }

@@ -88,3 +88,9 @@ TEST_CASE("Map-point options outside their range are named", "[probability]") {
   options.mismatch_threshold = 0;
   CHECK(cfp::invalid_field(options) == std::string("mismatch_threshold"));
 }
+
+TEST_CASE("A map point that was never in doubt keeps M = 1 under every policy", "[probability]") {
+  for (const auto policy : {cfp::MapPointPolicy::copy, cfp::MapPointPolicy::exponential_mean, cfp::MapPointPolicy::log_odds}) {
+    CHECK(cfp::updated_map_point(1.0, 1.0, with(policy)) == 1.0);
+  }
+}

@@ -1,6 +1,7 @@
 // Two frames of a room with people in it, as arrays: what a SLAM front end would hand to cfp, with the truth beside it.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>

@@ -128,6 +128,7 @@ FundamentalResult<Scalar> fundamental_ransac(PointSpan<Scalar, 2> prev, PointSpa
   const bool has_homography = search.dominant_homography(best.F, 0.5, H);
   if (has_homography) search.complete_from_plane(H, best);
   search.polish(best);
+  search.measure_noise(best.F);
   const bool explained_by_homography = has_homography && !search.has_parallax(H, best.F);
   if (explained_by_homography) {
     PinholeCamera<double> intrinsics;

@@ -32,10 +32,12 @@ struct FundamentalSearch {
   Random random;
   std::size_t iterations = 0;
   bool confident = false;
+  double noise_limit = limit;  // squared Sampson distance that 95 % of the true pairs stay below, as measured; at most limit
 
   // Transfer distances have two degrees of freedom and the noise of both images: 95 % of chi-squared is there at 3 times the
   // squared threshold that holds 95 % of the Sampson distances.
   [[nodiscard]] double transfer_limit() const noexcept { return 3 * limit; }
+  [[nodiscard]] double transfer_noise_limit() const noexcept { return 3 * noise_limit; }
 
   // Scales of the refinement loss in squared thresholds, wide in the search and near the inliers' spread in the end.
   static constexpr double search_scale = 4, final_scale = 2.5;
@@ -151,29 +153,70 @@ struct FundamentalSearch {
     if (best.cost < candidate.cost) candidate = best;
   }
 
+  // The threshold is the caller's tolerance, not the noise, and a video's parallax may be smaller than it: whether a homography
+  // suffices is judged by the spread of F's own residuals, a truncated variance iterated to its fixed point. 0.911 is the variance
+  // that a normal distribution keeps within 2.5 sigma, 3.84 the 95 % quantile of chi-squared. Floor: 0.01 px.
+  void measure_noise(const Matrix3<double>& F) noexcept {
+    const double floor = 1e-4 * pairs.factor * pairs.factor;
+    double variance = limit / 3.84;
+    for (int step = 0; step < 10; ++step) {
+      double sum = 0, weight = 0;
+      for (std::size_t i = 0; i < pairs.size; ++i) {
+        const double d2 = scaled_sampson_sq(pairs, F, i);
+        if (!(d2 <= (std::min)(limit, 6.25 * variance))) continue;
+        sum += pairs.weights()[i] * d2;
+        weight += pairs.weights()[i];
+      }
+      if (!(weight > 0)) break;
+      variance = (std::max)(sum / weight / 0.911, floor);
+    }
+    noise_limit = (std::min)(limit, 3.84 * variance);
+  }
+
+  [[nodiscard]] bool has_parallax(const Matrix3<double>& H, const Matrix3<double>& F) const noexcept {
+    return has_pairs_off_plane(H, F) || varies_along_lines(H, F);
+  }
+
   // Whether F explains clearly more of the pairs off the plane than lines in random directions through H p would: those catch a
   // pair at distance d with probability 2/pi asin(sqrt(2) T / d), T the Sampson threshold (noise of both images). Two pairs
   // fix the epipole; five standard deviations make up for the best epipole having been searched.
-  [[nodiscard]] bool has_parallax(const Matrix3<double>& H, const Matrix3<double>& F) const noexcept {
+  [[nodiscard]] bool has_pairs_off_plane(const Matrix3<double>& H, const Matrix3<double>& F) const noexcept {
     double expected = 2, variance = 1, found = 0;
     for (std::size_t i = 0; i < pairs.size; ++i) {
       const double d2 = transfer_sq(pairs, H, i);
-      if (!(d2 > transfer_limit())) continue;
-      const double chance = 2 / pi<double> * std::asin(std::sqrt((std::min)(1.0, 2 * limit / d2)));
+      if (!(d2 > transfer_noise_limit())) continue;
+      const double chance = 2 / pi<double> * std::asin(std::sqrt((std::min)(1.0, 2 * noise_limit / d2)));
       expected += chance;
       variance += chance * (1 - chance);
-      found += scaled_sampson_sq(pairs, F, i) <= limit ? 1 : 0;
+      found += scaled_sampson_sq(pairs, F, i) <= noise_limit ? 1 : 0;
     }
     return found >= expected + 5 * std::sqrt(variance);
+  }
+
+  // Whether the pairs are spread more along their epipolar lines than across them: d_H^2 / 2 is the sum of both squares, and under
+  // H alone their sums have an F distribution around n / (n - 7) (F has 7 parameters) with deviation sqrt(4/n); six of them. Finds the small
+  // parallax of a slow camera before a far wall, which no single pair shows. Pairs far off H are left to the test above:
+  // mismatches would otherwise outweigh everything.
+  [[nodiscard]] bool varies_along_lines(const Matrix3<double>& H, const Matrix3<double>& F) const noexcept {
+    const double farthest = 16 * noise_limit / 3.84;
+    double across = 0, along = 0, n = 0;
+    for (std::size_t i = 0; i < pairs.size; ++i) {
+      const double sum = transfer_sq(pairs, H, i) / 2, across_sq = scaled_sampson_sq(pairs, F, i);
+      if (!(sum <= farthest && across_sq <= farthest)) continue;
+      across += across_sq;
+      along += sum - across_sq;
+      n += 1;
+    }
+    return n > 7 && along * (n - 7) > across * n * (1 + 6 * std::sqrt(4 / n));
   }
 
   // Share of the pairs explained by H that `other` explains, too.
   [[nodiscard]] double explained_by(const Matrix3<double>& other, const Matrix3<double>& H) const noexcept {
     double both = 0, all = 0;
     for (std::size_t i = 0; i < pairs.size; ++i) {
-      if (!(transfer_sq(pairs, H, i) <= transfer_limit())) continue;
+      if (!(transfer_sq(pairs, H, i) <= transfer_noise_limit())) continue;
       all += pairs.weights()[i];
-      both += transfer_sq(pairs, other, i) <= transfer_limit() ? pairs.weights()[i] : 0.0;
+      both += transfer_sq(pairs, other, i) <= transfer_noise_limit() ? pairs.weights()[i] : 0.0;
     }
     return all > 0 ? both / all : 0;
   }
@@ -194,7 +237,7 @@ struct FundamentalSearch {
     const Matrix3<double> ray_prev = K_inverse * pairs.scale_prev.matrix().inverse(), ray_cur = K_inverse * pairs.scale_cur.matrix().inverse();
     Matrix3<double> M = Matrix3<double>::Zero();
     for (std::size_t i = 0; i < pairs.size; ++i) {
-      if (!(transfer_sq(pairs, H, i) <= transfer_limit())) continue;
+      if (!(transfer_sq(pairs, H, i) <= transfer_noise_limit())) continue;
       const Vector3<double> p = ray_prev * Vector3<double>(pairs.array(0)[i], pairs.array(1)[i], 1), q = ray_cur * Vector3<double>(pairs.array(2)[i], pairs.array(3)[i], 1);
       M += pairs.weights()[i] * q.normalized() * p.normalized().transpose();
     }

@@ -45,7 +45,9 @@ template <typename Scalar>
   using std::log;
   const auto bounded = [limit](Scalar p) { return p < limit ? limit : (p > Scalar(1) - limit ? Scalar(1) - limit : p); };
   const auto logit = [](Scalar p) { return log(p / (Scalar(1) - p)); };
-  return bounded(Scalar(1) / (Scalar(1) + exp(-(logit(bounded(m)) + rate * logit(bounded(k))))));
+  const Scalar updated = bounded(Scalar(1) / (Scalar(1) + exp(-(logit(bounded(m)) + rate * logit(bounded(k))))));
+  // A K beyond the bound never lowers M: a point that was never in doubt keeps the weight 1 that it has without this library.
+  return k > Scalar(1) - limit && updated < m ? m : updated;
 }
 
 }  // namespace detail
