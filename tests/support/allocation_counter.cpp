@@ -24,7 +24,9 @@ std::size_t allocation_count() noexcept { return count; }
 // malloc as well: interposing malloc catches both. The sanitizers own malloc and offer a hook instead. Elsewhere only
 // operator new is counted.
 #if defined(CFP_TEST_SANITIZED)
-#include <sanitizer/allocator_interface.h>
+// As in sanitizer/allocator_interface.h, which GCC's packages lack.
+extern "C" int __sanitizer_install_malloc_and_free_hooks(void (*on_malloc)(const volatile void*, std::size_t),
+                                                         void (*on_free)(const volatile void*));
 namespace {
 [[maybe_unused]] const int installed =
     __sanitizer_install_malloc_and_free_hooks([](const volatile void*, std::size_t) { ++count; }, [](const volatile void*) {});
