@@ -8,6 +8,7 @@ foreach(header ${headers})
   file(READ "${ROOT}/include/${header}" text)
   # What stands in namespace detail is nobody's business; square brackets and semicolons would upset CMake's lists.
   string(REGEX REPLACE "[][;]" " " text "${text}")
+  string(REPLACE "namespace cfp::detail" "namespace detail" text "${text}")
   set(outside "")
   string(FIND "${text}" "\nnamespace detail {" begin)
   while(NOT begin EQUAL -1)

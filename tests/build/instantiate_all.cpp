@@ -32,14 +32,15 @@ template struct cfp::SE3<float>;
 template struct cfp::SE3<double>;
 template <typename Scalar>
 static void instantiate_math() noexcept {
+  use(&cfp::order_statistic<Scalar>);
+  use(&cfp::se3_exp<Scalar>);
+  use(&cfp::se3_log<Scalar>);
+  use(&cfp::adjoint<Scalar>);
   use(&cfp::hat<Scalar>);
   use(&cfp::so3_exp<Scalar>);
   use(&cfp::so3_log<Scalar>);
   use(&cfp::so3_left_jacobian<Scalar>);
   use(&cfp::normalized_rotation<Scalar>);
-  use(&cfp::se3_exp<Scalar>);
-  use(&cfp::se3_log<Scalar>);
-  use(&cfp::adjoint<Scalar>);
   use(&cfp::SE3<Scalar>::template cast<float>);
   use(&cfp::SE3<Scalar>::template cast<double>);
 }
@@ -49,6 +50,8 @@ template struct cfp::Box<float>;
 template struct cfp::Box<double>;
 template struct cfp::PinholeCamera<float>;
 template struct cfp::PinholeCamera<double>;
+template struct cfp::RadialTangentialCamera<float>;
+template struct cfp::RadialTangentialCamera<double>;
 template <typename Scalar>
 static void instantiate_geometry() noexcept {
   use(&cfp::is_proper<Scalar>);
@@ -57,17 +60,103 @@ static void instantiate_geometry() noexcept {
   use(&cfp::intersection<Scalar>);
   use(&cfp::iou<Scalar>);
   use(&cfp::clip<Scalar>);
+  use(&cfp::has_distance<Scalar>);
+  use(&cfp::essential_from_pose<Scalar>);
+  use(&cfp::epipolar_line<Scalar>);
+  use(&cfp::point_line_distance<Scalar>);
+  use(&cfp::epipolar_distance<Scalar>);
+  use(&cfp::symmetric_epipolar_distance<Scalar>);
+  use(&cfp::sampson_distance<Scalar>);
+  use(&cfp::epipolar_distances<Scalar>);
+  use(&cfp::reprojection_distances<Scalar>);
 }
 
 // ---- detection ----
+template struct cfp::CostMatrix<float>;
+template struct cfp::CostMatrix<double>;
+template struct cfp::ClassBox<float>;
+template struct cfp::ClassBox<double>;
+template struct cfp::RateFilter<float>;
+template struct cfp::RateFilter<double>;
+template struct cfp::BoxFilter<float>;
+template struct cfp::BoxFilter<double>;
+template struct cfp::Detection<float>;
+template struct cfp::Detection<double>;
+template struct cfp::TrackedBox<float>;
+template struct cfp::TrackedBox<double>;
+template struct cfp::BoxTrackerResult<float>;
+template struct cfp::BoxTrackerResult<double>;
+template class cfp::BoxTracker<float>;
+template class cfp::BoxTracker<double>;
+template <typename Scalar>
+static void instantiate_detection() noexcept {
+  use(&cfp::associate_boxes<Scalar>);
+  use(&cfp::box_edges<Scalar>);
+}
+
 // ---- clustering ----
+template struct cfp::AdaptiveWorkspace<float>;
+template struct cfp::AdaptiveWorkspace<double>;
+template struct cfp::Ascending<float>;
+template struct cfp::Ascending<double>;
+template struct cfp::AscendingWorkspace<float>;
+template struct cfp::AscendingWorkspace<double>;
+template struct cfp::DbscanWorkspace<float>;
+template struct cfp::DbscanWorkspace<double>;
+template struct cfp::ForegroundWorkspace<float>;
+template struct cfp::ForegroundWorkspace<double>;
+template struct cfp::KDistanceWorkspace<float>;
+template struct cfp::KDistanceWorkspace<double>;
+template <typename Scalar>
+static void instantiate_clustering() noexcept {
+  use(&cfp::adaptive_options<Scalar>);
+  use(&cfp::dbscan_ascending<Scalar>);
+  use(&cfp::dbscan<Scalar>);
+  use(&cfp::verify_dbscan<Scalar>);
+  use(&cfp::depth_foreground<Scalar>);
+  use(&cfp::k_distances<Scalar>);
+  use(&cfp::median_k_distance<Scalar>);
+  use(&cfp::knee_k_distance<Scalar>);
+  use(&cfp::kann_options<Scalar>);
+}
+
 // ---- probability ----
+template struct cfp::ConstraintModel<float>;
+template struct cfp::ConstraintModel<double>;
+template struct cfp::Evidence<float>;
+template struct cfp::Evidence<double>;
+template struct cfp::SecondStageKeypoint<float>;
+template struct cfp::SecondStageKeypoint<double>;
+template <typename Scalar>
+static void instantiate_probability() noexcept {
+  use(&cfp::statistical_confidence<Scalar>);
+  use(&cfp::calculation_confidence<Scalar>);
+  use(&cfp::fit_constraint<Scalar>);
+  use(&cfp::static_probability<Scalar>);
+  use(&cfp::static_probabilities<Scalar>);
+  use(&cfp::fuse_high_dynamic<Scalar>);
+  use(&cfp::fuse_low_dynamic<Scalar>);
+  use(&cfp::second_stage_probability<Scalar>);
+  use(&cfp::is_high_dynamic<Scalar>);
+  use(&cfp::background_factor<Scalar>);
+  use(&cfp::first_stage_probability<Scalar>);
+  use(&cfp::updated_map_point<Scalar>);
+  use(&cfp::is_deletable<Scalar>);
+  use(&cfp::is_mismatch<Scalar>);
+  use(&cfp::observation_weight<Scalar>);
+  use(&cfp::object_score<Scalar>);
+  use(&cfp::object_probability<Scalar>);
+}
+
 // ---- optimization ----
 // ---- evaluation ----
 // ---- pipeline ----
 
 template <typename Scalar>
 static void instantiate() noexcept {
+  instantiate_probability<Scalar>();
+  instantiate_clustering<Scalar>();
+  instantiate_detection<Scalar>();
   instantiate_core<Scalar>();
   instantiate_math<Scalar>();
   instantiate_geometry<Scalar>();

@@ -5,16 +5,73 @@
 #include "cfp/cfp.hpp"
 
 // clang-format off
-#define CFP_LAYOUTS                                        \
-  CFP_LAYOUT_OPAQUE(cfp::span<const float>)                \
-  CFP_LAYOUT_OPAQUE(cfp::PointSpan<float, 2>)              \
-  CFP_LAYOUT_OPAQUE(cfp::PointSpan<double, 3>)             \
-  CFP_LAYOUT_OPAQUE(cfp::Random)                           \
-  CFP_LAYOUT_OPAQUE(cfp::Tolerance<float>)                 \
-  CFP_LAYOUT(cfp::SE3<float>, translation)                 \
-  CFP_LAYOUT(cfp::SE3<double>, translation)                \
-  CFP_LAYOUT(cfp::Box<float>, y2)                          \
-  CFP_LAYOUT(cfp::Box<double>, y2)                         \
-  CFP_LAYOUT(cfp::PinholeCamera<float>, cy)                \
-  CFP_LAYOUT(cfp::PinholeCamera<double>, cy)
+#define CFP_LAYOUTS                                                     \
+  CFP_LAYOUT(cfp::DepthNoise, nearest_m)                                \
+  CFP_LAYOUT(cfp::AdaptiveOptions, k_fraction)                          \
+  CFP_LAYOUT(cfp::AdaptiveWorkspace<float>, k_distance)                 \
+  CFP_LAYOUT(cfp::AdaptiveWorkspace<double>, k_distance)                \
+  CFP_LAYOUT(cfp::Ascending<float>, index)                              \
+  CFP_LAYOUT(cfp::Ascending<double>, index)                             \
+  CFP_LAYOUT(cfp::AscendingWorkspace<float>, index)                     \
+  CFP_LAYOUT(cfp::AscendingWorkspace<double>, index)                    \
+  CFP_LAYOUT(cfp::DbscanOptions, min_pts)                               \
+  CFP_LAYOUT(cfp::DbscanResult, invalid)                                \
+  CFP_LAYOUT(cfp::DbscanWorkspace<float>, core)                         \
+  CFP_LAYOUT(cfp::DbscanWorkspace<double>, core)                        \
+  CFP_LAYOUT(cfp::DbscanVerifierOptions, ascending_numbers)             \
+  CFP_LAYOUT(cfp::DbscanVerdict, index)                                 \
+  CFP_LAYOUT(cfp::ForegroundOptions, invalid_is_foreground)             \
+  CFP_LAYOUT(cfp::ForegroundResult, near_m)                             \
+  CFP_LAYOUT(cfp::ForegroundWorkspace<float>, labels)                   \
+  CFP_LAYOUT(cfp::ForegroundWorkspace<double>, labels)                  \
+  CFP_LAYOUT(cfp::KDistanceWorkspace<float>, labels)                    \
+  CFP_LAYOUT(cfp::KDistanceWorkspace<double>, labels)                   \
+  CFP_LAYOUT_OPAQUE(cfp::Tolerance<float>)                              \
+  CFP_LAYOUT_OPAQUE(cfp::Random)                                        \
+  CFP_LAYOUT_OPAQUE(cfp::span<const float>)                             \
+  CFP_LAYOUT_OPAQUE(cfp::PointSpan<float, 2>)                           \
+  CFP_LAYOUT_OPAQUE(cfp::PointSpan<double, 3>)                          \
+  CFP_LAYOUT(cfp::CostMatrix<float>, cols)                              \
+  CFP_LAYOUT(cfp::CostMatrix<double>, cols)                             \
+  CFP_LAYOUT(cfp::AssignmentResult, cost)                               \
+  CFP_LAYOUT(cfp::AssignmentWorkspace, visits)                          \
+  CFP_LAYOUT(cfp::ClassBox<float>, class_id)                            \
+  CFP_LAYOUT(cfp::ClassBox<double>, class_id)                           \
+  CFP_LAYOUT(cfp::AssociationWorkspace, assignment)                     \
+  CFP_LAYOUT(cfp::BoxMotionOptions, max_size_px)                        \
+  CFP_LAYOUT(cfp::RateFilter<float>, var_rate)                          \
+  CFP_LAYOUT(cfp::RateFilter<double>, var_rate)                         \
+  CFP_LAYOUT(cfp::BoxFilter<float>, log_height)                         \
+  CFP_LAYOUT(cfp::BoxFilter<double>, log_height)                        \
+  CFP_LAYOUT(cfp::Detection<float>, score)                              \
+  CFP_LAYOUT(cfp::Detection<double>, score)                             \
+  CFP_LAYOUT(cfp::TrackedBox<float>, associated)                        \
+  CFP_LAYOUT(cfp::TrackedBox<double>, associated)                       \
+  CFP_LAYOUT(cfp::BoxTrackerOptions, image_height)                      \
+  CFP_LAYOUT(cfp::BoxTrackerResult<float>, unwarped)                    \
+  CFP_LAYOUT(cfp::BoxTrackerResult<double>, unwarped)                   \
+  CFP_LAYOUT_OPAQUE(cfp::BoxTracker<float>)                             \
+  CFP_LAYOUT_OPAQUE(cfp::BoxTracker<double>)                            \
+  CFP_LAYOUT_OPAQUE(cfp::EkfState<float, 8>)                            \
+  CFP_LAYOUT_OPAQUE(cfp::EkfState<double, 2>)                           \
+  CFP_LAYOUT_OPAQUE(cfp::EkfState<double, 8>)                           \
+  CFP_LAYOUT(cfp::EkfUpdate, mahalanobis_sq)                            \
+  CFP_LAYOUT(cfp::Box<float>, y2)                                       \
+  CFP_LAYOUT(cfp::Box<double>, y2)                                      \
+  CFP_LAYOUT(cfp::PinholeCamera<float>, cy)                             \
+  CFP_LAYOUT(cfp::PinholeCamera<double>, cy)                            \
+  CFP_LAYOUT(cfp::RadialTangentialCamera<float>, k3)                    \
+  CFP_LAYOUT(cfp::RadialTangentialCamera<double>, k3)                   \
+  CFP_LAYOUT(cfp::SE3<float>, translation)                              \
+  CFP_LAYOUT(cfp::SE3<double>, translation)                             \
+  CFP_LAYOUT(cfp::ConstraintOptions, min_samples)                       \
+  CFP_LAYOUT(cfp::ConstraintModel<float>, status)                       \
+  CFP_LAYOUT(cfp::ConstraintModel<double>, status)                      \
+  CFP_LAYOUT(cfp::Evidence<float>, available)                           \
+  CFP_LAYOUT(cfp::Evidence<double>, available)                          \
+  CFP_LAYOUT(cfp::SecondStageKeypoint<float>, box_associated)           \
+  CFP_LAYOUT(cfp::SecondStageKeypoint<double>, box_associated)          \
+  CFP_LAYOUT(cfp::MapPointOptions, weight)                              \
+  CFP_LAYOUT(cfp::ObjectProbabilityOptions, unknown_object_probability) \
+  CFP_LAYOUT(cfp::ObjectProbability, status)
 // clang-format on
