@@ -83,7 +83,7 @@ void copy_costs(const Scalar* source, std::size_t step, std::size_t size, CostLi
 class AssignmentSolver {
  public:
   AssignmentSolver(AssignmentWorkspace& w, std::size_t rows, std::size_t cols, double gate) noexcept
-      : w_(w), rows_(rows), cols_(cols), stride_(padded(cols)), gate_(gate) {}
+      : w_(w), rows_(rows), stride_(padded(cols)), gate_(gate) {}
 
   static std::size_t padded(std::size_t cols) noexcept { return (cols + assignment_lanes - 1) / assignment_lanes * assignment_lanes; }
 
@@ -283,7 +283,7 @@ class AssignmentSolver {
   }
 
   AssignmentWorkspace& w_;
-  std::size_t rows_, cols_, stride_;
+  std::size_t rows_, stride_;
   double gate_;
 };
 
