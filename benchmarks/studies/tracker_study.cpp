@@ -183,7 +183,7 @@ std::vector<int> match(const std::vector<Truth>& truth, const Boxes& boxes) {
   for (const Truth& t : truth) left.push_back({t.box, 0});
   for (const auto& b : boxes) right.push_back({b.box, 0});
   std::vector<int> partner(left.size());
-  cfp::AssociationWorkspace workspace;
+  cfp::BoxAssociationWorkspace workspace;
   cfp::associate_boxes<double>(left, right, 0.4999999, partner, workspace);
   return partner;
 }

@@ -19,7 +19,7 @@ struct ClassBox {
   int class_id = 0;
 };
 
-struct AssociationWorkspace {
+struct BoxAssociationWorkspace {
   std::vector<double> costs;
   AssignmentWorkspace assignment;
 };
@@ -29,7 +29,7 @@ struct AssociationWorkspace {
 /// Improper boxes stay alone. Allocates only while the workspace grows.
 template <typename Scalar>
 AssignmentResult associate_boxes(span<const ClassBox<Scalar>> left, span<const ClassBox<Scalar>> right, double min_iou, span<int> partner,
-                                 AssociationWorkspace& workspace) {
+                                 BoxAssociationWorkspace& workspace) {
   workspace.costs.resize(left.size() * right.size());
   double* cost = workspace.costs.data();
   for (const ClassBox<Scalar>& a : left) {

@@ -191,7 +191,7 @@ class BoxTracker {
   std::vector<Source> sources_;
   std::vector<int> partner_;
   std::vector<std::size_t> births_;
-  AssociationWorkspace workspace_;
+  BoxAssociationWorkspace workspace_;
 };
 
 }  // namespace cfp
