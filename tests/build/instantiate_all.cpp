@@ -32,6 +32,7 @@ template struct cfp::SE3<float>;
 template struct cfp::SE3<double>;
 template <typename Scalar>
 static void instantiate_math() noexcept {
+  use(&cfp::real_cubic_roots<Scalar>);
   use(&cfp::order_statistic<Scalar>);
   use(&cfp::se3_exp<Scalar>);
   use(&cfp::se3_log<Scalar>);
@@ -50,6 +51,8 @@ template struct cfp::Box<float>;
 template struct cfp::Box<double>;
 template struct cfp::PinholeCamera<float>;
 template struct cfp::PinholeCamera<double>;
+template struct cfp::FundamentalResult<float>;
+template struct cfp::FundamentalResult<double>;
 template struct cfp::RadialTangentialCamera<float>;
 template struct cfp::RadialTangentialCamera<double>;
 template <typename Scalar>
@@ -68,6 +71,10 @@ static void instantiate_geometry() noexcept {
   use(&cfp::symmetric_epipolar_distance<Scalar>);
   use(&cfp::sampson_distance<Scalar>);
   use(&cfp::epipolar_distances<Scalar>);
+  use(&cfp::nearest_fundamental<Scalar>);
+  use(&cfp::fundamental_8point<Scalar>);
+  use(&cfp::fundamental_7point<Scalar>);
+  use(&cfp::fundamental_ransac<Scalar>);
   use(&cfp::reprojection_distances<Scalar>);
 }
 
@@ -149,11 +156,47 @@ static void instantiate_probability() noexcept {
 }
 
 // ---- optimization ----
+template struct cfp::Trivial<float>;
+template struct cfp::Trivial<double>;
+template struct cfp::Huber<float>;
+template struct cfp::Huber<double>;
+template struct cfp::Cauchy<float>;
+template struct cfp::Cauchy<double>;
+template struct cfp::GemanMcClure<float>;
+template struct cfp::GemanMcClure<double>;
+template struct cfp::Truncated<float>;
+template struct cfp::Truncated<double>;
+template struct cfp::RobustLoss<float>;
+template struct cfp::RobustLoss<double>;
+template struct cfp::PoseObservations<float>;
+template struct cfp::PoseObservations<double>;
+template struct cfp::WeightedPnPWorkspace<float>;
+template struct cfp::WeightedPnPWorkspace<double>;
+template <typename Scalar>
+static void instantiate_optimization() noexcept {
+}
+
 // ---- evaluation ----
+template struct cfp::StampedPose<float>;
+template struct cfp::StampedPose<double>;
+template <typename Scalar>
+static void instantiate_evaluation() noexcept {
+  use(&cfp::align_points<Scalar>);
+  use(&cfp::area_under_curve<Scalar>);
+  use(&cfp::is_usable<Scalar>);
+  use(&cfp::time_order<Scalar>);
+  use(&cfp::associate<Scalar>);
+  use(&cfp::trajectory_coverage<Scalar>);
+  use(&cfp::absolute_trajectory_error<Scalar>);
+  use(&cfp::relative_pose_error<Scalar>);
+}
+
 // ---- pipeline ----
 
 template <typename Scalar>
 static void instantiate() noexcept {
+  instantiate_evaluation<Scalar>();
+  instantiate_optimization<Scalar>();
   instantiate_probability<Scalar>();
   instantiate_clustering<Scalar>();
   instantiate_detection<Scalar>();

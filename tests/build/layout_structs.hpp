@@ -1,5 +1,6 @@
 // Every public struct, one line each: CFP_LAYOUT(type, last data member) or, where the members are private or there are
 // none, CFP_LAYOUT_OPAQUE(type). check_layout_list.cmake names those that are missing.
+// Left out because they are registers, made to follow the flags, and never stored: cfp::PacketMask, cfp::BasicPacket, of core/packet.hpp.
 #pragma once
 
 #include "cfp/cfp.hpp"
@@ -37,7 +38,7 @@
   CFP_LAYOUT(cfp::AssignmentWorkspace, visits)                          \
   CFP_LAYOUT(cfp::ClassBox<float>, class_id)                            \
   CFP_LAYOUT(cfp::ClassBox<double>, class_id)                           \
-  CFP_LAYOUT(cfp::AssociationWorkspace, assignment)                     \
+  CFP_LAYOUT(cfp::BoxAssociationWorkspace, assignment)                  \
   CFP_LAYOUT(cfp::BoxMotionOptions, max_size_px)                        \
   CFP_LAYOUT(cfp::RateFilter<float>, var_rate)                          \
   CFP_LAYOUT(cfp::RateFilter<double>, var_rate)                         \
@@ -56,14 +57,57 @@
   CFP_LAYOUT_OPAQUE(cfp::EkfState<double, 2>)                           \
   CFP_LAYOUT_OPAQUE(cfp::EkfState<double, 8>)                           \
   CFP_LAYOUT(cfp::EkfUpdate, mahalanobis_sq)                            \
+  CFP_LAYOUT(cfp::Similarity, translation)                              \
+  CFP_LAYOUT(cfp::AlignmentResult, status)                              \
+  CFP_LAYOUT(cfp::RankedLabel, is_static)                               \
+  CFP_LAYOUT(cfp::CalibrationWorkspace, ranked)                         \
+  CFP_LAYOUT(cfp::AucResult, status)                                    \
+  CFP_LAYOUT(cfp::ReliabilityBin, static_fraction)                      \
+  CFP_LAYOUT(cfp::CalibrationResult<10>, status)                        \
+  CFP_LAYOUT(cfp::ErrorStatistics, count)                               \
+  CFP_LAYOUT(cfp::StampedPose<float>, T_world_cam)                      \
+  CFP_LAYOUT(cfp::StampedPose<double>, T_world_cam)                     \
+  CFP_LAYOUT(cfp::AssociationOptions, offset_s)                         \
+  CFP_LAYOUT(cfp::TimeMatch, second)                                    \
+  CFP_LAYOUT(cfp::AssociationWorkspace, heap)                           \
+  CFP_LAYOUT(cfp::TrajectoryCoverage, largest_stamp_difference_s)       \
+  CFP_LAYOUT(cfp::AbsoluteErrorOptions, expected_poses)                 \
+  CFP_LAYOUT(cfp::AbsoluteErrorResult, status)                          \
+  CFP_LAYOUT(cfp::RelativeErrorOptions, expected_poses)                 \
+  CFP_LAYOUT(cfp::RelativeErrorResult, status)                          \
+  CFP_LAYOUT(cfp::TrajectoryErrorWorkspace, used)                       \
   CFP_LAYOUT(cfp::Box<float>, y2)                                       \
   CFP_LAYOUT(cfp::Box<double>, y2)                                      \
   CFP_LAYOUT(cfp::PinholeCamera<float>, cy)                             \
   CFP_LAYOUT(cfp::PinholeCamera<double>, cy)                            \
+  CFP_LAYOUT(cfp::FundamentalRansacOptions, seed)                       \
+  CFP_LAYOUT(cfp::FundamentalResult<float>, inlier_share)               \
+  CFP_LAYOUT(cfp::FundamentalResult<double>, inlier_share)              \
+  CFP_LAYOUT(cfp::FundamentalRansacWorkspace, list)                     \
   CFP_LAYOUT(cfp::RadialTangentialCamera<float>, k3)                    \
   CFP_LAYOUT(cfp::RadialTangentialCamera<double>, k3)                   \
+  CFP_LAYOUT_OPAQUE(cfp::MinimalSampler)                                \
   CFP_LAYOUT(cfp::SE3<float>, translation)                              \
   CFP_LAYOUT(cfp::SE3<double>, translation)                             \
+  CFP_LAYOUT(cfp::Trivial<float>, delta)                                \
+  CFP_LAYOUT(cfp::Trivial<double>, delta)                               \
+  CFP_LAYOUT(cfp::Huber<float>, delta)                                  \
+  CFP_LAYOUT(cfp::Huber<double>, delta)                                 \
+  CFP_LAYOUT(cfp::Cauchy<float>, delta)                                 \
+  CFP_LAYOUT(cfp::Cauchy<double>, delta)                                \
+  CFP_LAYOUT(cfp::GemanMcClure<float>, delta)                           \
+  CFP_LAYOUT(cfp::GemanMcClure<double>, delta)                          \
+  CFP_LAYOUT(cfp::Truncated<float>, delta)                              \
+  CFP_LAYOUT(cfp::Truncated<double>, delta)                             \
+  CFP_LAYOUT(cfp::RobustLoss<float>, delta)                             \
+  CFP_LAYOUT(cfp::RobustLoss<double>, delta)                            \
+  CFP_LAYOUT(cfp::PoseRound, inliers_only)                              \
+  CFP_LAYOUT(cfp::WeightedPnPOptions, round_count)                      \
+  CFP_LAYOUT(cfp::PoseObservations<float>, baseline_fx)                 \
+  CFP_LAYOUT(cfp::PoseObservations<double>, baseline_fx)                \
+  CFP_LAYOUT(cfp::WeightedPnPResult, reason)                            \
+  CFP_LAYOUT(cfp::WeightedPnPWorkspace<float>, indices)                 \
+  CFP_LAYOUT(cfp::WeightedPnPWorkspace<double>, indices)                \
   CFP_LAYOUT(cfp::ConstraintOptions, min_samples)                       \
   CFP_LAYOUT(cfp::ConstraintModel<float>, status)                       \
   CFP_LAYOUT(cfp::ConstraintModel<double>, status)                      \
