@@ -162,7 +162,7 @@ template <typename T, int Lanes>
 /// log(1 + x) for x > -1, lane by lane.
 template <typename T, int Lanes>
 [[nodiscard]] BasicPacket<T, Lanes> log1p(const BasicPacket<T, Lanes>& a) noexcept {
-  T lanes[Lanes];
+  T lanes[static_cast<std::size_t>(Lanes)];
   store(lanes, a);
   for (T& x : lanes) x = std::log1p(x);
   return load<BasicPacket<T, Lanes>>(lanes);
