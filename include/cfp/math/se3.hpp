@@ -5,7 +5,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 
 #include "cfp/math/so3.hpp"
 
@@ -40,7 +39,8 @@ template <typename Scalar>
 [[nodiscard]] Vector6<Scalar> se3_log(const SE3<Scalar>& T) noexcept {
   Vector6<Scalar> xi;
   const Vector3<Scalar> w = so3_log(T.rotation);
-  xi << so3_left_jacobian(w).inverse() * T.translation, w;
+  xi.template head<3>() = so3_left_jacobian_inverse(w) * T.translation;
+  xi.template tail<3>() = w;
   return xi;
 }
 

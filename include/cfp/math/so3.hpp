@@ -102,6 +102,27 @@ template <typename Scalar>
   return J;
 }
 
+/// The inverse of so3_left_jacobian for |w| < 2 pi: I - hat(w)/2 + d hat(w)^2, d = (1 - (t/2) cot(t/2)) / t^2.
+template <typename Scalar>
+[[nodiscard]] Matrix3<Scalar> so3_left_jacobian_inverse(const Vector3<Scalar>& w) noexcept {
+  using std::cos;
+  using std::sin;
+  using std::sqrt;
+  const Scalar t2 = w.squaredNorm();
+  const Matrix3<Scalar> W = hat(w);
+  Scalar d;
+  if (t2 > Scalar(1e-2)) {
+    const Scalar half = Scalar(0.5) * sqrt(t2);
+    d = (Scalar(1) - half * cos(half) / sin(half)) / t2;
+  } else {
+    d = Scalar(1) / Scalar(12) + t2 / Scalar(720) * (Scalar(1) + t2 / Scalar(42) * (Scalar(1) + t2 / Scalar(40)));
+  }
+  Matrix3<Scalar> J = Scalar(-0.5) * W;
+  J.noalias() += d * (W * W);
+  J.diagonal().array() += Scalar(1);
+  return J;
+}
+
 /// The rotation of R's normalised quaternion: to first order the nearest one to an R that is nearly a rotation. Removes the
 /// drift that products of many rotations collect.
 template <typename Scalar>
