@@ -28,10 +28,8 @@ template <typename Scalar>
   const Scalar discriminant = b * b - Scalar(3) * a * c;
   if (!(discriminant >= zero)) return true;
   const Scalar q = b < zero ? Scalar(sqrt(discriminant) - b) : Scalar(-b - sqrt(discriminant));  // the sum without cancellation
-  for (const Scalar& s : {Scalar(q / (Scalar(3) * c)), Scalar(a / q)}) {
-    if (s > zero && s < end && !(value(s) > zero)) return false;
-  }
-  return true;
+  const auto fails_at = [&](const Scalar& s) { return s > zero && s < end && !(value(s) > zero); };
+  return !fails_at(q / (Scalar(3) * c)) && !fails_at(a / q);
 }
 
 }  // namespace detail
@@ -60,88 +58,81 @@ struct RadialTangentialCamera {
   /// The same camera without its distortion: where the pixels of an undistorted image belong, as epipolar lines need them.
   [[nodiscard]] PinholeCamera<Scalar> pinhole() const noexcept { return {fx, fy, cx, cy}; }
 
-  /// Distorts a point of the plane z = 1. Returns false, and touches nothing, beyond the fold or when not finite.
-  bool distort(const Vector2<Scalar>& plane, Vector2<Scalar>& distorted, Matrix2<Scalar>& jacobian) const noexcept {
-    const Scalar x = plane.x();
-    const Scalar y = plane.y();
-    const Scalar s = x * x + y * y;
-    const Scalar radial = Scalar(1) + s * (k1 + s * (k2 + s * k3));
-    const Scalar twice_slope = Scalar(2) * (k1 + s * (Scalar(2) * k2 + s * Scalar(3) * k3));  // of `radial` along x is x times this
-    const Scalar xd = x * radial + Scalar(2) * p1 * x * y + p2 * (s + Scalar(2) * x * x);
-    const Scalar yd = y * radial + p1 * (s + Scalar(2) * y * y) + Scalar(2) * p2 * x * y;
-    const Scalar j00 = radial + x * x * twice_slope + Scalar(2) * p1 * y + Scalar(6) * p2 * x;
-    const Scalar j01 = x * y * twice_slope + Scalar(2) * p1 * x + Scalar(2) * p2 * y;
-    const Scalar j11 = radial + y * y * twice_slope + Scalar(6) * p1 * y + Scalar(2) * p2 * x;
-    if (!is_finite(xd) || !is_finite(yd) || !(j00 * j11 - j01 * j01 > Scalar(0))) return false;
-    if (!detail::stays_positive(Scalar(3) * k1, Scalar(5) * k2, Scalar(7) * k3, s)) return false;
-    distorted << xd, yd;
-    jacobian << j00, j01, j01, j11;
-    return true;
-  }
-
   /// Projects a point of the camera frame. Returns whether the projection is valid: z > Tolerance::min_depth, before the
   /// fold, a finite pixel; otherwise pixel and jacobian are left as they were. jacobian: d pixel / d point.
   bool project(const Vector3<Scalar>& point, Vector2<Scalar>& pixel, Matrix23<Scalar>* jacobian = nullptr) const noexcept {
     if (!(point.z() > Scalar(Tolerance<Scalar>::min_depth))) return false;
     const Scalar inv_z = Scalar(1) / point.z();
-    const Vector2<Scalar> plane(point.x() * inv_z, point.y() * inv_z);
-    Vector2<Scalar> distorted;
-    Matrix2<Scalar> D;
-    if (!distort(plane, distorted, D)) return false;
-    const Scalar u = fx * distorted.x() + cx;
-    const Scalar v = fy * distorted.y() + cy;
+    const Scalar x = point.x() * inv_z;
+    const Scalar y = point.y() * inv_z;
+    Distorted d;
+    if (!distort(x, y, d)) return false;
+    const Scalar u = fx * d.x + cx;
+    const Scalar v = fy * d.y + cy;
     if (!is_finite(u) || !is_finite(v)) return false;
     // Not a comma initialiser: g++ 12.2 at -O3 -DNDEBUG loses the second coordinate of one inlined into a loop.
     pixel[0] = u;
     pixel[1] = v;
     if (jacobian != nullptr) {
-      D.row(0) *= fx * inv_z;
-      D.row(1) *= fy * inv_z;
-      jacobian->template leftCols<2>() = D;
-      jacobian->col(2) = -D.col(0) * plane.x() - D.col(1) * plane.y();
+      const Scalar fx_z = fx * inv_z;
+      const Scalar fy_z = fy * inv_z;
+      *jacobian << fx_z * d.xx, fx_z * d.xy, -fx_z * (d.xx * x + d.xy * y), fy_z * d.xy, fy_z * d.yy, -fy_z * (d.xy * x + d.yy * y);
     }
     return true;
   }
 
-  /// The ray through a pixel, scaled to z = 1, by Newton's method with step halving. False, and ray untouched, when no ray
-  /// before the fold gives the pixel, or anything is not finite. At most 40 evaluations of the model.
+  /// The ray through a pixel, scaled to z = 1, by Newton's method from the axis with step halving. False, and ray untouched,
+  /// when no ray before the fold gives the pixel, or anything is not finite. At most 40 evaluations of the model.
   bool unproject(const Vector2<Scalar>& pixel, Vector3<Scalar>& ray) const noexcept {
-    using std::sqrt;
-    const Vector2<Scalar> target((pixel.x() - cx) / fx, (pixel.y() - cy) / fy);
-    if (!is_finite(target.x()) || !is_finite(target.y())) return false;
-    const Scalar tolerance = Scalar(16) * Scalar(std::numeric_limits<Scalar>::epsilon()) * (Scalar(1) + sqrt(target.squaredNorm()));
-    Vector2<Scalar> plane = target;
-    Vector2<Scalar> distorted;
-    Matrix2<Scalar> D;
-    int evaluations = 1;
-    // The pixel's own position can lie beyond the fold; some point towards the axis does not.
-    while (!distort(plane, distorted, D)) {
-      if (++evaluations > 20) return false;
-      plane *= Scalar(0.5);
-    }
-    Vector2<Scalar> residual = target - distorted;
-    Scalar error_sq = residual.squaredNorm();
-    while (!(error_sq <= tolerance * tolerance)) {
-      const Scalar inv_determinant = Scalar(1) / (D(0, 0) * D(1, 1) - D(0, 1) * D(1, 0));
-      Vector2<Scalar> step((D(1, 1) * residual.x() - D(0, 1) * residual.y()) * inv_determinant,
-                           (D(0, 0) * residual.y() - D(1, 0) * residual.x()) * inv_determinant);
-      for (;;) {
-        if (++evaluations > 40) return false;
-        const Vector2<Scalar> candidate = plane + step;
-        if (distort(candidate, distorted, D)) {
-          const Vector2<Scalar> left = target - distorted;
-          if (left.squaredNorm() < error_sq) {
-            plane = candidate;
-            residual = left;
-            error_sq = left.squaredNorm();
-            break;
-          }
-        }
-        step *= Scalar(0.5);
+    const Scalar target_x = (pixel.x() - cx) / fx;
+    const Scalar target_y = (pixel.y() - cy) / fy;
+    Scalar error_sq = target_x * target_x + target_y * target_y;
+    if (!is_finite(error_sq)) return false;
+    const Scalar unit_roundoff(std::numeric_limits<Scalar>::epsilon());
+    const Scalar enough_sq = Scalar(256) * unit_roundoff * unit_roundoff * (Scalar(1) + error_sq);
+    // On the axis the distortion is 0 and its Jacobian the identity: the first step is the target itself.
+    Scalar x(0), y(0), step_x = target_x, step_y = target_y;
+    for (int evaluation = 0; evaluation < 40 && !(error_sq <= enough_sq); ++evaluation) {
+      Distorted d;
+      const bool valid = distort(x + step_x, y + step_y, d);
+      const Scalar ex = target_x - d.x;
+      const Scalar ey = target_y - d.y;
+      const Scalar candidate_error_sq = ex * ex + ey * ey;
+      if (!valid || !(candidate_error_sq < error_sq)) {
+        step_x *= Scalar(0.5);
+        step_y *= Scalar(0.5);
+        continue;
       }
+      x += step_x;
+      y += step_y;
+      error_sq = candidate_error_sq;
+      const Scalar inv_determinant = Scalar(1) / (d.xx * d.yy - d.xy * d.xy);
+      step_x = (d.yy * ex - d.xy * ey) * inv_determinant;
+      step_y = (d.xx * ey - d.xy * ex) * inv_determinant;
     }
-    ray << plane.x(), plane.y(), Scalar(1);
+    if (!(error_sq <= enough_sq)) return false;
+    ray << x, y, Scalar(1);
     return true;
+  }
+
+ private:
+  /// The distorted point and the (symmetric) Jacobian of the distortion.
+  struct Distorted {
+    Scalar x{}, y{}, xx{}, xy{}, yy{};
+  };
+
+  /// Distorts the point (x, y) of the plane z = 1; false beyond the fold or when not finite.
+  bool distort(const Scalar& x, const Scalar& y, Distorted& d) const noexcept {
+    const Scalar s = x * x + y * y;
+    const Scalar radial = Scalar(1) + s * (k1 + s * (k2 + s * k3));
+    const Scalar twice_slope = Scalar(2) * (k1 + s * (Scalar(2) * k2 + s * Scalar(3) * k3));  // of `radial` along x is x times this
+    d.x = x * radial + Scalar(2) * p1 * x * y + p2 * (s + Scalar(2) * x * x);
+    d.y = y * radial + p1 * (s + Scalar(2) * y * y) + Scalar(2) * p2 * x * y;
+    d.xx = radial + x * x * twice_slope + Scalar(2) * p1 * y + Scalar(6) * p2 * x;
+    d.xy = x * y * twice_slope + Scalar(2) * p1 * x + Scalar(2) * p2 * y;
+    d.yy = radial + y * y * twice_slope + Scalar(6) * p1 * y + Scalar(2) * p2 * x;
+    return is_finite(d.x) && is_finite(d.y) && d.xx * d.yy - d.xy * d.xy > Scalar(0) &&
+           detail::stays_positive(Scalar(3) * k1, Scalar(5) * k2, Scalar(7) * k3, s);
   }
 };
 

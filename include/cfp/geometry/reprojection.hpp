@@ -26,8 +26,8 @@ template <typename Camera, typename Scalar>
 [[nodiscard]] Scalar reprojection_distance(const Camera& camera, const SE3<Scalar>& T_cur_prev, const Vector2<Scalar>& pixel_prev,
                                            const detail::non_deduced<Scalar>& depth_prev, const Vector2<Scalar>& pixel_cur) noexcept {
   using std::sqrt;
-  Vector3<Scalar> ray;
-  Vector2<Scalar> projected;
+  Vector3<Scalar> ray = Vector3<Scalar>::Zero();
+  Vector2<Scalar> projected = Vector2<Scalar>::Zero();
   if (!is_valid_depth(depth_prev) || !camera.unproject(pixel_prev, ray)) return Scalar(no_distance<double>);
   const Vector3<Scalar> point = ray * depth_prev;
   if (!camera.project(T_cur_prev * point, projected)) return Scalar(no_distance<double>);

@@ -1,0 +1,85 @@
+#include "cfp/geometry/radial_tangential_camera.hpp"
+
+#include <cmath>
+
+#include "cfp/core/random.hpp"
+#include "support/catch.hpp"
+
+using cfp::RadialTangentialCamera;
+using cfp::Vector2;
+using cfp::Vector3;
+
+TEMPLATE_TEST_CASE("without coefficients the distorted camera is the pinhole camera", "[geometry]", float, double) {
+  const RadialTangentialCamera<TestType> camera{500, 510, 320, 240};
+  for (const Vector3<TestType>& point : {Vector3<TestType>(0, 0, 1), Vector3<TestType>(-1, 2, 3), Vector3<TestType>(9, 9, TestType(0.1))}) {
+    Vector2<TestType> distorted = Vector2<TestType>::Zero(), plain = Vector2<TestType>::Zero();
+    cfp::Matrix23<TestType> distorted_jacobian = cfp::Matrix23<TestType>::Zero(), plain_jacobian = cfp::Matrix23<TestType>::Zero();
+    REQUIRE(camera.project(point, distorted, &distorted_jacobian));
+    REQUIRE(camera.pinhole().project(point, plain, &plain_jacobian));
+    CHECK((distorted - plain).norm() <= TestType(1e-6) * plain.norm());
+    CHECK((distorted_jacobian - plain_jacobian).norm() <= TestType(1e-6) * plain_jacobian.norm());
+  }
+}
+
+TEST_CASE("the distorted camera reproduces a pixel computed by hand", "[geometry]") {
+  // x = 0.5, y = -0.25: s = 0.3125, radial = 1 - 0.2 s + 0.1 s^2 + 0.05 s^3 = 0.948791503906250; tangential terms
+  // 2 p1 x y + p2 (s + 2 x^2) = -0.00025 + 0.001625, p1 (s + 2 y^2) + 2 p2 x y = 0.0004375 - 0.0005.
+  const RadialTangentialCamera<double> camera{100, 200, 50, 60, -0.2, 0.1, 0.001, 0.002, 0.05};
+  Vector2<double> pixel = Vector2<double>::Zero();
+  REQUIRE(camera.project(Vector3<double>(1, -0.5, 2), pixel));
+  const double s = 0.3125, radial = 1 - 0.2 * s + 0.1 * s * s + 0.05 * s * s * s;
+  CHECK_THAT(pixel.x(), WithinAbs(100 * (0.5 * radial + 0.001375) + 50, 1e-12));
+  CHECK_THAT(pixel.y(), WithinAbs(200 * (-0.25 * radial - 0.0000625) + 60, 1e-12));
+}
+
+TEST_CASE("nothing beyond the fold of the distortion is projected", "[geometry]") {
+  // Purely k1 < 0: r (1 + k1 r^2) folds at r = 1/sqrt(-3 k1).
+  const double k1 = -0.3, fold = 1 / std::sqrt(0.9);
+  const RadialTangentialCamera<double> barrel{500, 500, 0, 0, k1};
+  Vector2<double> pixel = Vector2<double>::Zero();
+  for (int degrees = 0; degrees < 360; degrees += 15) {
+    const double angle = degrees * cfp::pi<double> / 180;
+    const Vector3<double> direction(std::cos(angle), std::sin(angle), 0);
+    CHECK(barrel.project(direction * (fold * 0.999) + Vector3<double>::UnitZ(), pixel));
+    CHECK_FALSE(barrel.project(direction * (fold * 1.001) + Vector3<double>::UnitZ(), pixel));
+    CHECK_FALSE(barrel.project(direction * 20 + Vector3<double>::UnitZ(), pixel));
+    // The largest radius on the sensor is that of the fold; no ray gives a pixel outside it.
+    const double largest = 500 * fold * (1 + k1 * fold * fold);
+    Vector3<double> ray = Vector3<double>::Zero();
+    CHECK(barrel.unproject((direction * largest * 0.9999).head<2>(), ray));
+    CHECK(ray.head<2>().norm() < fold);
+    CHECK_FALSE(barrel.unproject((direction * largest * 1.001).head<2>(), ray));
+    CHECK_FALSE(barrel.unproject((direction * largest * 3).head<2>(), ray));
+  }
+}
+
+TEST_CASE("a polynomial that rises again is not trusted after its first fold", "[geometry]") {
+  // 1 - 3 s + 1.6 s^2 ... radial derivative with zeros at s = 0.5 and s = 2: 1 - 2.5 s + s^2 = 1 + 3 k1 s + 5 k2 s^2.
+  const RadialTangentialCamera<double> camera{500, 500, 0, 0, -2.5 / 3, 1.0 / 5};
+  Vector2<double> pixel = Vector2<double>::Zero();
+  CHECK(camera.project(Vector3<double>(std::sqrt(0.499), 0, 1), pixel));
+  CHECK_FALSE(camera.project(Vector3<double>(std::sqrt(0.501), 0, 1), pixel));
+  CHECK_FALSE(camera.project(Vector3<double>(std::sqrt(1.999), 0, 1), pixel));
+  CHECK_FALSE(camera.project(Vector3<double>(std::sqrt(2.5), 0, 1), pixel));
+}
+
+TEST_CASE("stays_positive agrees with sampling the polynomial", "[geometry]") {
+  cfp::Random random(2, "polynomials");
+  int positive = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const double scale = i % 3 == 0 ? 0.0 : 1.0;
+    const double a = random.uniform(-6, 6), b = random.uniform(-9, 9) * (i % 5 == 0 ? 0.0 : 1.0), c = random.uniform(-6, 6) * scale;
+    const double end = random.uniform(0, 2);
+    double least = 1;
+    for (int j = 0; j <= 400; ++j) {
+      const double s = end * j / 400;
+      least = std::fmin(least, 1 + s * (a + s * (b + s * c)));
+    }
+    if (std::abs(least) < 1e-3) continue;  // sampling cannot tell
+    CAPTURE(a, b, c, end, least);
+    REQUIRE(cfp::detail::stays_positive(a, b, c, end) == (least > 0));
+    positive += least > 0 ? 1 : 0;
+  }
+  CHECK(positive > 5000);
+  CHECK(positive < 19000);
+}
