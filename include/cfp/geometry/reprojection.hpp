@@ -45,8 +45,8 @@ void reprojection_distances(const Camera& camera, const SE3<typename Camera::Sca
   for (std::size_t i = 0; i < out.size(); ++i) out[i] = reprojection_distance(camera, T_cur_prev, prev[i], depth_prev[i], cur[i]);
 }
 
-/// The same for the pinhole camera, vectorised: depth * (K R K^-1) (u, v, 1) + K t, divided by its last component. Equal to
-/// the scalar function up to rounding; the result of a keypoint does not depend on its place in the arrays.
+/// The same for the pinhole camera, vectorised. Equal to the scalar function up to rounding; the result of a keypoint does not
+/// depend on its place in the arrays.
 template <typename Scalar>
 void reprojection_distances(const PinholeCamera<Scalar>& camera, const SE3<detail::non_deduced<Scalar>>& T_cur_prev,
                             const PointSpan<detail::non_deduced<Scalar>, 2>& prev, span<const detail::non_deduced<Scalar>> depth_prev,
@@ -67,8 +67,8 @@ void reprojection_distances(const PinholeCamera<Scalar>& camera, const SE3<detai
     const Chunk y = (v_prev - camera.cy) * inv_fy;
     const Chunk z = depth * (R(2, 0) * x + R(2, 1) * y + R(2, 2)) + t.z();
     const Chunk inv_z = z.inverse();
-    const Chunk du = camera.fx * (depth * (R(0, 0) * x + R(0, 1) * y + R(0, 2)) + t.x()) * inv_z + (camera.cx - u);
-    const Chunk dv = camera.fy * (depth * (R(1, 0) * x + R(1, 1) * y + R(1, 2)) + t.y()) * inv_z + (camera.cy - v);
+    const Chunk du = camera.fx * ((depth * (R(0, 0) * x + R(0, 1) * y + R(0, 2)) + t.x()) * inv_z) + (camera.cx - u);
+    const Chunk dv = camera.fy * ((depth * (R(1, 0) * x + R(1, 1) * y + R(1, 2)) + t.y()) * inv_z) + (camera.cy - v);
     Chunk distance = (du * du + dv * dv).sqrt();
     for (Eigen::Index i = 0; i < distance.size(); ++i) {
       const bool valid = static_cast<bool>(static_cast<int>(depth[i] > Scalar(0)) & static_cast<int>(depth[i] <= largest) &

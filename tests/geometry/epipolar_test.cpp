@@ -1,0 +1,121 @@
+#include "cfp/geometry/epipolar.hpp"
+
+#include <cmath>
+#include <vector>
+
+#include "support/allocation_counter.hpp"
+#include "support/catch.hpp"
+#include "support/numbers.hpp"
+#include "support/two_views.hpp"
+
+using cfp::Matrix3;
+using cfp::no_distance;
+using cfp::Vector2;
+using cfp::Vector3;
+using cfp_test::TwoViews;
+
+namespace {
+template <typename Scalar>
+constexpr Scalar pixel_tolerance = Scalar(1e-9);
+template <>
+constexpr float pixel_tolerance<float> = 5e-3F;
+}  // namespace
+
+TEMPLATE_TEST_CASE("exact correspondences lie on their epipolar lines", "[geometry]", float, double) {
+  const TwoViews<TestType> views(300);
+  const Matrix3<TestType> F = cfp::fundamental_from_pose(views.camera_prev, views.camera_cur, views.T_cur_prev);
+  const Matrix3<TestType> E = cfp::essential_from_pose(views.T_cur_prev);
+  for (std::size_t i = 0; i < views.prev.size(); ++i) {
+    CHECK_THAT(cfp::epipolar_distance(F, views.prev[i], views.cur[i]), WithinAbs(0, pixel_tolerance<TestType>));
+    CHECK_THAT(cfp::symmetric_epipolar_distance(F, views.prev[i], views.cur[i]), WithinAbs(0, pixel_tolerance<TestType>));
+    CHECK_THAT(cfp::sampson_distance(F, views.prev[i], views.cur[i]), WithinAbs(0, pixel_tolerance<TestType>));
+    Vector3<TestType> ray_prev = Vector3<TestType>::Zero(), ray_cur = Vector3<TestType>::Zero();
+    REQUIRE(views.camera_prev.unproject(views.prev[i], ray_prev));
+    REQUIRE(views.camera_cur.unproject(views.cur[i], ray_cur));
+    CHECK_THAT(ray_cur.dot(E * ray_prev), WithinAbs(0, pixel_tolerance<TestType> / 100));
+  }
+}
+
+TEST_CASE("a sideways motion of equal cameras leaves rows as epipolar lines", "[geometry]") {
+  // With R = I and t = (b, 0, 0) the line of (u, v) is the row v: the distance is the difference of rows, whatever b is.
+  const cfp::PinholeCamera<double> camera{500, 500, 320, 240};
+  for (const double baseline : {1e-9, 0.1, 3e5}) {
+    cfp::SE3<double> T;
+    T.translation << baseline, 0, 0;
+    const Matrix3<double> F = cfp::fundamental_from_pose(camera, T);
+    CHECK_THAT(cfp::epipolar_distance(F, {100, 200}, {400, 203.5}), WithinAbs(3.5, 1e-9));
+    CHECK_THAT(cfp::symmetric_epipolar_distance(F, {100, 200}, {400, 203.5}), WithinAbs(3.5, 1e-9));
+    CHECK_THAT(cfp::sampson_distance(F, {100, 200}, {400, 203.5}), WithinAbs(3.5 / std::sqrt(2.0), 1e-9));
+  }
+}
+
+TEST_CASE("the epipolar distance is the distance to the foot of the perpendicular", "[geometry]") {
+  const TwoViews<double> views(50);
+  const Matrix3<double> F = cfp::fundamental_from_pose(views.camera_prev, views.camera_cur, views.T_cur_prev);
+  for (std::size_t i = 0; i < views.prev.size(); ++i) {
+    const Vector2<double> point = views.cur[i] + Vector2<double>(3, -7);
+    const Vector3<double> line = cfp::epipolar_line(F, views.prev[i]);
+    const Vector2<double> direction = Vector2<double>(-line.y(), line.x()).normalized();
+    const Vector2<double> foot = views.cur[i] + direction * direction.dot(point - views.cur[i]);  // cur lies on the line
+    CHECK_THAT(cfp::epipolar_distance(F, views.prev[i], point), WithinAbs((point - foot).norm(), 1e-9));
+    CHECK_THAT(cfp::point_line_distance(line, point), WithinAbs((point - foot).norm(), 1e-9));
+  }
+}
+
+TEST_CASE("distances do not depend on the scale of F, the symmetric ones not on the order of the views", "[geometry]") {
+  const TwoViews<double> views(50);
+  const Matrix3<double> F = cfp::fundamental_from_pose(views.camera_prev, views.camera_cur, views.T_cur_prev);
+  const Matrix3<double> F_swapped = cfp::fundamental_from_pose(views.camera_cur, views.camera_prev, views.T_cur_prev.inverse());
+  for (std::size_t i = 0; i < views.prev.size(); ++i) {
+    const Vector2<double> a = views.prev[i], b = views.cur[i] + Vector2<double>(2, 5);
+    const double d = cfp::epipolar_distance(F, a, b);
+    for (const double scale : {-1.0, 1e-200, 1e200}) CHECK_THAT(cfp::epipolar_distance(Matrix3<double>(scale * F), a, b), WithinAbs(d, 1e-9));
+    CHECK_THAT(cfp::symmetric_epipolar_distance(F_swapped, b, a), WithinAbs(cfp::symmetric_epipolar_distance(F, a, b), 1e-9));
+    CHECK_THAT(cfp::sampson_distance(F_swapped, b, a), WithinAbs(cfp::sampson_distance(F, a, b), 1e-9));
+    CHECK(cfp::sampson_distance(F, a, b) <= d);
+  }
+}
+
+TEMPLATE_TEST_CASE("where there is no line there is no distance", "[geometry]", float, double) {
+  const cfp::PinholeCamera<TestType> camera{500, 500, 320, 240};
+  cfp::SE3<TestType> still, forward;
+  forward.translation << 0, 0, 1;
+  const Vector2<TestType> anywhere(100, 50), epipole(320, 240);
+  const Matrix3<TestType> none = cfp::fundamental_from_pose(camera, still);
+  const Matrix3<TestType> F = cfp::fundamental_from_pose(camera, forward);
+  CHECK(cfp::epipolar_distance(none, anywhere, anywhere) == no_distance<TestType>);
+  CHECK(cfp::epipolar_distance(F, epipole, anywhere) == no_distance<TestType>);
+  CHECK(cfp::symmetric_epipolar_distance(F, anywhere, epipole) == no_distance<TestType>);
+  CHECK(cfp::sampson_distance(none, anywhere, anywhere) == no_distance<TestType>);
+  CHECK(cfp::point_line_distance(Vector3<TestType>(0, 0, 1), anywhere) == no_distance<TestType>);
+  CHECK(cfp::has_distance(cfp::epipolar_distance(F, Vector2<TestType>(320.5, 240), anywhere)));
+  CHECK_FALSE(cfp::has_distance(no_distance<TestType>));
+  Matrix3<TestType> broken = F;
+  broken(2, 2) = std::numeric_limits<TestType>::quiet_NaN();
+  CHECK(cfp::epipolar_distance(broken, anywhere, epipole) == no_distance<TestType>);
+}
+
+TEMPLATE_TEST_CASE("epipolar distances of arrays equal the scalar function", "[geometry]", float, double) {
+  TwoViews<TestType> views(200);
+  const Matrix3<TestType> F = cfp::fundamental_from_pose(views.camera_prev, views.camera_cur, views.T_cur_prev);
+  const auto hostile = cfp_test::hostile_numbers<TestType>();
+  for (std::size_t i = 0; i < views.cur.size(); ++i) views.cur[i] += Vector2<TestType>(TestType(i % 7), TestType(i % 11) / 2);
+  for (std::size_t i = 0; i < hostile.size(); ++i) {
+    views.prev[3 * i].x() = hostile[i];
+    views.cur[3 * i + 1].y() = hostile[i];
+    views.prev[3 * i + 2].y() = views.cur[3 * i + 2].x() = hostile[i];
+  }
+  for (const std::size_t n : {0UL, 1UL, 63UL, 64UL, 65UL, 200UL}) {
+    const std::vector<Vector2<TestType>> prev(views.prev.begin(), views.prev.begin() + static_cast<std::ptrdiff_t>(n));
+    const std::vector<Vector2<TestType>> cur(views.cur.begin(), views.cur.begin() + static_cast<std::ptrdiff_t>(n));
+    std::vector<TestType> out(n, TestType(-9));
+    CHECK(cfp_test::allocations_in([&] { cfp::epipolar_distances(F, prev, cur, out); }) == 0);
+    for (std::size_t i = 0; i < n; ++i) {
+      CAPTURE(n, i, prev[i].transpose(), cur[i].transpose());
+      const TestType expected = cfp::epipolar_distance(F, prev[i], cur[i]);
+      CHECK((out[i] == no_distance<TestType> || (out[i] >= 0 && cfp::is_finite(out[i]))));
+      CHECK((out[i] < 0) == (expected < 0));
+      CHECK_THAT(out[i], WithinAbs(expected, pixel_tolerance<TestType> * (1 + std::abs(expected))));
+    }
+  }
+}
