@@ -73,7 +73,7 @@ template <typename Scalar>
 [[nodiscard]] Scalar symmetric_epipolar_distance(const Matrix3<Scalar>& F, const Vector2<Scalar>& x_prev, const Vector2<Scalar>& x_cur) noexcept {
   const Scalar in_cur = epipolar_distance(F, x_prev, x_cur);
   const Scalar in_prev = epipolar_distance(Matrix3<Scalar>(F.transpose()), x_cur, x_prev);
-  return has_distance(in_cur) && has_distance(in_prev) ? Scalar(0.5) * in_cur + Scalar(0.5) * in_prev : no_distance<Scalar>;
+  return has_distance(in_cur) && has_distance(in_prev) ? Scalar(0.5) * in_cur + Scalar(0.5) * in_prev : Scalar(no_distance<double>);
 }
 
 /// |x_cur^T F x_prev| / sqrt(A^2 + B^2 + A'^2 + B'^2), (A', B', C') = F^T x_cur: to first order the distance in pixels of

@@ -1,0 +1,110 @@
+#include "support/catch.hpp"
+
+#include <rapidcheck/catch.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+#include "cfp/math/chi_squared.hpp"
+#include "cfp/math/logistic.hpp"
+#include "cfp/math/order_statistic.hpp"
+
+namespace {
+/// A number of any bit pattern whatever, NaN and infinities included.
+template <typename Scalar, typename Bits>
+Scalar any_number() {
+  const Bits bits = *rc::gen::arbitrary<Bits>();
+  Scalar value;
+  static_assert(sizeof(value) == sizeof(bits));
+  std::memcpy(&value, &bits, sizeof(bits));
+  return value;
+}
+/// A real number in [low, high] with 1/1000 of the interval as its grain, so that shrinking reads well.
+double real(double low, double high) { return low + (high - low) * *rc::gen::inRange(0, 1001) / 1000.0; }
+}  // namespace
+
+TEST_CASE("properties of chi-squared", "[properties]") {
+  rc::prop("survival is in [0, 1] and density finite and >= 0 for any bits", [] {
+    const double k = *rc::gen::element(1.0, 2.0, real(0.001, 60), any_number<double, std::uint64_t>());
+    const double x = any_number<double, std::uint64_t>();
+    const double survival = cfp::chi_squared_survival(x, k), density = cfp::chi_squared_density(x, k);
+    RC_ASSERT(survival >= 0 && survival <= 1);
+    RC_ASSERT(density >= 0 && cfp::is_finite(density));
+    const float xf = any_number<float, std::uint32_t>();
+    RC_ASSERT(cfp::chi_squared_survival(xf, k) >= 0 && cfp::chi_squared_survival(xf, k) <= 1);
+    RC_ASSERT(cfp::chi_squared_density(xf, k) >= 0 && cfp::is_finite(cfp::chi_squared_density(xf, k)));
+  });
+  rc::prop("survival does not increase in x and does not decrease in k", [] {
+    const double k = real(0.01, 60), more_k = k + real(0, 20), x = real(0, 120), more_x = x + real(0, 20);
+    const double survival = cfp::chi_squared_survival(x, k);
+    RC_ASSERT(cfp::chi_squared_survival(more_x, k) <= survival * (1 + 1e-13));
+    RC_ASSERT(cfp::chi_squared_survival(x, more_k) >= survival * (1 - 1e-13));
+  });
+  rc::prop("float equals double within its rounding", [] {
+    const double k = real(0.5, 20), x = real(0.01, 40);
+    const float xf = static_cast<float>(x);
+    RC_ASSERT(std::abs(cfp::chi_squared_survival(xf, k) - cfp::chi_squared_survival(static_cast<double>(xf), k)) <= 1e-6);
+  });
+}
+
+TEST_CASE("properties of logistic", "[properties]") {
+  rc::prop("in [0, 1] for any bits, alone and in an array", [] {
+    std::vector<float> x(static_cast<std::size_t>(*rc::gen::inRange(0, 150)));
+    for (float& value : x) value = any_number<float, std::uint32_t>();
+    std::vector<float> p(x.size());
+    cfp::logistic(cfp::span<const float>(x), cfp::span<float>(p));
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      RC_ASSERT(p[i] >= 0 && p[i] <= 1);
+      RC_ASSERT(std::abs(p[i] - cfp::logistic(x[i])) <= 4e-7F);
+    }
+    const double value = any_number<double, std::uint64_t>();
+    RC_ASSERT(cfp::logistic(value) >= 0 && cfp::logistic(value) <= 1);
+  });
+  rc::prop("non-decreasing, and symmetric about one half", [] {
+    const double x = real(-50, 50), more = x + real(0, 10);
+    RC_ASSERT(cfp::logistic(more) >= cfp::logistic(x));
+    RC_ASSERT(std::abs(cfp::logistic(x) + cfp::logistic(-x) - 1) <= 3e-16);
+  });
+  rc::prop("a result does not depend on the place in the array, to the bit", [] {
+    std::vector<double> x(static_cast<std::size_t>(*rc::gen::inRange(1, 200)));
+    for (double& value : x) value = real(-40, 40);
+    std::vector<double> reversed(x.rbegin(), x.rend()), p(x.size()), q(x.size());
+    cfp::logistic(cfp::span<double>(x), cfp::span<double>(p));
+    cfp::logistic(cfp::span<double>(reversed), cfp::span<double>(q));
+    std::reverse(q.begin(), q.end());
+    RC_ASSERT(p == q);
+  });
+}
+
+TEST_CASE("properties of order statistics", "[properties]") {
+  rc::prop("equal to sorting, for any numbers but NaN, in any order", [] {
+    std::vector<double> values(static_cast<std::size_t>(*rc::gen::inRange(1, 400)));
+    const bool few_values = *rc::gen::arbitrary<bool>();
+    for (double& value : values) {
+      value = few_values ? real(-1, 1) : any_number<double, std::uint64_t>();
+      if (!(value == value)) value = 0;
+    }
+    std::vector<double> sorted = values;
+    std::sort(sorted.begin(), sorted.end());
+    const std::size_t rank = static_cast<std::size_t>(*rc::gen::inRange(0, static_cast<int>(values.size())));
+    std::vector<double> scratch = values;
+    RC_ASSERT(cfp::order_statistic(cfp::span<double>(scratch), rank) == sorted[rank]);
+    scratch.assign(values.rbegin(), values.rend());
+    RC_ASSERT(cfp::order_statistic(cfp::span<double>(scratch), rank) == sorted[rank]);
+    const std::array<double, 3> quantiles = {0.1, 0.2, 0.3};
+    scratch = values;
+    const std::array<double, 3> selected = cfp::select_quantiles(cfp::span<double>(scratch), quantiles);
+    for (std::size_t i = 0; i < 3; ++i) RC_ASSERT(selected[i] == sorted[cfp::quantile_rank(quantiles[i], values.size()) - 1]);
+  });
+  rc::prop("quantile_rank grows with q and with n", [] {
+    const std::size_t n = static_cast<std::size_t>(*rc::gen::inRange(1, 100000));
+    const double q = real(0, 1), more = std::fmin(1.0, q + real(0, 0.5));
+    RC_ASSERT(cfp::quantile_rank(more, n) >= cfp::quantile_rank(q, n));
+    RC_ASSERT(cfp::quantile_rank(q, n + 1) >= cfp::quantile_rank(q, n));
+    RC_ASSERT(static_cast<double>(cfp::quantile_rank(q, n)) >= q * static_cast<double>(n) * (1 - 1e-15));
+  });
+}
