@@ -38,6 +38,15 @@ void load_chunk(span<const Scalar> values, std::size_t first, std::size_t count,
 
 template <typename Scalar>
 void load_chunk(const PointSpan<Scalar, 2>& points, std::size_t first, std::size_t count, Chunk<Scalar>& x, Chunk<Scalar>& y) noexcept {
+  CFP_ASSERT(first + count <= points.size());
+  if (const Scalar* packed = points.packed(); packed != nullptr && count == chunk_size) {
+    packed += 2 * first;  // a loop of known length and stride, for the vectoriser
+    for (std::size_t i = 0; i < chunk_size; ++i) {
+      x.data()[i] = packed[2 * i];
+      y.data()[i] = packed[2 * i + 1];
+    }
+    return;
+  }
   if (count != chunk_size) {
     x.setZero();
     y.setZero();

@@ -109,8 +109,8 @@ void epipolar_distances(const Matrix3<Scalar>& F, const PointSpan<detail::non_de
     const Chunk threshold = noise * (u_prev * u_prev + v_prev * v_prev + Scalar(1));
     Chunk distance = numerator.abs() / norm_sq.sqrt();
     for (Eigen::Index i = 0; i < distance.size(); ++i) {
-      const bool valid = static_cast<bool>(static_cast<int>(norm_sq[i] > threshold[i]) & static_cast<int>(distance[i] <= (std::numeric_limits<Scalar>::max)()));
-      distance[i] = valid ? distance[i] : no_distance<Scalar>;
+      const Scalar d = distance[i] <= (std::numeric_limits<Scalar>::max)() ? distance[i] : no_distance<Scalar>;
+      distance[i] = norm_sq[i] > threshold[i] ? d : no_distance<Scalar>;
     }
     detail::store_chunk(distance, first, count, out);
   });

@@ -71,9 +71,10 @@ void reprojection_distances(const PinholeCamera<Scalar>& camera, const SE3<detai
     const Chunk dv = camera.fy * ((depth * (R(1, 0) * x + R(1, 1) * y + R(1, 2)) + t.y()) * inv_z) + (camera.cy - v);
     Chunk distance = (du * du + dv * dv).sqrt();
     for (Eigen::Index i = 0; i < distance.size(); ++i) {
-      const bool valid = static_cast<bool>(static_cast<int>(depth[i] > Scalar(0)) & static_cast<int>(depth[i] <= largest) &
-                                           static_cast<int>(z[i] > Tolerance<Scalar>::min_depth) & static_cast<int>(distance[i] <= largest));
-      distance[i] = valid ? distance[i] : no_distance<Scalar>;
+      Scalar d = distance[i] <= largest ? distance[i] : no_distance<Scalar>;
+      d = z[i] > Tolerance<Scalar>::min_depth ? d : no_distance<Scalar>;
+      d = depth[i] > Scalar(0) ? d : no_distance<Scalar>;
+      distance[i] = depth[i] <= largest ? d : no_distance<Scalar>;
     }
     detail::store_chunk(distance, first, count, out);
   });
