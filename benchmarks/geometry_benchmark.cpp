@@ -94,15 +94,18 @@ void sorted_sigmoid(Buffers<double>& b) {
   b.scratch = b.distance;
   std::sort(b.scratch.begin(), b.scratch.end());
   const double minimum = b.scratch.front(), threshold = b.scratch[cfp::quantile_rank(0.8, b.scratch.size()) - 1];
-  for (std::size_t i = 0; i < b.distance.size(); ++i) b.probability[i] = 1 / (1 + std::exp((b.distance[i] - threshold) * 5 / (threshold - minimum)));
+  for (std::size_t i = 0; i < b.distance.size(); ++i)
+    b.probability[i] = 1 / (1 + std::exp((b.distance[i] - threshold) * 5 / (threshold - minimum)));
 }
 
-void stage_two_first_thought(const Frame<double>& frame, const cfp::SE3<double>& T, const cfp::Matrix3<double>& F, Buffers<double>& projection,
-                             Buffers<double>& epipolar) {
+void stage_two_first_thought(const Frame<double>& frame, const cfp::SE3<double>& T, const cfp::Matrix3<double>& F,
+                             Buffers<double>& projection, Buffers<double>& epipolar) {
   for (std::size_t i = 0; i < frame.prev.size(); ++i) {
-    const cfp::Vector3<double> p((frame.prev[i].x() - camera.cx) / camera.fx * frame.depth[i], (frame.prev[i].y() - camera.cy) / camera.fy * frame.depth[i], frame.depth[i]);
+    const cfp::Vector3<double> p((frame.prev[i].x() - camera.cx) / camera.fx * frame.depth[i],
+                                 (frame.prev[i].y() - camera.cy) / camera.fy * frame.depth[i], frame.depth[i]);
     const cfp::Vector3<double> q = T.rotation * p + T.translation;
-    projection.distance[i] = (cfp::Vector2<double>(camera.fx * q.x() / q.z() + camera.cx, camera.fy * q.y() / q.z() + camera.cy) - frame.cur[i]).norm();
+    projection.distance[i] =
+        (cfp::Vector2<double>(camera.fx * q.x() / q.z() + camera.cx, camera.fy * q.y() / q.z() + camera.cy) - frame.cur[i]).norm();
     const cfp::Vector3<double> line = F * frame.prev[i].homogeneous();
     epipolar.distance[i] = std::abs(line.dot(frame.cur[i].homogeneous())) / line.head<2>().norm();
   }

@@ -1,7 +1,7 @@
 // Chi-squared against Boost.Math, order statistics against std::nth_element and std::sort, the logistic of an array against
 // the scalar loop. Every iteration takes another of at least 16 inputs
-// with 2^17 values together: fewer, and the branch predictor learns nth_element's way through them. The counter `difference` is the largest relative deviation
-// from Boost.Math (chi-squared), or the absolute one from the scalar function (logistic).
+// with 2^17 values together: fewer, and the branch predictor learns nth_element's way through them. The counter `difference` is the largest
+// relative deviation from Boost.Math (chi-squared), or the absolute one from the scalar function (logistic).
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -171,7 +171,8 @@ void BM_three_quantiles(benchmark::State& state) {
     } else {
       auto end = scratch.end();
       for (int i = 2; i >= 0; --i) {
-        const auto position = scratch.begin() + static_cast<std::ptrdiff_t>(cfp::quantile_rank(quantiles[static_cast<std::size_t>(i)], n) - 1);
+        const auto position =
+            scratch.begin() + static_cast<std::ptrdiff_t>(cfp::quantile_rank(quantiles[static_cast<std::size_t>(i)], n) - 1);
         std::nth_element(scratch.begin(), position, end);
         end = position;
         benchmark::DoNotOptimize(*position);

@@ -29,14 +29,22 @@ struct Limit<float> {
 template <typename Camera>
 Camera make();
 template <>
-PinholeCamera<double> make() { return {535.4, 539.2, 320.1, 247.6}; }
+PinholeCamera<double> make() {
+  return {535.4, 539.2, 320.1, 247.6};
+}
 template <>
-PinholeCamera<float> make() { return {535.4F, 539.2F, 320.1F, 247.6F}; }
+PinholeCamera<float> make() {
+  return {535.4F, 539.2F, 320.1F, 247.6F};
+}
 // TUM RGB-D freiburg2, the published calibration of a strongly distorted lens.
 template <>
-RadialTangentialCamera<double> make() { return {520.9, 521.0, 325.1, 249.7, 0.2312, -0.7849, -0.0033, -0.0001, 0.9172}; }
+RadialTangentialCamera<double> make() {
+  return {520.9, 521.0, 325.1, 249.7, 0.2312, -0.7849, -0.0033, -0.0001, 0.9172};
+}
 template <>
-RadialTangentialCamera<float> make() { return {520.9F, 521.0F, 325.1F, 249.7F, 0.2312F, -0.7849F, -0.0033F, -0.0001F, 0.9172F}; }
+RadialTangentialCamera<float> make() {
+  return {520.9F, 521.0F, 325.1F, 249.7F, 0.2312F, -0.7849F, -0.0033F, -0.0001F, 0.9172F};
+}
 
 /// A grid before, at and behind the camera.
 template <typename Scalar>
@@ -52,8 +60,8 @@ std::vector<Vector3<Scalar>> points() {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("project agrees with finite differences and rejects what is behind", "[geometry]", PinholeCamera<float>, PinholeCamera<double>,
-                   RadialTangentialCamera<float>, RadialTangentialCamera<double>) {
+TEMPLATE_TEST_CASE("project agrees with finite differences and rejects what is behind", "[geometry]", PinholeCamera<float>,
+                   PinholeCamera<double>, RadialTangentialCamera<float>, RadialTangentialCamera<double>) {
   using Scalar = typename TestType::ScalarType;
   const auto camera = make<TestType>();
   int valid = 0;
@@ -76,11 +84,14 @@ TEMPLATE_TEST_CASE("project agrees with finite differences and rejects what is b
     bool inside = true;
     for (int c = 0; c < 3; ++c) {
       Vector2<Scalar> plus = Vector2<Scalar>::Zero(), minus = Vector2<Scalar>::Zero();
-      inside = inside && camera.project(point + h * Vector3<Scalar>::Unit(c), plus) && camera.project(point - h * Vector3<Scalar>::Unit(c), minus);
+      inside = inside && camera.project(point + h * Vector3<Scalar>::Unit(c), plus) &&
+               camera.project(point - h * Vector3<Scalar>::Unit(c), minus);
       if (inside) numeric.col(c) = (plus - minus) / (2 * h);
     }
     CAPTURE(jacobian, numeric);
-    if (inside) CHECK_THAT((jacobian - numeric).cwiseAbs().maxCoeff() / (1 + jacobian.cwiseAbs().maxCoeff()), WithinAbs(0, Limit<Scalar>::jacobian / 50));
+    if (inside)
+      CHECK_THAT((jacobian - numeric).cwiseAbs().maxCoeff() / (1 + jacobian.cwiseAbs().maxCoeff()),
+                 WithinAbs(0, Limit<Scalar>::jacobian / 50));
   }
   CHECK(valid >= 40);
 }
@@ -105,8 +116,8 @@ TEMPLATE_TEST_CASE("unproject inverts project", "[geometry]", PinholeCamera<floa
   }
 }
 
-TEMPLATE_TEST_CASE("cameras answer hostile input with false and leave the outputs alone", "[geometry]", PinholeCamera<float>, PinholeCamera<double>,
-                   RadialTangentialCamera<float>, RadialTangentialCamera<double>) {
+TEMPLATE_TEST_CASE("cameras answer hostile input with false and leave the outputs alone", "[geometry]", PinholeCamera<float>,
+                   PinholeCamera<double>, RadialTangentialCamera<float>, RadialTangentialCamera<double>) {
   using Scalar = typename TestType::ScalarType;
   const auto camera = make<TestType>();
   for (const Scalar a : cfp_test::hostile_numbers<Scalar>()) {

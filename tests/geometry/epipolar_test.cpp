@@ -12,14 +12,8 @@ using cfp::Matrix3;
 using cfp::no_distance;
 using cfp::Vector2;
 using cfp::Vector3;
+using cfp_test::pixel_tolerance;
 using cfp_test::TwoViews;
-
-namespace {
-template <typename Scalar>
-constexpr Scalar pixel_tolerance = Scalar(1e-9);
-template <>
-constexpr float pixel_tolerance<float> = 5e-3F;
-}  // namespace
 
 TEMPLATE_TEST_CASE("exact correspondences lie on their epipolar lines", "[geometry]", float, double) {
   const TwoViews<TestType> views(300);
@@ -69,7 +63,8 @@ TEST_CASE("distances do not depend on the scale of F, the symmetric ones not on 
   for (std::size_t i = 0; i < views.prev.size(); ++i) {
     const Vector2<double> a = views.prev[i], b = views.cur[i] + Vector2<double>(2, 5);
     const double d = cfp::epipolar_distance(F, a, b);
-    for (const double scale : {-1.0, 1e-200, 1e200}) CHECK_THAT(cfp::epipolar_distance(Matrix3<double>(scale * F), a, b), WithinAbs(d, 1e-9));
+    for (const double scale : {-1.0, 1e-200, 1e200})
+      CHECK_THAT(cfp::epipolar_distance(Matrix3<double>(scale * F), a, b), WithinAbs(d, 1e-9));
     CHECK_THAT(cfp::symmetric_epipolar_distance(F_swapped, b, a), WithinAbs(cfp::symmetric_epipolar_distance(F, a, b), 1e-9));
     CHECK_THAT(cfp::sampson_distance(F_swapped, b, a), WithinAbs(cfp::sampson_distance(F, a, b), 1e-9));
     CHECK(cfp::sampson_distance(F, a, b) <= d);

@@ -13,14 +13,10 @@
 using cfp::no_distance;
 using cfp::Vector2;
 using cfp::Vector3;
+using cfp_test::pixel_tolerance;
 using cfp_test::TwoViews;
 
 namespace {
-template <typename Scalar>
-constexpr Scalar pixel_tolerance = Scalar(1e-9);
-template <>
-constexpr float pixel_tolerance<float> = 2e-3F;
-
 template <typename Scalar>
 cfp::RadialTangentialCamera<Scalar> distorted(const cfp::PinholeCamera<Scalar>& c) {
   return {c.fx, c.fy, c.cx, c.cy, Scalar(-0.28), Scalar(0.07), Scalar(0.001), Scalar(-0.0005), Scalar(0.01)};
@@ -35,8 +31,10 @@ TEST_CASE("the reprojection distance is the offset from the exact match", "[geom
     Vector2<double> exact = Vector2<double>::Zero();
     REQUIRE(views.camera_prev.unproject(views.prev[i], ray));
     REQUIRE(views.camera_prev.project(views.T_cur_prev * Vector3<double>(ray * views.depth_prev[i]), exact));
-    CHECK_THAT(cfp::reprojection_distance(views.camera_prev, views.T_cur_prev, views.prev[i], views.depth_prev[i], exact), WithinAbs(0, 1e-12));
-    CHECK_THAT(cfp::reprojection_distance(views.camera_prev, views.T_cur_prev, views.prev[i], views.depth_prev[i], Vector2<double>(exact + Vector2<double>(3, -4))),
+    CHECK_THAT(cfp::reprojection_distance(views.camera_prev, views.T_cur_prev, views.prev[i], views.depth_prev[i], exact),
+               WithinAbs(0, 1e-12));
+    CHECK_THAT(cfp::reprojection_distance(views.camera_prev, views.T_cur_prev, views.prev[i], views.depth_prev[i],
+                                          Vector2<double>(exact + Vector2<double>(3, -4))),
                WithinAbs(5, 1e-10));
   }
 }
@@ -67,7 +65,8 @@ TEMPLATE_TEST_CASE("no depth, behind the camera, not finite: no distance", "[geo
   const cfp::PinholeCamera<TestType> camera{500, 500, 320, 240};
   cfp::SE3<TestType> T;
   const Vector2<TestType> pixel(300, 200);
-  for (const TestType depth : {TestType(0), TestType(-1), std::numeric_limits<TestType>::quiet_NaN(), std::numeric_limits<TestType>::infinity()}) {
+  for (const TestType depth :
+       {TestType(0), TestType(-1), std::numeric_limits<TestType>::quiet_NaN(), std::numeric_limits<TestType>::infinity()}) {
     CHECK(cfp::reprojection_distance(camera, T, pixel, depth, pixel) == no_distance<TestType>);
   }
   CHECK_THAT(cfp::reprojection_distance(camera, T, pixel, TestType(2), pixel), WithinAbs(0, pixel_tolerance<TestType>));

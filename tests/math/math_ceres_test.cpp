@@ -42,7 +42,8 @@ TEST_CASE("motions differentiate at the identity and away from it", "[math]") {
     const cfp::Vector3<Jet6> moved = cfp::se3_exp(dual) * cfp::Vector3<Jet6>(p.cast<Jet6>());
     for (int c = 0; c < 6; ++c) {
       const cfp::Vector6<double> d = cfp::Vector6<double>::Unit(c) * 1e-6;
-      const Eigen::Vector3d slope = (cfp::se3_exp(cfp::Vector6<double>(xi + d)) * p - cfp::se3_exp(cfp::Vector6<double>(xi - d)) * p) / 2e-6;
+      const Eigen::Vector3d slope =
+          (cfp::se3_exp(cfp::Vector6<double>(xi + d)) * p - cfp::se3_exp(cfp::Vector6<double>(xi - d)) * p) / 2e-6;
       for (int r = 0; r < 3; ++r) CHECK_THAT(moved[r].v[c], WithinAbs(slope[r], 1e-8));
     }
   }

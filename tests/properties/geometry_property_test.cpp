@@ -65,7 +65,8 @@ TEST_CASE("properties of epipolar distances", "[properties]") {
 TEST_CASE("properties of reprojection distances", "[properties]") {
   rc::prop("a rigid change of the world changes nothing", [] {
     // The relative pose of two cameras is the same whatever the world frame is.
-    const SE3<double> T_prev_world = cfp::se3_exp(tangent(2, 0.5)), T_cur_prev = cfp::se3_exp(tangent(0.3, 0.2)), S = cfp::se3_exp(tangent(9, 3));
+    const SE3<double> T_prev_world = cfp::se3_exp(tangent(2, 0.5)), T_cur_prev = cfp::se3_exp(tangent(0.3, 0.2)),
+                      S = cfp::se3_exp(tangent(9, 3));
     const SE3<double> T_cur_world = T_cur_prev * T_prev_world;
     const SE3<double> again = (T_cur_world * S) * (T_prev_world * S).inverse();
     const Vector2<double> prev(real(0, 640), real(0, 480)), cur(real(0, 640), real(0, 480));
@@ -116,8 +117,8 @@ TEST_CASE("properties of boxes and of the distorted camera", "[properties]") {
     RC_ASSERT(std::abs(cfp::iou(moved(a), moved(b)) - overlap) < 1e-9 || cfp::area(a) < 1e-3 || cfp::area(b) < 1e-3);
   });
   rc::prop("a ray that unproject gives projects to its pixel, for any lens", [] {
-    const cfp::RadialTangentialCamera<double> lens{500,          500,          320,           240,          real(-0.5, 0.5),
-                                                   real(-1, 1),  real(-0.02, 0.02), real(-0.02, 0.02), real(-1, 1)};
+    const cfp::RadialTangentialCamera<double> lens{
+        500, 500, 320, 240, real(-0.5, 0.5), real(-1, 1), real(-0.02, 0.02), real(-0.02, 0.02), real(-1, 1)};
     const Vector2<double> pixel(real(-100, 740), real(-100, 580));
     Vector3<double> ray = Vector3<double>::Zero();
     Vector2<double> back = Vector2<double>::Zero();

@@ -10,6 +10,12 @@
 
 namespace cfp_test {
 
+/// Rounding of a pixel distance, in pixels.
+template <typename Scalar>
+constexpr Scalar pixel_tolerance = Scalar(1e-9);
+template <>
+constexpr float pixel_tolerance<float> = 2e-3F;
+
 template <typename Scalar>
 struct TwoViews {
   cfp::PinholeCamera<Scalar> camera_prev{Scalar(535.4), Scalar(539.2), Scalar(320.1), Scalar(247.6)};

@@ -3,7 +3,8 @@
 /// sections IV-B and IV-D). Convention: x_cur^T F x_prev = 0, with pixels of an undistorted image.
 ///
 /// A distance is >= 0 and finite, or `no_distance` (-1) where there is none: the line is undefined (A = B = 0 up to
-/// rounding: the point is at the epipole, F is zero or not finite), or a coordinate is not finite. No distance depends on the scale of F.
+/// rounding: the point is at the epipole, F is zero or not finite), or a coordinate is not finite. No distance depends on
+/// the scale of F.
 #pragma once
 
 #include <cmath>
