@@ -28,7 +28,8 @@ std::vector<std::vector<Scalar>> value_sets(std::size_t n) {
     sets[3][i] = Scalar(1) + static_cast<Scalar>(random.index(50)) * std::numeric_limits<Scalar>::epsilon();
     sets[4][i] = Scalar(7);
     sets[5][i] = static_cast<Scalar>(random.index(3));
-    sets[6][i] = i % 97 == 0 ? std::numeric_limits<Scalar>::max() : static_cast<Scalar>(random.index(1000)) * std::numeric_limits<Scalar>::denorm_min();
+    sets[6][i] = i % 97 == 0 ? std::numeric_limits<Scalar>::max()
+                             : static_cast<Scalar>(random.index(1000)) * std::numeric_limits<Scalar>::denorm_min();
     sets[7][i] = i % 2 == 0 ? Scalar(0.0) : Scalar(-0.0);
     sets[8][i] = static_cast<Scalar>(i);
   }
@@ -109,7 +110,8 @@ TEMPLATE_TEST_CASE("order_statistic ends and stays in memory when values are NaN
     std::vector<TestType> values(40 + random.index(400));
     for (TestType& value : values) {
       value = static_cast<TestType>(random.normal());
-      if (random.index(4) < share) value = round % 2 == 0 ? std::numeric_limits<TestType>::quiet_NaN() : -std::numeric_limits<TestType>::quiet_NaN();
+      if (random.index(4) < share)
+        value = round % 2 == 0 ? std::numeric_limits<TestType>::quiet_NaN() : -std::numeric_limits<TestType>::quiet_NaN();
     }
     const std::size_t rank = random.index(static_cast<std::uint32_t>(values.size()));
     (void)cfp::order_statistic(span<TestType>(values), rank);

@@ -31,7 +31,8 @@ template <typename Scalar>
 
 /// F = K_cur^-T [t]x R K_prev^-1. The scale is that of t in metres; zero when t is zero, which every distance then reports.
 template <typename Scalar>
-[[nodiscard]] Matrix3<Scalar> fundamental_from_pose(const Matrix3<Scalar>& K_prev, const Matrix3<Scalar>& K_cur, const SE3<Scalar>& T_cur_prev) noexcept {
+[[nodiscard]] Matrix3<Scalar> fundamental_from_pose(const Matrix3<Scalar>& K_prev, const Matrix3<Scalar>& K_cur,
+                                                    const SE3<Scalar>& T_cur_prev) noexcept {
   return K_cur.inverse().transpose() * essential_from_pose(T_cur_prev) * K_prev.inverse();
 }
 template <typename Scalar>
@@ -71,7 +72,8 @@ template <typename Scalar>
 /// Mean of the distances in both images, in pixels: invariant when the two views change roles (F becomes F^T).
 /// no_distance when either has none.
 template <typename Scalar>
-[[nodiscard]] Scalar symmetric_epipolar_distance(const Matrix3<Scalar>& F, const Vector2<Scalar>& x_prev, const Vector2<Scalar>& x_cur) noexcept {
+[[nodiscard]] Scalar symmetric_epipolar_distance(const Matrix3<Scalar>& F, const Vector2<Scalar>& x_prev,
+                                                 const Vector2<Scalar>& x_cur) noexcept {
   const Scalar in_cur = epipolar_distance(F, x_prev, x_cur);
   const Scalar in_prev = epipolar_distance(Matrix3<Scalar>(F.transpose()), x_cur, x_prev);
   return has_distance(in_cur) && has_distance(in_prev) ? Scalar(0.5) * in_cur + Scalar(0.5) * in_prev : Scalar(no_distance<double>);
@@ -86,7 +88,8 @@ template <typename Scalar>
   const Vector3<Scalar> line = epipolar_line(G, x_prev);
   const Vector3<Scalar> line_prev = epipolar_line(G_transposed, x_cur);
   const Scalar norm_sq = line.x() * line.x() + line.y() * line.y() + line_prev.x() * line_prev.x() + line_prev.y() * line_prev.y();
-  const Scalar noise = detail::line_noise(G) * (x_prev.squaredNorm() + Scalar(1)) + detail::line_noise(G_transposed) * (x_cur.squaredNorm() + Scalar(1));
+  const Scalar noise =
+      detail::line_noise(G) * (x_prev.squaredNorm() + Scalar(1)) + detail::line_noise(G_transposed) * (x_cur.squaredNorm() + Scalar(1));
   return detail::ratio_distance(line.x() * x_cur.x() + line.y() * x_cur.y() + line.z(), norm_sq, noise);
 }
 
