@@ -44,6 +44,7 @@ struct BoxTrackerOptions {
   double birth_score = -1e300;   ///< detections below extend a track but start none (and are not output when they extend none)
   int confirm_hits = 2;          ///< detections before a track may be compensated, >= 1
   int max_coast = 6;             ///< missed frames in a row that are compensated, >= 0 (the paper's figure shows six)
+  double coast_per_hit = 1.0;    ///< ... and at most this many per detection so far, > 0 (1: no longer than it was seen)
   double min_visible = 0.25;     ///< a compensated box with a smaller share of its area in the image is dropped, in [0, 1]
   double max_gap_s = 2.0;        ///< after a longer dt the frames are not adjacent: all tracks are dropped, s, > 0
   double image_width = 0;        ///< px; 0: unknown, nothing is clipped
@@ -57,6 +58,7 @@ struct BoxTrackerOptions {
   if (!is_finite(o.birth_score)) return "birth_score";
   if (!(o.confirm_hits >= 1)) return "confirm_hits";
   if (!(o.max_coast >= 0)) return "max_coast";
+  if (!(o.coast_per_hit > 0)) return "coast_per_hit";
   if (!(o.min_visible >= 0 && o.min_visible <= 1)) return "min_visible";
   if (!(o.max_gap_s > 0 && o.max_gap_s <= 1e6)) return "max_gap_s";
   if (!(o.image_width >= 0 && o.image_width <= 1e6)) return "image_width";

@@ -147,7 +147,7 @@ class BoxTracker {
       track.missed = seen ? 0 : next(track.missed);
       Box<Scalar> box = track.box;
       if (!seen) {
-        if (track.missed > options_.max_coast || !(confirmed || detector_skipped)) continue;
+        if (track.missed > options_.max_coast || track.missed > options_.coast_per_hit * track.hits || !(confirmed || detector_skipped)) continue;
         box = track.filter.box();
         if (!clip_to_image(box)) continue;
       }

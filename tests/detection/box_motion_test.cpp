@@ -1,0 +1,196 @@
+#include "cfp/detection/box_motion.hpp"
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <type_traits>
+
+#include "cfp/core/random.hpp"
+#include "cfp/detection/ekf.hpp"
+#include "cfp/math/so3.hpp"
+#include "support/catch.hpp"
+
+namespace {
+
+/// The 8-state EKF of the same model, written with general matrices.
+template <typename Scalar>
+struct DenseBoxFilter {
+  using Vector8 = Eigen::Matrix<Scalar, 8, 1>;
+  using Matrix8 = Eigen::Matrix<Scalar, 8, 8>;
+  cfp::EkfState<Scalar, 8> state;
+
+  explicit DenseBoxFilter(const cfp::BoxFilter<Scalar>& f) {
+    state.covariance.setZero();
+    const std::array<cfp::RateFilter<Scalar>, 4> parts{f.u, f.v, f.log_width, f.log_height};
+    for (int i = 0; i < 4; ++i) {
+      const auto& p = parts[static_cast<std::size_t>(i)];
+      state.mean[i] = p.value;
+      state.mean[i + 4] = p.rate;
+      state.covariance(i, i) = p.var_value;
+      state.covariance(i, i + 4) = state.covariance(i + 4, i) = p.covariance;
+      state.covariance(i + 4, i + 4) = p.var_rate;
+    }
+  }
+  void predict(Scalar dt, const cfp::BoxMotionOptions& o) {
+    Matrix8 Q = Matrix8::Zero();
+    const Scalar w = std::exp(state.mean[2]), h = std::exp(state.mean[3]);
+    const std::array<Scalar, 4> q{Scalar(o.centre_acceleration) * w, Scalar(o.centre_acceleration) * h, Scalar(o.size_acceleration), Scalar(o.size_acceleration)};
+    for (int i = 0; i < 4; ++i) {
+      const Scalar d = q[static_cast<std::size_t>(i)] * q[static_cast<std::size_t>(i)];
+      Q(i, i) = d * dt * dt * dt / 3;
+      Q(i, i + 4) = Q(i + 4, i) = d * dt * dt / 2;
+      Q(i + 4, i + 4) = d * dt;
+    }
+    const auto motion = [&](const Vector8& m, Matrix8& F) -> Vector8 {
+      F.setIdentity();
+      F.template topRightCorner<4, 4>() = dt * Eigen::Matrix<Scalar, 4, 4>::Identity();
+      return F * m;
+    };
+    REQUIRE(cfp::ekf_predict(state, motion, Q));
+  }
+  void update(const cfp::Box<Scalar>& b, const cfp::BoxMotionOptions& o) {
+    const Scalar sx = Scalar(o.edge_noise) * std::exp(state.mean[2]), sy = Scalar(o.edge_noise) * std::exp(state.mean[3]);
+    const Eigen::Matrix<Scalar, 4, 4> R = Eigen::Matrix<Scalar, 4, 1>(sx * sx, sx * sx, sy * sy, sy * sy).asDiagonal();
+    const Eigen::Matrix<Scalar, 4, 1> z(b.x1, b.x2, b.y1, b.y2);
+    REQUIRE(cfp::ekf_update(state, z, [](const Vector8& m, Eigen::Matrix<Scalar, 4, 8>& H) { return cfp::box_edges(m, H); }, R).status == cfp::Status::ok);
+  }
+};
+
+template <typename Scalar>
+void require_equal(const cfp::BoxFilter<Scalar>& split, const DenseBoxFilter<Scalar>& dense, double tolerance) {
+  const DenseBoxFilter<Scalar> other(split);
+  for (int i = 0; i < 8; ++i) {
+    const double scale = 1 + std::abs(static_cast<double>(dense.state.mean[i]));
+    REQUIRE_THAT(static_cast<double>(other.state.mean[i]), WithinAbs(static_cast<double>(dense.state.mean[i]), tolerance * scale));
+    for (int j = 0; j < 8; ++j) {
+      const double size = std::sqrt(static_cast<double>(dense.state.covariance(i, i)) * static_cast<double>(dense.state.covariance(j, j)));
+      REQUIRE_THAT(static_cast<double>(other.state.covariance(i, j)), WithinAbs(static_cast<double>(dense.state.covariance(i, j)), tolerance * size + 1e-12));
+    }
+  }
+}
+
+cfp::Box<double> random_box(cfp::Random& random) {
+  const double x = random.uniform(0, 500), y = random.uniform(0, 300);
+  return {x, y, x + random.uniform(10, 200), y + random.uniform(20, 300)};
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("Four two-state filters are the eight-state EKF on edges", "[detection]", float, double) {
+  cfp::Random random(1, "split filter");
+  const cfp::BoxMotionOptions options;
+  const double tolerance = std::is_same_v<TestType, float> ? 2e-3 : 1e-10;
+  for (int repetition = 0; repetition < 20; ++repetition) {
+    const cfp::Box<double> start = random_box(random);
+    const auto cast = [](const cfp::Box<double>& b) { return cfp::Box<TestType>{TestType(b.x1), TestType(b.y1), TestType(b.x2), TestType(b.y2)}; };
+    cfp::BoxFilter<TestType> split = cfp::make_box_filter(cast(start), options);
+    DenseBoxFilter<TestType> dense(split);
+    for (int k = 0; k < 40; ++k) {
+      const TestType dt = TestType(random.uniform(0.01, 0.1));
+      cfp::predict(split, dt, options);
+      dense.predict(dt, options);
+      require_equal(split, dense, tolerance);
+      if (random.uniform() < 0.3) continue;
+      const double s = 0.05 * start.width();
+      const cfp::Box<double> seen{start.x1 + 3 * k + s * random.normal(), start.y1 + s * random.normal(), start.x2 + 3 * k + s * random.normal(),
+                                  start.y2 + s * random.normal()};
+      cfp::update(split, cast(seen), options);
+      dense.update(cast(seen), options);
+      require_equal(split, dense, tolerance);
+    }
+  }
+}
+
+TEST_CASE("The Jacobian of the edges agrees with central differences", "[detection]") {
+  cfp::Random random(2, "edge jacobian");
+  for (int repetition = 0; repetition < 50; ++repetition) {
+    Eigen::Matrix<double, 8, 1> state;
+    state << random.uniform(0, 640), random.uniform(0, 480), random.uniform(1, 6), random.uniform(1, 6), 1, 2, 3, 4;
+    Eigen::Matrix<double, 4, 8> H, unused;
+    const Eigen::Vector4d edges = cfp::box_edges(state, H);
+    CHECK_THAT(edges[1] - edges[0], WithinAbs(std::exp(state[2]), 1e-10));
+    for (int i = 0; i < 8; ++i) {
+      Eigen::Matrix<double, 8, 1> plus = state, minus = state;
+      plus[i] += 1e-6;
+      minus[i] -= 1e-6;
+      const Eigen::Vector4d slope = (cfp::box_edges(plus, unused) - cfp::box_edges(minus, unused)) / 2e-6;
+      CHECK((slope - H.col(i)).norm() < 1e-5);
+    }
+  }
+}
+
+TEST_CASE("One step of 2 dt equals two steps of dt", "[detection]") {
+  cfp::RateFilter<double> once{1, 2, 3, 0.5, 4}, twice = once;
+  once.predict(0.2, 1.7);
+  twice.predict(0.1, 1.7);
+  twice.predict(0.1, 1.7);
+  CHECK_THAT(once.value, WithinAbs(1.4, 1e-15));
+  CHECK_THAT(once.value, WithinAbs(twice.value, 1e-15));
+  CHECK_THAT(once.var_value, WithinAbs(twice.var_value, 1e-14));
+  CHECK_THAT(once.covariance, WithinAbs(twice.covariance, 1e-14));
+  CHECK_THAT(once.var_rate, WithinAbs(twice.var_rate, 1e-14));
+  CHECK_THAT(once.var_value, WithinAbs(3 + 0.2 * 2 * 0.5 + 0.04 * 4 + 1.7 * 1.7 * 0.008 / 3, 1e-14));
+}
+
+TEMPLATE_TEST_CASE("Sizes stay positive and everything finite for any number of predictions", "[detection]", float, double) {
+  const cfp::BoxMotionOptions options;
+  for (const TestType rate : {TestType(-50), TestType(50), TestType(-1e30), TestType(1e30)}) {
+    cfp::BoxFilter<TestType> filter = cfp::make_box_filter(cfp::Box<TestType>{10, 20, 60, 200}, options);
+    filter.log_width.rate = filter.log_height.rate = filter.u.rate = rate;
+    for (int k = 0; k < 10000; ++k) {
+      cfp::predict(filter, k % 100 == 0 ? TestType(1e30) : TestType(0.1), options);
+      const cfp::Box<TestType> box = filter.box();
+      REQUIRE((cfp::is_finite(box.x1) && cfp::is_finite(box.x2) && cfp::is_finite(box.y1) && cfp::is_finite(box.y2)));
+      REQUIRE(std::exp(filter.log_width.value) >= TestType(0.99));
+      REQUIRE(std::exp(filter.log_width.value) <= TestType(1.01e5));
+      REQUIRE((filter.u.var_value >= 0 && filter.u.var_rate >= 0 && cfp::is_finite(filter.u.covariance)));
+    }
+    cfp::update(filter, cfp::Box<TestType>{10, 20, 60, 200}, options);
+    CHECK(cfp::is_finite(filter.u.value));
+  }
+}
+
+TEST_CASE("An image motion moves the box as the homography moves its points", "[detection]") {
+  const cfp::BoxMotionOptions options;
+  const cfp::Box<double> box{100, 120, 160, 300};
+  cfp::Matrix3<double> H = cfp::Matrix3<double>::Identity();
+  H(0, 2) = 7;
+  H(1, 2) = -3;
+  cfp::BoxFilter<double> filter = cfp::make_box_filter(box, options);
+  REQUIRE(cfp::warp(filter, H, options));
+  CHECK_THAT(filter.box().x1, WithinAbs(107, 1e-9));
+  CHECK_THAT(filter.box().y2, WithinAbs(297, 1e-9));
+
+  H = 2 * cfp::Matrix3<double>::Identity();  // zoom by 2 about the origin, at any scale of H
+  H(2, 2) = 1;
+  filter = cfp::make_box_filter(box, options);
+  filter.u.rate = 5;
+  REQUIRE(cfp::warp(filter, cfp::Matrix3<double>(-3 * H), options));
+  CHECK_THAT(filter.box().x1, WithinAbs(200, 1e-9));
+  CHECK_THAT(filter.box().y2, WithinAbs(600, 1e-9));
+  CHECK_THAT(filter.u.rate, WithinAbs(10, 1e-12));
+  CHECK_THAT(filter.u.var_value, WithinAbs(4 * cfp::make_box_filter(box, options).u.var_value, 1e-9));
+
+  // Rolling to and fro by a degree for ten seconds leaves the size within a few per cent.
+  filter = cfp::make_box_filter(box, options);
+  for (int k = 0; k < 300; ++k) REQUIRE(cfp::warp(filter, cfp::so3_exp<double>({0, 0, k % 2 == 0 ? 0.0175 : -0.0175}), options));
+  CHECK(filter.box().width() < 1.5 * box.width());
+  CHECK_THAT(filter.u.value, WithinAbs(130, 1e-6));
+
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e300, 0.0}) {
+    cfp::BoxFilter<double> kept = filter;
+    CHECK_FALSE(cfp::warp(kept, cfp::Matrix3<double>(cfp::Matrix3<double>::Constant(bad)), options));
+    CHECK(kept.u.value == filter.u.value);
+  }
+}
+
+TEST_CASE("Motion options outside their range are named", "[detection]") {
+  CHECK(invalid_field(cfp::BoxMotionOptions{}) == nullptr);
+  cfp::BoxMotionOptions options;
+  options.edge_noise = std::numeric_limits<double>::quiet_NaN();
+  CHECK(invalid_field(options) == std::string("edge_noise"));
+  options = {};
+  options.max_size_px = 0.5;
+  CHECK(invalid_field(options) == std::string("max_size_px"));
+}
