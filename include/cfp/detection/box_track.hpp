@@ -52,7 +52,7 @@ struct BoxTrackerOptions {
 };
 
 [[nodiscard]] inline const char* invalid_field(const BoxTrackerOptions& o) noexcept {
-  if (const char* field = invalid_field(o.motion)) return field;
+  if (const char* field = detail::invalid_motion_field(o.motion)) return field;
   if (!(o.min_iou >= 0 && o.min_iou < 1)) return "min_iou";
   if (!is_finite(o.min_score)) return "min_score";
   if (!is_finite(o.birth_score)) return "birth_score";

@@ -43,7 +43,7 @@ class BoxTracker {
   }
 
   /// A frame on which the detector did not run: nothing was missed, so tracks of one detection live on, but confirmed tracks
-  /// are output as compensated and age towards max_coast all the same.
+  /// are output as compensated and age towards max_coast all the same. For a detector that runs on every n-th frame only.
   BoxTrackerResult<Scalar> skip(Scalar dt_s, const Eigen::Matrix<Scalar, 3, 3>* image_motion = nullptr) {
     BoxTrackerResult<Scalar> result = advance(dt_s, image_motion);
     for (Track& track : tracks_) track.detection = -1;
@@ -147,7 +147,8 @@ class BoxTracker {
       track.missed = seen ? 0 : next(track.missed);
       Box<Scalar> box = track.box;
       if (!seen) {
-        if (track.missed > options_.max_coast || track.missed > options_.coast_per_hit * track.hits || !(confirmed || detector_skipped)) continue;
+        if (track.missed > options_.max_coast) continue;
+        if (!detector_skipped && !(confirmed && track.missed <= options_.coast_per_hit * track.hits)) continue;
         box = track.filter.box();
         if (!clip_to_image(box)) continue;
       }

@@ -1,0 +1,269 @@
+#include "cfp/detection/box_tracker.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "cfp/core/random.hpp"
+#include "cfp/math/so3.hpp"
+#include "support/allocation_counter.hpp"
+#include "support/catch.hpp"
+
+namespace {
+
+using Box = cfp::Box<double>;
+using Detections = std::vector<cfp::Detection<double>>;
+using Boxes = std::vector<cfp::TrackedBox<double>>;
+
+constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
+
+Box shifted(const Box& b, double dx, double dy = 0) { return {b.x1 + dx, b.y1 + dy, b.x2 + dx, b.y2 + dy}; }
+Boxes copy(const cfp::BoxTrackerResult<double>& result) { return {result.boxes.begin(), result.boxes.end()}; }
+bool same(const Boxes& a, const Boxes& b) {
+  return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), [](const auto& p, const auto& q) {
+           return p.box.x1 == q.box.x1 && p.box.y1 == q.box.y1 && p.box.x2 == q.box.x2 && p.box.y2 == q.box.y2 && p.id == q.id && p.class_id == q.class_id &&
+                  p.score == q.score && p.age == q.age && p.missed == q.missed && p.associated == q.associated && p.compensated() == q.compensated();
+         });
+}
+
+cfp::BoxTrackerOptions in_image() {
+  cfp::BoxTrackerOptions options;
+  options.image_width = 640;
+  options.image_height = 480;
+  return options;
+}
+
+/// A scene of n boxes at some frame, every one moving its own way, with noise and misses.
+Detections scene(cfp::Random& random, int n, int k) {
+  Detections detections;
+  for (int i = 0; i < n; ++i) {
+    const double x = 20 + 590.0 / n * i + 40 * std::sin(0.05 * k + i), y = 150 + 30 * std::cos(0.03 * k + 2 * i);
+    if (random.uniform() < 0.15) continue;
+    const auto jitter = [&] { return random.normal(); };
+    detections.push_back({{x + jitter(), y + jitter(), x + 60 + jitter(), y + 180 + jitter()}, i % 2, random.uniform(0.4, 1)});
+  }
+  return detections;
+}
+
+}  // namespace
+
+TEST_CASE("Bursts of one to six missed frames are compensated where the box really is", "[detection]") {
+  for (const double rate_hz : {30.0, 15.0}) {  // the same motion in px per second at two frame rates
+    for (int burst = 1; burst <= 7; ++burst) {
+      cfp::BoxTracker<double> tracker(in_image());
+      const Box start{100, 100, 180, 340};
+      for (int k = 0; k < 40; ++k) {
+        const double t = k / rate_hz;
+        const Box truth = shifted(start, 60 * t, -10 * t);
+        const bool missed = k >= 20 && k < 20 + burst;
+        const auto result = tracker.update(missed ? Detections{} : Detections{{truth, 7, 0.9}}, k == 0 ? 0.0 : 1 / rate_hz);
+        CAPTURE(rate_hz, burst, k);
+        if (k >= 26 && burst == 7) {
+          CHECK(result.boxes.empty() == missed);
+          continue;
+        }
+        REQUIRE(result.boxes.size() == 1);
+        const cfp::TrackedBox<double>& box = result.boxes[0];
+        CHECK(box.compensated() == missed);
+        CHECK(box.missed == (missed ? k - 19 : 0));
+        CHECK(box.age == k);
+        CHECK(box.id == 1);
+        CHECK(box.class_id == 7);
+        CHECK(box.associated == (k > 0));
+        CHECK(cfp::iou(box.box, truth) > 0.9);
+      }
+    }
+  }
+}
+
+TEST_CASE("A box without an associated box in the frame before says so", "[detection]") {
+  cfp::BoxTracker<double> tracker;
+  const Box box{0, 0, 50, 100};
+  CHECK_FALSE(tracker.update(Detections{{box, 0, 1}}, 0.0).boxes[0].associated);
+  CHECK(tracker.update(Detections{{box, 0, 1}}, 0.1).boxes[0].associated);
+  CHECK(tracker.update(Detections{}, 0.1).boxes[0].associated);  // a compensated box stands in for the detection
+  const auto result = tracker.update(Detections{{box, 0, 1}, {shifted(box, 300), 0, 1}}, 0.1);
+  REQUIRE(result.boxes.size() == 2);
+  CHECK(result.boxes[0].associated);
+  CHECK_FALSE(result.boxes[1].associated);
+  CHECK(result.boxes[1].id == 2);
+}
+
+TEST_CASE("A single detection is output but never compensated", "[detection]") {
+  cfp::BoxTracker<double> tracker;
+  CHECK(tracker.update(Detections{{{0, 0, 50, 100}, 0, 1}}, 0.0).boxes.size() == 1);
+  CHECK(tracker.update(Detections{}, 0.1).boxes.empty());
+}
+
+TEST_CASE("Crossing boxes keep their identities", "[detection]") {
+  cfp::BoxTracker<double> tracker(in_image());
+  for (int k = 0; k < 60; ++k) {
+    const Box right = shifted({50, 100, 110, 300}, 8 * k), left = shifted({520, 120, 580, 330}, -8 * k);
+    Detections detections{{right, 0, 1}, {left, 0, 1}};
+    if (k % 2 == 1) std::swap(detections[0], detections[1]);
+    const auto result = tracker.update(detections, 1.0 / 30);
+    REQUIRE(result.boxes.size() == 2);
+    for (const auto& box : result.boxes) CHECK(cfp::iou(box.box, box.id == 1 ? right : left) == 1);
+  }
+}
+
+TEST_CASE("Classes are never mixed", "[detection]") {
+  cfp::BoxTracker<double> tracker;
+  const Box box{10, 10, 60, 160};
+  for (int k = 0; k < 5; ++k) tracker.update(Detections{{box, 0, 1}}, 0.03);
+  const auto result = tracker.update(Detections{{box, 1, 1}}, 0.03);
+  REQUIRE(result.boxes.size() == 2);
+  CHECK((result.boxes[0].class_id == 0 && result.boxes[0].compensated()));
+  CHECK((result.boxes[1].class_id == 1 && !result.boxes[1].associated));
+}
+
+TEST_CASE("A given image motion carries predictions through violent rotation", "[detection]") {
+  const Box start{280, 100, 360, 340};
+  for (const bool given : {false, true}) {
+    cfp::BoxTracker<double> tracker(in_image());
+    bool kept = true;
+    for (int k = 0; k < 24; ++k) {  // half a box width to and fro, each way within a frame, with bursts of misses
+      const double shift = (k / 3) % 2 == 0 ? 0 : 60;
+      cfp::Matrix3<double> motion = cfp::Matrix3<double>::Identity();
+      if (k > 0 && k % 3 == 0) motion(0, 2) = (k / 3) % 2 == 0 ? -60 : 60;
+      const bool missed = k > 6 && k % 3 != 2;
+      const auto result = tracker.update(missed ? Detections{} : Detections{{shifted(start, shift), 0, 1}}, 1.0 / 30, given ? &motion : nullptr);
+      kept = kept && result.boxes.size() == 1 && result.boxes[0].id == 1 && cfp::iou(result.boxes[0].box, shifted(start, shift)) > 0.8;
+    }
+    CHECK(kept == given);
+  }
+  cfp::BoxTracker<double> tracker;
+  tracker.update(Detections{{start, 0, 1}}, 0.0);
+  const cfp::Matrix3<double> broken = cfp::Matrix3<double>::Constant(nan_value);
+  const auto result = tracker.update(Detections{{start, 0, 1}}, 0.03, &broken);
+  CHECK(result.unwarped == 1);
+  CHECK((result.boxes.size() == 1 && result.boxes[0].id == 1));
+}
+
+TEST_CASE("Compensated boxes are clipped to the image and dropped when nearly outside", "[detection]") {
+  cfp::BoxTracker<double> tracker(in_image());
+  for (int k = 0; k < 10; ++k) tracker.update(Detections{{shifted({400, 100, 500, 300}, 15 * k), 0, 1}}, 0.1);  // right edge at 635
+  std::size_t frames = 0;
+  for (int k = 0; k < 6; ++k) {
+    const auto result = tracker.update(Detections{}, 0.1);
+    for (const auto& box : result.boxes) {
+      ++frames;
+      CHECK((box.box.x2 <= 640 && cfp::is_proper(box.box) && box.box.width() >= 25));
+    }
+  }
+  CHECK(frames >= 4);
+  CHECK(frames < 6);
+}
+
+TEST_CASE("Scores: below min_score ignored, below birth_score only extends", "[detection]") {
+  cfp::BoxTrackerOptions options;
+  options.min_score = 0.3;
+  options.birth_score = 0.6;
+  cfp::BoxTracker<double> tracker(options);
+  const Box box{10, 10, 60, 160};
+  auto result = tracker.update(Detections{{box, 0, 0.5}}, 0.0);
+  CHECK((result.boxes.empty() && result.ignored == 1));
+  tracker.update(Detections{{box, 0, 0.6}}, 0.03);
+  result = tracker.update(Detections{{box, 0, 0.3}}, 0.03);
+  CHECK((result.boxes.size() == 1 && result.boxes[0].id == 1 && !result.boxes[0].compensated()));
+  result = tracker.update(Detections{{box, 0, 0.2}}, 0.03);
+  CHECK((result.ignored == 1 && result.compensated == 1));
+}
+
+TEST_CASE("A frame without a detector run predicts and forgets nobody", "[detection]") {
+  cfp::BoxTracker<double> tracker;
+  int id = 0;
+  for (int k = 0; k < 30; ++k) {  // the detector runs on every third frame only
+    const Box truth = shifted({10, 10, 90, 200}, 2.0 * k);
+    const auto result = k % 3 == 0 ? tracker.update(Detections{{truth, 0, 1}}, 1.0 / 30) : tracker.skip(1.0 / 30);
+    if (k < 3) continue;  // one detection so far: nothing to compensate yet
+    REQUIRE(result.boxes.size() == 1);
+    if (id == 0) id = static_cast<int>(result.boxes[0].id);
+    CHECK(result.boxes[0].id == id);
+    CHECK(result.boxes[0].compensated() == (k % 3 != 0));
+    CHECK(cfp::iou(result.boxes[0].box, truth) > 0.8);
+  }
+}
+
+TEST_CASE("A long gap ends all tracks", "[detection]") {
+  cfp::BoxTracker<double> tracker;
+  const Box box{10, 10, 60, 160};
+  for (int k = 0; k < 5; ++k) tracker.update(Detections{{box, 0, 1}}, 0.1);
+  const auto result = tracker.update(Detections{{box, 0, 1}}, 2.1);
+  CHECK((result.boxes.size() == 1 && result.boxes[0].id == 2 && !result.boxes[0].associated));
+  tracker.reset();
+  CHECK(tracker.update(Detections{{box, 0, 1}}, 0.1).boxes[0].id == 1);
+}
+
+TEMPLATE_TEST_CASE("Hostile detections, dt and image motion leave finite boxes and a count", "[detection]", float, double) {
+  const TestType inf = std::numeric_limits<TestType>::infinity(), nan_ = std::numeric_limits<TestType>::quiet_NaN();
+  const std::vector<TestType> values{nan_, inf, -inf, 0, TestType(1e-40), TestType(1e30), (std::numeric_limits<TestType>::max)(), -1, 10, 50, 100, 400};
+  cfp::Random random(1, "hostile tracker");
+  const auto pick = [&] { return values[random.index(static_cast<std::uint32_t>(values.size()))]; };
+  cfp::BoxTracker<TestType> tracker(in_image());
+  for (int k = 0; k < 20000; ++k) {
+    std::vector<cfp::Detection<TestType>> detections(random.index(6));
+    std::size_t improper = 0;
+    for (auto& d : detections) {
+      d = {{pick(), pick(), pick(), pick()}, static_cast<int>(random.index(2)), pick()};
+      if (random.uniform() < 0.5) d = {{10, 10, 50, 100}, 0, 1};
+      improper += cfp::is_proper(d.box) && d.score == d.score ? 0 : 1;
+    }
+    Eigen::Matrix<TestType, 3, 3> motion = Eigen::Matrix<TestType, 3, 3>::Identity();
+    if (random.uniform() < 0.3) motion(static_cast<int>(random.index(3)), static_cast<int>(random.index(3))) = pick();
+    const TestType dt = random.uniform() < 0.5 ? TestType(0.03) : pick();
+    const auto result = random.uniform() < 0.1 ? tracker.skip(dt, &motion) : tracker.update(detections, dt, k % 2 == 0 ? &motion : nullptr);
+    REQUIRE((result.status == cfp::Status::invalid_input) == !(dt >= 0 && dt < inf));
+    REQUIRE(result.skipped <= detections.size());
+    for (const auto& box : result.boxes) {
+      REQUIRE(cfp::is_proper(box.box));
+      if (box.compensated()) REQUIRE((box.box.x1 >= 0 && box.box.y1 >= 0 && box.box.x2 <= 640 && box.box.y2 <= 480));
+    }
+    if (!result.boxes.empty() && result.boxes.size() > result.compensated) REQUIRE(result.skipped >= improper);
+  }
+}
+
+TEST_CASE("The order of the detections changes nothing but their indices", "[detection]") {
+  cfp::Random noise(2, "permutation scene"), shuffle(3, "permutation order");
+  cfp::BoxTracker<double> one(in_image()), two(in_image());
+  for (int k = 0; k < 300; ++k) {
+    Detections detections = scene(noise, 8, k);
+    const Boxes a = copy(one.update(detections, 1.0 / 30));
+    for (std::size_t i = detections.size(); i > 1; --i) std::swap(detections[i - 1], detections[shuffle.index(static_cast<std::uint32_t>(i))]);
+    REQUIRE(same(a, copy(two.update(detections, 1.0 / 30))));
+  }
+}
+
+TEST_CASE("Equal calls give equal bits, and warm frames allocate nothing", "[detection]") {
+  cfp::BoxTracker<double> one(in_image()), two(in_image());
+  cfp::Random noise(4, "repeat");
+  const cfp::Matrix3<double> motion = cfp::Matrix3<double>::Identity();
+  for (int k = 0; k < 400; ++k) {
+    const Detections detections = scene(noise, 12, k);
+    std::size_t allocations = 0;
+    Boxes a;
+    {
+      cfp::BoxTrackerResult<double> result;
+      allocations = cfp_test::allocations_in([&] { result = one.update(detections, 1.0 / 30, &motion); });
+      a = copy(result);
+    }
+    if (k > 200) CHECK(allocations == 0);
+    REQUIRE(same(a, copy(two.update(detections, 1.0 / 30, &motion))));
+  }
+}
+
+TEST_CASE("Tracker options outside their range are named", "[detection]") {
+  CHECK(invalid_field(cfp::BoxTrackerOptions{}) == nullptr);
+  const auto named = [](auto change) {
+    cfp::BoxTrackerOptions options;
+    change(options);
+    return std::string(invalid_field(options));
+  };
+  CHECK(named([](auto& o) { o.min_iou = 1; }) == "min_iou");
+  CHECK(named([](auto& o) { o.max_coast = -1; }) == "max_coast");
+  CHECK(named([](auto& o) { o.confirm_hits = 0; }) == "confirm_hits");
+  CHECK(named([](auto& o) { o.max_gap_s = nan_value; }) == "max_gap_s");
+  CHECK(named([](auto& o) { o.motion.edge_noise = 0; }) == "motion.edge_noise");
+}
