@@ -158,7 +158,7 @@ TEST_CASE("An image motion moves the box as the homography moves its points", "[
   H(0, 2) = 7;
   H(1, 2) = -3;
   cfp::BoxFilter<double> filter = cfp::make_box_filter(box, options);
-  REQUIRE(cfp::warp(filter, H, options));
+  REQUIRE(cfp::warp(filter, H));
   CHECK_THAT(filter.box().x1, WithinAbs(107, 1e-9));
   CHECK_THAT(filter.box().y2, WithinAbs(297, 1e-9));
 
@@ -166,7 +166,7 @@ TEST_CASE("An image motion moves the box as the homography moves its points", "[
   H(2, 2) = 1;
   filter = cfp::make_box_filter(box, options);
   filter.u.rate = 5;
-  REQUIRE(cfp::warp(filter, cfp::Matrix3<double>(-3 * H), options));
+  REQUIRE(cfp::warp(filter, cfp::Matrix3<double>(-3 * H)));
   CHECK_THAT(filter.box().x1, WithinAbs(200, 1e-9));
   CHECK_THAT(filter.box().y2, WithinAbs(600, 1e-9));
   CHECK_THAT(filter.u.rate, WithinAbs(10, 1e-12));
@@ -175,13 +175,13 @@ TEST_CASE("An image motion moves the box as the homography moves its points", "[
   // Rolling to and fro by a degree for ten seconds: w^2 gains (sin 1deg)^2 h^2 each time, a third in all; bounding the
   // rotated corners would have made the box 17 times as wide.
   filter = cfp::make_box_filter(box, options);
-  for (int k = 0; k < 300; ++k) REQUIRE(cfp::warp(filter, cfp::so3_exp<double>({0, 0, k % 2 == 0 ? 0.0175 : -0.0175}), options));
+  for (int k = 0; k < 300; ++k) REQUIRE(cfp::warp(filter, cfp::so3_exp<double>({0, 0, k % 2 == 0 ? 0.0175 : -0.0175})));
   CHECK(filter.box().width() < 1.5 * box.width());
   CHECK_THAT(filter.u.value, WithinAbs(130, 1e-6));
 
   for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e300, 0.0}) {
     cfp::BoxFilter<double> kept = filter;
-    CHECK_FALSE(cfp::warp(kept, cfp::Matrix3<double>(cfp::Matrix3<double>::Constant(bad)), options));
+    CHECK_FALSE(cfp::warp(kept, cfp::Matrix3<double>(cfp::Matrix3<double>::Constant(bad))));
     CHECK(kept.u.value == filter.u.value);
   }
 }
@@ -192,6 +192,6 @@ TEST_CASE("Motion options outside their range are named", "[detection]") {
   options.edge_noise = std::numeric_limits<double>::quiet_NaN();
   CHECK(invalid_field(options) == std::string("edge_noise"));
   options = {};
-  options.max_size_px = 0.5;
-  CHECK(invalid_field(options) == std::string("max_size_px"));
+  options.size_acceleration = -1;
+  CHECK(invalid_field(options) == std::string("size_acceleration"));
 }

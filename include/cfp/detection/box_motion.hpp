@@ -33,8 +33,6 @@ struct BoxMotionOptions {
   double size_acceleration = 0.2;     ///< q of the log size, s^-1.5, >= 0
   double initial_centre_rate = 1.0;   ///< standard deviation of a new box's velocity / size, per second, > 0
   double initial_size_rate = 0.2;     ///< the same of the log size rate, per second, > 0
-  double min_size_px = 1.0;           ///< the log sizes stay between these two, px, > 0
-  double max_size_px = 1e5;
 };
 
 namespace detail {
@@ -45,8 +43,6 @@ namespace detail {
   if (!(o.size_acceleration >= 0 && o.size_acceleration <= 1e6)) return "motion.size_acceleration";
   if (!(o.initial_centre_rate > 0 && o.initial_centre_rate <= 1e6)) return "motion.initial_centre_rate";
   if (!(o.initial_size_rate > 0 && o.initial_size_rate <= 1e6)) return "motion.initial_size_rate";
-  if (!(o.min_size_px >= 1e-3 && o.min_size_px <= 1e5)) return "motion.min_size_px";
-  if (!(o.max_size_px >= o.min_size_px && o.max_size_px <= 1e6)) return "motion.max_size_px";
   return nullptr;
 }
 }  // namespace detail
@@ -100,8 +96,8 @@ struct BoxFilter {
 template <typename Scalar>
 [[nodiscard]] BoxFilter<Scalar> make_box_filter(const Box<Scalar>& box, const BoxMotionOptions& options) noexcept;
 
-/// Moves the filter dt seconds ahead (finite, >= 0). Sizes stay within the options' limits, where their rate becomes 0 (positive
-/// for any number of predictions), and the centre within +-1e7 px: nothing overflows. Equal to the EKF up to there.
+/// Moves the filter dt seconds ahead (finite, >= 0). Sizes stay within [1, 1e5] px, where their rate becomes 0 (so they
+/// are positive after any number of predictions), and the centre within +-1e7 px: nothing overflows. Equal to the EKF up to there.
 template <typename Scalar>
 void predict(BoxFilter<Scalar>& filter, Scalar dt_s, const BoxMotionOptions& options) noexcept;
 
@@ -115,7 +111,7 @@ void update(BoxFilter<Scalar>& filter, const Box<Scalar>& measured, const BoxMot
 /// variances of the centre follow J; its cross terms between u and v are dropped, as the split form needs. Returns false, and
 /// leaves the filter, when H is not finite, the centre falls behind the camera, or a size leaves the limits.
 template <typename Scalar>
-[[nodiscard]] bool warp(BoxFilter<Scalar>& filter, const Eigen::Matrix<Scalar, 3, 3>& H, const BoxMotionOptions& options) noexcept;
+[[nodiscard]] bool warp(BoxFilter<Scalar>& filter, const Eigen::Matrix<Scalar, 3, 3>& H) noexcept;
 
 /// The measurement of the 8-state form (u, v, log width, log height, then their rates): edges (x1, x2, y1, y2) and Jacobian.
 template <typename Scalar>

@@ -9,6 +9,8 @@ namespace detail {
 
 inline constexpr double box_largest_px = 1e7;        // centres and velocities are kept below, far outside any image
 inline constexpr double box_largest_variance = 1e14;  // its square
+inline constexpr double box_largest_size_px = 1e5;
+inline constexpr double box_largest_log_size = 11.512925464970229;  // log of the line above; log of the smallest, 1 px, is 0
 inline constexpr double box_largest_log_rate = 1e3;
 
 /// x in [low, high]; NaN becomes low.
@@ -31,14 +33,12 @@ void confine(RateFilter<Scalar>& f, Scalar low, Scalar high, Scalar largest_rate
 }
 
 template <typename Scalar>
-void confine(BoxFilter<Scalar>& filter, const BoxMotionOptions& options) noexcept {
-  using std::log;
+void confine(BoxFilter<Scalar>& filter) noexcept {
   const Scalar far = Scalar(box_largest_px);
-  const Scalar low = Scalar(log(options.min_size_px)), high = Scalar(log(options.max_size_px));
   confine(filter.u, -far, far, far);
   confine(filter.v, -far, far, far);
-  confine(filter.log_width, low, high, Scalar(box_largest_log_rate));
-  confine(filter.log_height, low, high, Scalar(box_largest_log_rate));
+  confine(filter.log_width, Scalar(0), Scalar(box_largest_log_size), Scalar(box_largest_log_rate));
+  confine(filter.log_height, Scalar(0), Scalar(box_largest_log_size), Scalar(box_largest_log_rate));
 }
 
 template <typename Scalar>
@@ -58,7 +58,7 @@ BoxFilter<Scalar> make_box_filter(const Box<Scalar>& box, const BoxMotionOptions
   filter.v = detail::at_rest(Scalar(0.5) * (box.y1 + box.y2), noise * noise * h * h / Scalar(2), rate * h);
   filter.log_width = detail::at_rest(Scalar(log(w)), Scalar(2) * noise * noise, size_rate);
   filter.log_height = detail::at_rest(Scalar(log(h)), Scalar(2) * noise * noise, size_rate);
-  detail::confine(filter, options);
+  detail::confine(filter);
   return filter;
 }
 
@@ -70,7 +70,7 @@ void predict(BoxFilter<Scalar>& filter, Scalar dt_s, const BoxMotionOptions& opt
   filter.v.predict(dt_s, q * exp(filter.log_height.value));
   filter.log_width.predict(dt_s, q_size);
   filter.log_height.predict(dt_s, q_size);
-  detail::confine(filter, options);
+  detail::confine(filter);
 }
 
 template <typename Scalar>
@@ -83,11 +83,11 @@ void update(BoxFilter<Scalar>& filter, const Box<Scalar>& measured, const BoxMot
   filter.v.update(Scalar(0.5) * (measured.y1 + measured.y2) - filter.v.value, noise * h * h / Scalar(2));
   filter.log_width.update((measured.width() - w) / w, Scalar(2) * noise);
   filter.log_height.update((measured.height() - h) / h, Scalar(2) * noise);
-  detail::confine(filter, options);
+  detail::confine(filter);
 }
 
 template <typename Scalar>
-bool warp(BoxFilter<Scalar>& filter, const Eigen::Matrix<Scalar, 3, 3>& H, const BoxMotionOptions& options) noexcept {
+bool warp(BoxFilter<Scalar>& filter, const Eigen::Matrix<Scalar, 3, 3>& H) noexcept {
   using std::exp;
   using std::log;
   using std::sqrt;
@@ -99,7 +99,7 @@ bool warp(BoxFilter<Scalar>& filter, const Eigen::Matrix<Scalar, 3, 3>& H, const
   const Scalar c = (H(1, 0) - y * H(2, 0)) / s, d = (H(1, 1) - y * H(2, 1)) / s;
   const Scalar w = exp(filter.log_width.value), h = exp(filter.log_height.value);
   const Scalar width = sqrt(a * a * w * w + b * b * h * h), height = sqrt(c * c * w * w + d * d * h * h);
-  const Scalar far = Scalar(detail::box_largest_px), low = Scalar(options.min_size_px), high = Scalar(options.max_size_px);
+  const Scalar far = Scalar(detail::box_largest_px), low = Scalar(1), high = Scalar(detail::box_largest_size_px);
   if (!(x >= -far && x <= far && y >= -far && y <= far && width >= low && width <= high && height >= low && height <= high)) return false;
   const RateFilter<Scalar> fu = filter.u, fv = filter.v;
   const auto mix = [](Scalar p, Scalar q, const RateFilter<Scalar>& f, const RateFilter<Scalar>& g, Scalar value) {
@@ -110,7 +110,7 @@ bool warp(BoxFilter<Scalar>& filter, const Eigen::Matrix<Scalar, 3, 3>& H, const
   filter.v = mix(c, d, fu, fv, y);
   filter.log_width.value = log(width);
   filter.log_height.value = log(height);
-  detail::confine(filter, options);
+  detail::confine(filter);
   return true;
 }
 

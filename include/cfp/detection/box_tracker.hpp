@@ -78,7 +78,7 @@ class BoxTracker {
     predicted_.clear();
     for (Track& track : tracks_) {
       predict(track.filter, dt_s, options_.motion);
-      if (image_motion != nullptr && !warp(track.filter, *image_motion, options_.motion)) ++result.unwarped;
+      if (image_motion != nullptr && !warp(track.filter, *image_motion)) ++result.unwarped;
       track.age = next(track.age);
       predicted_.push_back({track.filter.box(), track.class_id});
     }
