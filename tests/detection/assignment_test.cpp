@@ -1,8 +1,13 @@
 #include "cfp/detection/assignment.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <fstream>
 #include <limits>
+#include <sstream>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "cfp/core/random.hpp"
@@ -71,6 +76,30 @@ TEMPLATE_TEST_CASE("The assignment is optimal: brute force up to 6 x 7, all gate
       }
     }
   }
+}
+
+TEST_CASE("The optimum is scipy's", "[detection]") {
+  std::ifstream file(std::string(CFP_SOURCE_DIR) + "/tests/data/assignment_scipy.csv");  // tests/data/generate_assignment_scipy.py
+  REQUIRE(file);
+  cfp::AssignmentWorkspace workspace;
+  int problems = 0;
+  for (std::string line; std::getline(file, line);) {
+    if (line[0] == '#') continue;
+    std::stringstream fields(line);
+    std::vector<double> numbers;
+    for (std::string field; std::getline(fields, field, ',');) numbers.push_back(std::stod(field));
+    const std::size_t rows = static_cast<std::size_t>(numbers[0]), cols = static_cast<std::size_t>(numbers[1]);
+    const double gate = numbers[2];
+    const std::vector<double> values(numbers.begin() + 4, numbers.end());
+    REQUIRE(values.size() == rows * cols);
+    std::vector<int> columns(rows);
+    const cfp::AssignmentResult result = cfp::solve_assignment(cfp::CostMatrix(values, rows, cols), gate, columns, workspace);
+    const double left_out = static_cast<double>((std::min)(rows, cols) - result.pairs);
+    CAPTURE(problems, rows, cols, gate);
+    CHECK_THAT(result.cost + (left_out > 0 ? gate * left_out : 0.0), WithinAbs(numbers[3], 1e-12));
+    ++problems;
+  }
+  CHECK(problems == 63);
 }
 
 TEST_CASE("Large assignments carry a proof: the duality gap vanishes", "[detection]") {

@@ -51,28 +51,43 @@ struct CostLimits {
   }
 };
 
-/// Copies a row of costs, and takes it into the least and the most allowed cost of each column (no reduction along the row, so
-/// that compilers vectorise the loop).
+using RowView = Eigen::Map<const Eigen::ArrayXd>;
+
+/// Copies a row of costs, forbidden ones as infinity, padded to `stride` with infinity. Returns the least.
 template <typename Scalar>
-void copy_costs(const Scalar* source, std::size_t step, std::size_t size, CostLimits limits, double* costs, double* least, double* most) noexcept {
-  const auto copy = [&](std::size_t j, Scalar value) {
-    const double c = limits(value);
-    const double allowed = c < infinity ? c : -infinity;
-    costs[j] = c;
-    least[j] = c < least[j] ? c : least[j];
-    most[j] = allowed > most[j] ? allowed : most[j];
-  };
+double copy_costs(const Scalar* source, std::size_t step, std::size_t size, CostLimits limits, double* row, std::size_t stride) noexcept {
+  const double high = limits.high;  // a local: the stores might alias a member
   if (step == 1) {
-    for (std::size_t j = 0; j < size; ++j) copy(j, source[j]);
+    for (std::size_t j = 0; j < size; ++j) {
+      const double c = static_cast<double>(source[j]);
+      row[j] = c < high ? c : infinity;
+    }
   } else {
-    for (std::size_t j = 0; j < size; ++j) copy(j, source[j * step]);
+    for (std::size_t j = 0; j < size; ++j) row[j] = limits(source[j * step]);
   }
+  std::fill(row + size, row + stride, infinity);
+  const double least = RowView(row, static_cast<Eigen::Index>(stride)).minCoeff();
+  if (least >= limits.low) return least;
+  for (std::size_t j = 0; j < size; ++j) row[j] = limits(row[j]);  // rare: something below the range
+  return RowView(row, static_cast<Eigen::Index>(stride)).minCoeff();
 }
 
-/// The gate that is really used for n pairs at most; -infinity: no pair is allowed. Above the bound below a gate means "as
-/// many pairs as possible" anyway, and a needlessly large one would only cost digits.
+/// The largest allowed cost of a row, -infinity when there is none.
+[[nodiscard]] inline double largest_cost(const double* row, std::size_t size) noexcept {
+  const double most = RowView(row, static_cast<Eigen::Index>(size)).maxCoeff();
+  if (most < infinity) return most;
+  double allowed = -infinity;
+  for (std::size_t j = 0; j < size; ++j) allowed = row[j] < infinity ? larger(allowed, row[j]) : allowed;
+  return allowed;
+}
+
+/// Whether a gate is so near the least cost that it costs no digits. (A shortcut only: it saves a look at all costs.)
+[[nodiscard]] inline bool is_moderate(double max_cost, double least) noexcept { return std::abs(max_cost) <= 1e3 * std::abs(least); }
+
+/// The gate that is really used for n pairs at most. Above the bound below a gate means "as many pairs as possible" anyway, and
+/// a needlessly large one would only cost digits.
 [[nodiscard]] inline double effective_gate(double max_cost, double least, double most, std::size_t n) noexcept {
-  if (!(least <= most)) return -infinity;
+  if (is_moderate(max_cost, least)) return max_cost;
   // The magnitude takes part so that the bound exceeds `most` even after rounding when all costs are (nearly) equal.
   const double width = (std::max)({most - least, (std::max)(-least, most) / 4, (std::numeric_limits<double>::min)()});
   return (std::min)(max_cost, most + static_cast<double>(n) * width);
@@ -87,8 +102,8 @@ class AssignmentSolver {
 
   static std::size_t padded(std::size_t cols) noexcept { return (cols + assignment_lanes - 1) / assignment_lanes * assignment_lanes; }
 
-  void solve() noexcept {
-    const std::size_t left = bid(greet());
+  void solve(const double* row_least) noexcept {
+    const std::size_t left = bid(greet(row_least));
     for (std::size_t k = 0; k < left; ++k) augment(w_.queue[k]);
   }
   /// The smallest reduced cost of a row, its dummy included.
@@ -146,11 +161,11 @@ class AssignmentSolver {
 
   /// Every row takes its cheapest column while that is free. Returns how many rows are left in the queue. In a frame of boxes
   /// that barely overlap this settles nearly all.
-  std::size_t greet() noexcept {
+  std::size_t greet(const double* row_least) noexcept {
     std::size_t left = 0;
     for (std::size_t k = 0; k < rows_; ++k) {
       const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(k);
-      const double least = Eigen::Map<const Eigen::ArrayXd>(costs(row), static_cast<Eigen::Index>(stride_)).minCoeff();
+      const double least = row_least[k];
       if (!(least < gate_)) continue;
       const std::ptrdiff_t j = find(costs(row), w_.price.data(), least, 0);
       if (at(w_.row_of_column, j) != nobody) {
@@ -306,17 +321,23 @@ AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_co
   const std::size_t stride = detail::AssignmentSolver::padded(m);
   if (n == 0) return result;
   w.costs.resize(n * stride);
-  w.price.assign(stride, detail::infinity);
-  w.distance.assign(stride, -detail::infinity);
+  double* row_least = (tall ? w.column_saving : w.row_saving).data();  // borrowed until the savings are known
+  double least = detail::infinity;
   for (std::size_t i = 0; i < n; ++i) {
     const Scalar* source = costs.values.data() + (tall ? i : i * costs.cols);
-    detail::copy_costs(source, tall ? costs.cols : 1, m, detail::CostLimits(max_cost), w.costs.data() + i * stride, w.price.data(), w.distance.data());
-    std::fill(w.costs.data() + i * stride + m, w.costs.data() + (i + 1) * stride, detail::infinity);
+    row_least[i] = detail::copy_costs(source, tall ? costs.cols : 1, m, detail::CostLimits(max_cost), w.costs.data() + i * stride, stride);
+    least = (std::min)(least, row_least[i]);
   }
-  const double least = *std::min_element(w.price.begin(), w.price.end());
-  const double most = *std::max_element(w.distance.begin(), w.distance.end());
+  if (!(least < detail::infinity)) {
+    std::fill(row_least, row_least + n, 0.0);
+    return result;
+  }
+  double most = least;
+  if (!detail::is_moderate(max_cost, least)) {
+    for (std::size_t i = 0; i < n; ++i) most = (std::max)(most, detail::largest_cost(w.costs.data() + i * stride, m));
+  }
   const double gate = detail::effective_gate(max_cost, least, most, n);
-  if (!(gate > -detail::infinity)) return result;
+  w.distance.resize(stride);
   w.price.assign(stride, 0.0);
   w.open_price.resize(stride);
   w.row_of_column.assign(stride, detail::nobody);
@@ -325,7 +346,7 @@ AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_co
   w.visits.resize(n + 1);
 
   detail::AssignmentSolver solver(w, n, m, gate);
-  solver.solve();
+  solver.solve(row_least);
 
   std::vector<double>& short_side = tall ? w.column_saving : w.row_saving;
   std::vector<double>& long_side = tall ? w.row_saving : w.column_saving;
@@ -354,6 +375,7 @@ double assignment_gap(const CostMatrix<Scalar>& costs, double max_cost, span<con
     least = (std::min)(least, c);
     most = (std::max)(most, c);
   }
+  if (!(least < detail::infinity)) least = most = 0;  // no pair is allowed
   const double gate = detail::effective_gate(max_cost, least, most, (std::min)(costs.rows, costs.cols));
   const auto saving_of = [&](std::size_t i, std::size_t j) {
     const double c = limited(costs(i, j));
