@@ -63,7 +63,8 @@ void cfp_gated_0_7(benchmark::State& state) { solve(state, 0.7); }
 #ifdef CFP_HAVE_DLIB
 void dlib_max_cost(benchmark::State& state) {
   const long rows = state.range(0), cols = state.range(1);
-  const std::vector<std::vector<double>> all = problems(static_cast<std::size_t>(rows), static_cast<std::size_t>(cols), static_cast<int>(state.range(2)));
+  const std::vector<std::vector<double>> all =
+      problems(static_cast<std::size_t>(rows), static_cast<std::size_t>(cols), static_cast<int>(state.range(2)));
   const long n = (std::max)(rows, cols);
   dlib::matrix<int> savings(n, n);
   std::size_t k = 0;
@@ -86,7 +87,8 @@ void dlib_max_cost(benchmark::State& state) {
 
 void sizes(benchmark::internal::Benchmark* b) {
   for (const int kind : {0, 1}) {
-    for (const auto& [rows, cols] : {std::pair<int, int>{5, 5}, {5, 8}, {10, 10}, {10, 15}, {50, 50}, {50, 80}, {200, 200}, {200, 300}}) b->Args({rows, cols, kind});
+    for (const auto& [rows, cols] : {std::pair<int, int>{5, 5}, {5, 8}, {10, 10}, {10, 15}, {50, 50}, {50, 80}, {200, 200}, {200, 300}})
+      b->Args({rows, cols, kind});
   }
   b->ArgNames({"rows", "cols", "uniform"});
 }

@@ -27,7 +27,8 @@ struct Walk {
   explicit Walk(std::uint64_t seed) {
     cfp::Random random(seed, "tracker benchmark");
     for (int k = 0; k < 256; ++k) {
-      const double t = k * dt, w = 80 + 6 * std::sin(t), h = 240 + 12 * std::sin(0.7 * t), u = 300 + 120 * std::sin(0.8 * t), v = 240 + 10 * std::cos(t);
+      const double t = k * dt, w = 80 + 6 * std::sin(t), h = 240 + 12 * std::sin(0.7 * t), u = 300 + 120 * std::sin(0.8 * t),
+                   v = 240 + 10 * std::cos(t);
       truth.push_back({u - w / 2, v - h / 2, u + w / 2, v + h / 2});
       const auto& b = truth.back();
       const auto noisy = [&](double edge, double size) { return edge + 0.04 * size * random.normal(); };
@@ -138,7 +139,8 @@ void cfp_frame(benchmark::State& state) {
   std::vector<std::vector<cfp::Detection<Scalar>>> frames(256);
   for (std::size_t k = 0; k < frames.size(); ++k) {
     for (int i = 0; i < n; ++i) {
-      const double x = 20 + 580.0 / n * i + 30 * std::sin(2 * 3.14159265 * static_cast<double>(k) / 256 * (1 + i % 3) + i), y = 100 + 40 * (i % 4);
+      const double x = 20 + 580.0 / n * i + 30 * std::sin(2 * 3.14159265 * static_cast<double>(k) / 256 * (1 + i % 3) + i),
+                   y = 100 + 40 * (i % 4);
       const auto noisy = [&](double edge) { return Scalar(edge + random.normal()); };
       if (random.uniform() > 0.1) frames[k].push_back({{noisy(x), noisy(y), noisy(x + 70), noisy(y + 200)}, 0, Scalar(1)});
     }

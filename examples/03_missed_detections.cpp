@@ -55,8 +55,8 @@ int main(int argc, char** argv) {
     std::printf("frame %zu at %.3f s\n", k, frame.timestamp);
     for (const cfp::TrackedBox<double>& box : result.boxes) {
       std::printf("  %-11s %s %d  [%.0f, %.0f] x [%.0f, %.0f]  age %d%s\n", box.compensated() ? "COMPENSATED" : "detected",
-                  file.classes[static_cast<std::size_t>(box.class_id)].c_str(), static_cast<int>(box.id), box.box.x1, box.box.x2, box.box.y1, box.box.y2,
-                  box.age, box.associated ? "" : "  (new: not in the frame before)");
+                  file.classes[static_cast<std::size_t>(box.class_id)].c_str(), static_cast<int>(box.id), box.box.x1, box.box.x2,
+                  box.box.y1, box.box.y2, box.age, box.associated ? "" : "  (new: not in the frame before)");
     }
   }
   std::printf("%zu frames, %zu boxes compensated\n", file.frames.size(), compensated);

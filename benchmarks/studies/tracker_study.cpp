@@ -66,7 +66,8 @@ Sequence read_mot(const std::string& folder) {
     if (sequence.frames.size() < k) sequence.frames.resize(k);
     return sequence.frames[k - 1];
   };
-  for (const auto& r : read_rows(folder + "/gt.txt")) frame(r[0]).truth.push_back({{r[2], r[3], r[2] + r[4], r[3] + r[5]}, static_cast<int>(r[1])});
+  for (const auto& r : read_rows(folder + "/gt.txt"))
+    frame(r[0]).truth.push_back({{r[2], r[3], r[2] + r[4], r[3] + r[5]}, static_cast<int>(r[1])});
   for (const auto& r : read_rows(folder + "/det.txt")) frame(r[0]).detections.push_back({{r[2], r[3], r[2] + r[4], r[3] + r[5]}, 0, r[6]});
   return sequence;
 }
@@ -82,7 +83,8 @@ Sequence simulate(std::uint64_t seed, bool hand_held, bool use_motion) {
     int burst = 0;
   };
   std::vector<Person> people(4);
-  for (Person& p : people) p = {random.uniform(-1.5, 1.5), random.uniform(1.8, 4.5), random.normal() * 0.6, random.normal() * 0.4, random.uniform(0, 6), 0};
+  for (Person& p : people)
+    p = {random.uniform(-1.5, 1.5), random.uniform(1.8, 4.5), random.normal() * 0.6, random.normal() * 0.4, random.uniform(0, 6), 0};
   double pan = 0, tilt = 0, roll = 0, pan_rate = 0, tilt_rate = 0, roll_rate = 0;
   Matrix3<double> before = Matrix3<double>::Identity();
   const double f = 525, cx = 320, cy = 240;
@@ -142,7 +144,8 @@ Sequence simulate(std::uint64_t seed, bool hand_held, bool use_motion) {
       const bool missed = p.burst > 0 || covered > 0.6;
       p.burst = std::max(0, p.burst - 1);
       const double w = 0.04 * t.box.width(), h = 0.03 * t.box.height();
-      const Box noisy{t.box.x1 + w * random.normal(), t.box.y1 + h * random.normal(), t.box.x2 + w * random.normal(), t.box.y2 + h * random.normal()};
+      const Box noisy{t.box.x1 + w * random.normal(), t.box.y1 + h * random.normal(), t.box.x2 + w * random.normal(),
+                      t.box.y2 + h * random.normal()};
       if (!missed) frame.detections.push_back({noisy, 0, random.uniform(0.5, 1)});
     }
     if (random.uniform() < 0.03) {
@@ -327,11 +330,14 @@ int main(int argc, char** argv) {
     sets[sets.size() - 2].sequences.push_back(simulate(seed, true, true));
     sets[sets.size() - 1].sequences.push_back(every_other(simulate(seed, true, false)));
   }
-  std::printf("%-42s %9s %8s %8s %8s %9s %10s %11s %9s %8s\n", "data, defaults", "missed1-6", "covered", "unseen", "loose", "recovered", "on nothing", "on detected", "switches", "mean IoU");
+  std::printf("%-42s %9s %8s %8s %8s %9s %10s %11s %9s %8s\n", "data, defaults", "missed1-6", "covered", "unseen", "loose", "recovered",
+              "on nothing", "on detected", "switches", "mean IoU");
   for (const DataSet& set : sets) {
     const Figures f = run(set, {});
-    std::printf("%-42s %9.0f %7.1f%% %7.1f%% %7.1f%% %8.1f%% %10.4f %11.4f %9.0f %8.3f\n", set.name.c_str(), f.missed, 100 * f.covered / f.missed,
-                100 * f.unseen / f.missed, 100 * f.loose / f.missed, 100 * f.covered / (f.missed - f.unseen - f.loose), f.on_nothing / f.frames, f.on_detected / f.frames, f.switches, f.overlap / f.overlaps);
+    std::printf("%-42s %9.0f %7.1f%% %7.1f%% %7.1f%% %8.1f%% %10.4f %11.4f %9.0f %8.3f\n", set.name.c_str(), f.missed,
+                100 * f.covered / f.missed, 100 * f.unseen / f.missed, 100 * f.loose / f.missed,
+                100 * f.covered / (f.missed - f.unseen - f.loose), f.on_nothing / f.frames, f.on_detected / f.frames, f.switches,
+                f.overlap / f.overlaps);
   }
   std::printf("\nper data set: covered %% / on nothing per frame / switches\n%-26s", "variant");
   for (const DataSet& set : sets) std::printf("| %-21.21s", set.name.c_str());

@@ -52,7 +52,8 @@ inline DetectionsFile read_detections(std::istream& input, const std::string& na
     if (!(fields >> d.box.x1 >> d.box.y1 >> d.box.x2 >> d.box.y2)) return fail(number, "four numbers x1 y1 x2 y2 must follow the score");
     if (fields >> rest) return fail(number, "surplus '" + rest + "' after the box");
     if (!cfp::is_proper(d.box)) return fail(number, "the box needs x1 < x2 and y1 < y2");
-    if (!file.frames.empty() && timestamp < file.frames.back().timestamp) return fail(number, "the timestamp is before that of the line above");
+    if (!file.frames.empty() && timestamp < file.frames.back().timestamp)
+      return fail(number, "the timestamp is before that of the line above");
     std::size_t id = 0;
     while (id < file.classes.size() && file.classes[id] != label) ++id;
     if (id == file.classes.size()) file.classes.push_back(label);

@@ -34,7 +34,9 @@ std::vector<Scalar> random_costs(cfp::Random& random, std::size_t size, Kind kin
       case Kind::integer_ties: c = Scalar(random.index(4)); break;
       case Kind::overlap: c = random.uniform() < 0.7 ? Scalar(1) : Scalar(random.uniform()); break;
       case Kind::negative: c = Scalar(random.normal()); break;
-      case Kind::sparse: c = random.uniform() < 0.6 ? Scalar(inf) : (random.uniform() < 0.2 ? Scalar(nan_value) : Scalar(random.uniform())); break;
+      case Kind::sparse:
+        c = random.uniform() < 0.6 ? Scalar(inf) : (random.uniform() < 0.2 ? Scalar(nan_value) : Scalar(random.uniform()));
+        break;
     }
   }
   return costs;

@@ -35,7 +35,8 @@ struct DenseBoxFilter {
   void predict(Scalar dt, const cfp::BoxMotionOptions& o) {
     Matrix8 Q = Matrix8::Zero();
     const Scalar w = std::exp(state.mean[2]), h = std::exp(state.mean[3]);
-    const std::array<Scalar, 4> q{Scalar(o.centre_acceleration) * w, Scalar(o.centre_acceleration) * h, Scalar(o.size_acceleration), Scalar(o.size_acceleration)};
+    const std::array<Scalar, 4> q{Scalar(o.centre_acceleration) * w, Scalar(o.centre_acceleration) * h, Scalar(o.size_acceleration),
+                                  Scalar(o.size_acceleration)};
     for (int i = 0; i < 4; ++i) {
       const Scalar d = q[static_cast<std::size_t>(i)] * q[static_cast<std::size_t>(i)];
       Q(i, i) = d * dt * dt * dt / 3;
@@ -53,7 +54,9 @@ struct DenseBoxFilter {
     const Scalar sx = Scalar(o.edge_noise) * std::exp(state.mean[2]), sy = Scalar(o.edge_noise) * std::exp(state.mean[3]);
     const Eigen::Matrix<Scalar, 4, 4> R = Eigen::Matrix<Scalar, 4, 1>(sx * sx, sx * sx, sy * sy, sy * sy).asDiagonal();
     const Eigen::Matrix<Scalar, 4, 1> z(b.x1, b.x2, b.y1, b.y2);
-    REQUIRE(cfp::ekf_update(state, z, [](const Vector8& m, Eigen::Matrix<Scalar, 4, 8>& H) { return cfp::box_edges(m, H); }, R).status == cfp::Status::ok);
+    REQUIRE(cfp::ekf_update(
+                state, z, [](const Vector8& m, Eigen::Matrix<Scalar, 4, 8>& H) { return cfp::box_edges(m, H); }, R)
+                .status == cfp::Status::ok);
   }
 };
 
@@ -65,7 +68,8 @@ void require_equal(const cfp::BoxFilter<Scalar>& split, const DenseBoxFilter<Sca
     REQUIRE_THAT(static_cast<double>(other.state.mean[i]), WithinAbs(static_cast<double>(dense.state.mean[i]), tolerance * scale));
     for (int j = 0; j < 8; ++j) {
       const double size = std::sqrt(static_cast<double>(dense.state.covariance(i, i)) * static_cast<double>(dense.state.covariance(j, j)));
-      REQUIRE_THAT(static_cast<double>(other.state.covariance(i, j)), WithinAbs(static_cast<double>(dense.state.covariance(i, j)), tolerance * size + 1e-12));
+      REQUIRE_THAT(static_cast<double>(other.state.covariance(i, j)),
+                   WithinAbs(static_cast<double>(dense.state.covariance(i, j)), tolerance * size + 1e-12));
     }
   }
 }
@@ -83,7 +87,9 @@ TEMPLATE_TEST_CASE("Four two-state filters are the eight-state EKF on edges", "[
   const double tolerance = std::is_same_v<TestType, float> ? 2e-3 : 1e-10;
   for (int repetition = 0; repetition < 20; ++repetition) {
     const cfp::Box<double> start = random_box(random);
-    const auto cast = [](const cfp::Box<double>& b) { return cfp::Box<TestType>{TestType(b.x1), TestType(b.y1), TestType(b.x2), TestType(b.y2)}; };
+    const auto cast = [](const cfp::Box<double>& b) {
+      return cfp::Box<TestType>{TestType(b.x1), TestType(b.y1), TestType(b.x2), TestType(b.y2)};
+    };
     cfp::BoxFilter<TestType> split = cfp::make_box_filter(cast(start), options);
     DenseBoxFilter<TestType> dense(split);
     for (int k = 0; k < 40; ++k) {
@@ -93,8 +99,8 @@ TEMPLATE_TEST_CASE("Four two-state filters are the eight-state EKF on edges", "[
       require_equal(split, dense, tolerance);
       if (random.uniform() < 0.3) continue;
       const double s = 0.05 * start.width();
-      const cfp::Box<double> seen{start.x1 + 3 * k + s * random.normal(), start.y1 + s * random.normal(), start.x2 + 3 * k + s * random.normal(),
-                                  start.y2 + s * random.normal()};
+      const cfp::Box<double> seen{start.x1 + 3 * k + s * random.normal(), start.y1 + s * random.normal(),
+                                  start.x2 + 3 * k + s * random.normal(), start.y2 + s * random.normal()};
       cfp::update(split, cast(seen), options);
       dense.update(cast(seen), options);
       require_equal(split, dense, tolerance);

@@ -23,8 +23,9 @@ Box shifted(const Box& b, double dx, double dy = 0) { return {b.x1 + dx, b.y1 + 
 Boxes copy(const cfp::BoxTrackerResult<double>& result) { return {result.boxes.begin(), result.boxes.end()}; }
 bool same(const Boxes& a, const Boxes& b) {
   return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), [](const auto& p, const auto& q) {
-           return p.box.x1 == q.box.x1 && p.box.y1 == q.box.y1 && p.box.x2 == q.box.x2 && p.box.y2 == q.box.y2 && p.id == q.id && p.class_id == q.class_id &&
-                  p.score == q.score && p.age == q.age && p.missed == q.missed && p.associated == q.associated && p.compensated() == q.compensated();
+           return p.box.x1 == q.box.x1 && p.box.y1 == q.box.y1 && p.box.x2 == q.box.x2 && p.box.y2 == q.box.y2 && p.id == q.id &&
+                  p.class_id == q.class_id && p.score == q.score && p.age == q.age && p.missed == q.missed &&
+                  p.associated == q.associated && p.compensated() == q.compensated();
          });
 }
 
@@ -129,7 +130,8 @@ TEST_CASE("A given image motion carries predictions through violent rotation", "
       cfp::Matrix3<double> motion = cfp::Matrix3<double>::Identity();
       if (k > 0 && k % 3 == 0) motion(0, 2) = (k / 3) % 2 == 0 ? -60 : 60;
       const bool missed = k > 6 && k % 3 != 2;
-      const auto result = tracker.update(missed ? Detections{} : Detections{{shifted(start, shift), 0, 1}}, 1.0 / 30, given ? &motion : nullptr);
+      const auto result =
+          tracker.update(missed ? Detections{} : Detections{{shifted(start, shift), 0, 1}}, 1.0 / 30, given ? &motion : nullptr);
       kept = kept && result.boxes.size() == 1 && result.boxes[0].id == 1 && cfp::iou(result.boxes[0].box, shifted(start, shift)) > 0.8;
     }
     CHECK(kept == given);
@@ -199,7 +201,8 @@ TEST_CASE("A long gap ends all tracks", "[detection]") {
 
 TEMPLATE_TEST_CASE("Hostile detections, dt and image motion leave finite boxes and a count", "[detection]", float, double) {
   const TestType inf = std::numeric_limits<TestType>::infinity(), nan_ = std::numeric_limits<TestType>::quiet_NaN();
-  const std::vector<TestType> values{nan_, inf, -inf, 0, TestType(1e-40), TestType(1e30), (std::numeric_limits<TestType>::max)(), -1, 10, 50, 100, 400};
+  const std::vector<TestType> values{nan_, inf, -inf, 0,  TestType(1e-40), TestType(1e30), (std::numeric_limits<TestType>::max)(), -1,
+                                     10,   50,  100,  400};
   cfp::Random random(1, "hostile tracker");
   const auto pick = [&] { return values[random.index(static_cast<std::uint32_t>(values.size()))]; };
   cfp::BoxTracker<TestType> tracker(in_image());
@@ -231,7 +234,8 @@ TEST_CASE("The order of the detections changes nothing but their indices", "[det
   for (int k = 0; k < 300; ++k) {
     Detections detections = scene(noise, 8, k);
     const Boxes a = copy(one.update(detections, 1.0 / 30));
-    for (std::size_t i = detections.size(); i > 1; --i) std::swap(detections[i - 1], detections[shuffle.index(static_cast<std::uint32_t>(i))]);
+    for (std::size_t i = detections.size(); i > 1; --i)
+      std::swap(detections[i - 1], detections[shuffle.index(static_cast<std::uint32_t>(i))]);
     REQUIRE(same(a, copy(two.update(detections, 1.0 / 30))));
   }
 }

@@ -46,7 +46,8 @@ TEMPLATE_TEST_CASE("On a linear model the EKF is the textbook Kalman filter", "[
 
     // The oracle, in double, with explicit inverses: information form of the update.
     Eigen::Vector4d x = F.template cast<double>() * state.mean.template cast<double>();
-    Eigen::Matrix4d P = F.template cast<double>() * state.covariance.template cast<double>() * F.template cast<double>().transpose() + Q.template cast<double>();
+    Eigen::Matrix4d P = F.template cast<double>() * state.covariance.template cast<double>() * F.template cast<double>().transpose() +
+                        Q.template cast<double>();
     const Eigen::Matrix<double, 2, 4> Hd = H.template cast<double>();
     const Eigen::Matrix2d Rd = R.template cast<double>();
     const Eigen::Vector2d r = z.template cast<double>() - Hd * x;

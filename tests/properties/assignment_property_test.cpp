@@ -45,7 +45,8 @@ TEST_CASE("Properties of the assignment", "[properties]") {
       RC_ASSERT(result.pairs == best.pairs);
       RC_ASSERT(std::abs(result.cost - best.cost) < 1e-12);
     } else {
-      const double ours = result.cost - gate * static_cast<double>(result.pairs), theirs = best.cost - gate * static_cast<double>(best.pairs);
+      const double ours = result.cost - gate * static_cast<double>(result.pairs),
+                   theirs = best.cost - gate * static_cast<double>(best.pairs);
       RC_ASSERT(std::abs(ours - theirs) < 1e-12);
     }
     RC_ASSERT(std::abs(cfp::assignment_gap(costs, gate, columns, workspace.column_saving)) < 1e-12);
@@ -69,7 +70,9 @@ TEST_CASE("Properties of the assignment", "[properties]") {
     }
     cfp::AssignmentWorkspace workspace;
     std::vector<int> columns(rows), flipped(cols);
-    const auto objective = [&](const cfp::AssignmentResult& r) { return r.cost - (std::isinf(gate) ? 1e3 : gate) * static_cast<double>(r.pairs); };
+    const auto objective = [&](const cfp::AssignmentResult& r) {
+      return r.cost - (std::isinf(gate) ? 1e3 : gate) * static_cast<double>(r.pairs);
+    };
     const double a = objective(cfp::solve_assignment(cfp::CostMatrix(values, rows, cols), gate, columns, workspace));
     const double b = objective(cfp::solve_assignment(cfp::CostMatrix(permuted, rows, cols), gate, columns, workspace));
     const double c = objective(cfp::solve_assignment(cfp::CostMatrix(transposed, cols, rows), gate, flipped, workspace));

@@ -33,7 +33,8 @@ struct CostMatrix {
   [[nodiscard]] Scalar operator()(std::size_t row, std::size_t col) const noexcept { return values[row * cols + col]; }
 };
 template <typename C>
-CostMatrix(const C&, std::size_t, std::size_t) -> CostMatrix<std::remove_cv_t<std::remove_pointer_t<decltype(std::declval<const C&>().data())>>>;
+CostMatrix(const C&, std::size_t, std::size_t)
+    -> CostMatrix<std::remove_cv_t<std::remove_pointer_t<decltype(std::declval<const C&>().data())>>>;
 
 inline constexpr int unassigned = -1;  ///< the column of a row that stays alone
 
@@ -69,7 +70,8 @@ struct AssignmentWorkspace {
 /// 1987. Departure: every row owns a dummy column of cost max_cost, which makes the problem rectangular and gated by itself.
 /// The paper says "Hungarian algorithm" and neither cost nor gate.
 template <typename Scalar>
-AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_cost, span<int> column_of_row, AssignmentWorkspace& workspace);
+AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_cost, span<int> column_of_row,
+                                  AssignmentWorkspace& workspace);
 
 /// How far an assignment may be from the optimum: its objective minus a lower bound that holds by duality for any
 /// `column_saving` (negative or NaN entries count as 0). 0, up to rounding, proves the optimum; the savings that

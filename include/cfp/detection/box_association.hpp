@@ -35,7 +35,8 @@ AssignmentResult associate_boxes(span<const ClassBox<Scalar>> left, span<const C
   for (const ClassBox<Scalar>& a : left) {
     for (const ClassBox<Scalar>& b : right) {
       // Most pairs lie apart; that is cheaper to see than an IoU of 0 is to compute.
-      const bool apart = a.class_id != b.class_id || !(a.box.x1 < b.box.x2 && b.box.x1 < a.box.x2 && a.box.y1 < b.box.y2 && b.box.y1 < a.box.y2);
+      const bool apart =
+          a.class_id != b.class_id || !(a.box.x1 < b.box.x2 && b.box.x1 < a.box.x2 && a.box.y1 < b.box.y2 && b.box.y1 < a.box.y2);
       *cost++ = apart ? std::numeric_limits<double>::infinity() : 1.0 - static_cast<double>(iou(a.box, b.box));
     }
   }

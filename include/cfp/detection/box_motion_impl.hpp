@@ -52,7 +52,8 @@ template <typename Scalar>
 BoxFilter<Scalar> make_box_filter(const Box<Scalar>& box, const BoxMotionOptions& options) noexcept {
   using std::log;
   const Scalar w = box.width(), h = box.height();
-  const Scalar noise = Scalar(options.edge_noise), rate = Scalar(options.initial_centre_rate), size_rate = Scalar(options.initial_size_rate);
+  const Scalar noise = Scalar(options.edge_noise), rate = Scalar(options.initial_centre_rate),
+               size_rate = Scalar(options.initial_size_rate);
   BoxFilter<Scalar> filter;
   filter.u = detail::at_rest(Scalar(0.5) * (box.x1 + box.x2), noise * noise * w * w / Scalar(2), rate * w);
   filter.v = detail::at_rest(Scalar(0.5) * (box.y1 + box.y2), noise * noise * h * h / Scalar(2), rate * h);
@@ -103,8 +104,8 @@ bool warp(BoxFilter<Scalar>& filter, const Eigen::Matrix<Scalar, 3, 3>& H) noexc
   if (!(x >= -far && x <= far && y >= -far && y <= far && width >= low && width <= high && height >= low && height <= high)) return false;
   const RateFilter<Scalar> fu = filter.u, fv = filter.v;
   const auto mix = [](Scalar p, Scalar q, const RateFilter<Scalar>& f, const RateFilter<Scalar>& g, Scalar value) {
-    return RateFilter<Scalar>{value, p * f.rate + q * g.rate, p * p * f.var_value + q * q * g.var_value, p * p * f.covariance + q * q * g.covariance,
-                              p * p * f.var_rate + q * q * g.var_rate};
+    return RateFilter<Scalar>{value, p * f.rate + q * g.rate, p * p * f.var_value + q * q * g.var_value,
+                              p * p * f.covariance + q * q * g.covariance, p * p * f.var_rate + q * q * g.var_rate};
   };
   filter.u = mix(a, b, fu, fv, x);
   filter.v = mix(c, d, fu, fv, y);

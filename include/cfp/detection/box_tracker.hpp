@@ -31,7 +31,8 @@ class BoxTracker {
   /// frame on; a track with at least confirm_hits detections is compensated for up to max_coast frames; one with fewer
   /// ends with the first miss. image_motion, when given, maps pixels of the frame before to this one (see `warp`) and is applied
   /// to the predictions: hand it over when the camera turns fast.
-  BoxTrackerResult<Scalar> update(span<const Detection<Scalar>> detections, Scalar dt_s, const Eigen::Matrix<Scalar, 3, 3>* image_motion = nullptr) {
+  BoxTrackerResult<Scalar> update(span<const Detection<Scalar>> detections, Scalar dt_s,
+                                  const Eigen::Matrix<Scalar, 3, 3>* image_motion = nullptr) {
     BoxTrackerResult<Scalar> result = advance(dt_s, image_motion);
     select(detections, result);
     partner_.resize(tracks_.size());
@@ -92,7 +93,8 @@ class BoxTracker {
     sources_.clear();
     for (std::size_t i = 0; i < detections.size(); ++i) {
       const Detection<Scalar>& d = detections[i];
-      const bool usable = is_proper(d.box) && d.score == d.score && d.box.x1 >= -far && d.box.y1 >= -far && d.box.x2 <= far && d.box.y2 <= far;
+      const bool usable =
+          is_proper(d.box) && d.score == d.score && d.box.x1 >= -far && d.box.y1 >= -far && d.box.x2 <= far && d.box.y2 <= far;
       if (!usable) {
         ++result.skipped;
       } else if (!(static_cast<double>(d.score) >= options_.min_score)) {
@@ -133,7 +135,8 @@ class BoxTracker {
     std::sort(births_.begin(), births_.end(), [this](std::size_t a, std::size_t b) { return key(a) < key(b); });
     for (const std::size_t j : births_) {
       const ClassBox<Scalar>& c = candidates_[j];
-      tracks_.push_back({make_box_filter(c.box, options_.motion), c.box, next_id_++, sources_[j].score, c.class_id, 1, 0, 0, sources_[j].index, false});
+      tracks_.push_back(
+          {make_box_filter(c.box, options_.motion), c.box, next_id_++, sources_[j].score, c.class_id, 1, 0, 0, sources_[j].index, false});
     }
   }
 

@@ -42,7 +42,8 @@ template <typename Scalar, int n, typename Motion, typename Noise>
 /// mean <- mean + K r, P <- (I - K H) P (I - K H)' + K R K' (Joseph's form, symmetrised: P stays positive semi-definite).
 /// `measure(mean, H)` returns h(mean) and writes its Jacobian H (m x n). On any status but ok the state is left as it was.
 template <typename Scalar, int n, int m, typename Measure, typename Noise>
-EkfUpdate ekf_update(EkfState<Scalar, n>& state, const Eigen::Matrix<Scalar, m, 1>& z, Measure&& measure, const Eigen::MatrixBase<Noise>& R) noexcept {
+EkfUpdate ekf_update(EkfState<Scalar, n>& state, const Eigen::Matrix<Scalar, m, 1>& z, Measure&& measure,
+                     const Eigen::MatrixBase<Noise>& R) noexcept {
   using Square = Eigen::Matrix<Scalar, n, n>;
   Eigen::Matrix<Scalar, m, n> H;
   const Eigen::Matrix<Scalar, n, 1> before = state.mean;
@@ -53,7 +54,8 @@ EkfUpdate ekf_update(EkfState<Scalar, n>& state, const Eigen::Matrix<Scalar, m, 
   if (!r.allFinite() || !S.allFinite()) return {Status::invalid_input, 0};
   const Eigen::LDLT<Eigen::Matrix<Scalar, m, m>> solver(S);
   const auto& pivots = solver.vectorD();
-  if (solver.info() != Eigen::Success || !(pivots.minCoeff() > Scalar(Tolerance<Scalar>::degenerate) * pivots.maxCoeff())) return {Status::degenerate, 0};
+  if (solver.info() != Eigen::Success || !(pivots.minCoeff() > Scalar(Tolerance<Scalar>::degenerate) * pivots.maxCoeff()))
+    return {Status::degenerate, 0};
   const Eigen::Matrix<Scalar, n, m> K = solver.solve(HP).transpose();
   const Eigen::Matrix<Scalar, n, 1> mean = before + K * r;
   const Square A = Square::Identity() - K * H;
