@@ -42,11 +42,11 @@ struct AdaptiveOptions {
   DbscanOptions fixed;                ///< for `fixed`, and where a rule has too few values to work on
   DepthNoise noise;
   double noise_factor = 3.0;          ///< eps of every rule but `fixed` is at least so many sigmas at the foreground's depth; >= 0
-  double min_eps_m = 0.12;            ///< foreground_density: a smaller radius tears bodies, limbs become background; > 0
+  double min_eps_m = 0.1;             ///< foreground_density: a smaller radius tears bodies, limbs become background; > 0
   double max_eps_m = 0.3;             ///< foreground_density: a larger one bridges to the wall; >= min_eps_m
   double spacing_factor = 4.0;        ///< foreground_density: eps follows so many mean spacings, for boxes with few points; > 0
   double min_share = 0.15;            ///< nearer depths than this share of all may be a hand or spray: the foreground's depth is read here; (0, 1)
-  double min_density = 0.2;           ///< foreground_density: first share of the foreground's density that a core point must have; (0, 1]
+  double min_density = 0.11;          ///< foreground_density: first share of the foreground's density that a core point must have; (0, 1]
   double max_density = 0.6;           ///< foreground_density: last share tried; [min_density, 1]
   double body_depth_m = 0.5;          ///< foreground_density: the share is raised while the foreground reaches farther behind its depth; > 0
   double k_factor = 3.0;              ///< k_distance_median; > 0
