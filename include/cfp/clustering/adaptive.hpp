@@ -44,9 +44,9 @@ struct AdaptiveOptions {
   double noise_factor = 3.0;          ///< eps of every rule but `fixed` is at least so many sigmas at the foreground's depth; >= 0
   double min_eps_m = 0.1;             ///< foreground_density: a smaller radius tears bodies, limbs become background; > 0
   double max_eps_m = 0.3;             ///< foreground_density: a larger one bridges to the wall; >= min_eps_m
-  double spacing_factor = 4.0;        ///< foreground_density: eps follows so many mean spacings, for boxes with few points; > 0
+  double spacing_factor = 3.5;        ///< foreground_density: eps follows so many mean spacings, for boxes with few points; > 0
   double min_share = 0.15;            ///< nearer depths than this share of all may be a hand or spray: the foreground's depth is read here; (0, 1)
-  double min_density = 0.11;          ///< foreground_density: first share of the foreground's density that a core point must have; (0, 1]
+  double min_density = 0.15;          ///< foreground_density: first share of the foreground's density that a core point must have; (0, 1]
   double max_density = 0.6;           ///< foreground_density: last share tried; [min_density, 1]
   double body_depth_m = 0.5;          ///< foreground_density: the share is raised while the foreground reaches farther behind its depth; > 0
   double k_factor = 3.0;              ///< k_distance_median; > 0
@@ -73,7 +73,7 @@ struct AdaptiveOptions {
 /// Grows to the largest input seen, then allocates nothing.
 template <typename Scalar>
 struct AdaptiveWorkspace {
-  std::vector<std::uint32_t> counts;
+  std::vector<unsigned char> core;
   KDistanceWorkspace<Scalar> k_distance;
 };
 
@@ -85,26 +85,13 @@ constexpr std::size_t foreground_position(std::size_t n, const AdaptiveOptions& 
   return at < n ? at : n - 1;
 }
 
-// counts[i] = how many ascending values lie within eps of value i.
-template <typename Scalar>
-void count_neighbours(span<const Scalar> values, Scalar eps, std::vector<std::uint32_t>& counts) {
-  const std::size_t n = values.size();
-  counts.resize(n);
-  const Scalar* v = values.data();
-  for (std::size_t i = 0, begin = 0, end = 0; i < n; ++i) {
-    while (!(v[i] - v[begin] <= eps)) ++begin;
-    while (end < n && v[end] - v[i] <= eps) ++end;
-    counts[i] = static_cast<std::uint32_t>(end - begin);
-  }
-}
-
 // The last core point of the first cluster that ends at or behind position `least`; n when no cluster does.
 template <typename Scalar>
-std::size_t foreground_end(span<const Scalar> values, Scalar eps, std::size_t min_pts, std::size_t least, const std::vector<std::uint32_t>& counts) noexcept {
+std::size_t foreground_end(span<const Scalar> values, Scalar eps, std::size_t least, const std::vector<unsigned char>& core) noexcept {
   const std::size_t n = values.size();
   std::size_t last = n;
   for (std::size_t i = 0; i < n; ++i) {
-    if (counts[i] < min_pts) continue;
+    if (core[i] == 0) continue;
     if (last != n && last >= least && !(values[i] - values[last] <= eps)) return last;
     last = i;
   }
@@ -121,16 +108,20 @@ DbscanOptions density_options(span<const Scalar> depths, const AdaptiveOptions& 
   chosen.eps = (std::min)((std::max)(options.min_eps_m, options.spacing_factor * spacing), options.max_eps_m);
   chosen.eps = (std::max)(chosen.eps, floor_m);
   const Scalar eps = static_cast<Scalar>(chosen.eps);
-  count_neighbours(depths, eps, workspace.counts);
-  std::uint32_t peak = 0;
-  for (std::size_t i = 0; i < n && (i <= at || depths[i] - depths[at] <= eps); ++i) peak = (std::max)(peak, workspace.counts[i]);
+  std::size_t peak = 0;
+  for (std::size_t i = 0, begin = 0, end = 0; i < n && (i <= at || depths[i] - depths[at] <= eps); ++i) {
+    while (!(depths[i] - depths[begin] <= eps)) ++begin;
+    while (end < n && depths[end] - depths[i] <= eps) ++end;
+    peak = (std::max)(peak, end - begin);
+  }
 
   std::size_t nearest = n, tried = 0;
   for (double share = options.min_density; share <= options.max_density; share *= 1.4) {
     const auto min_pts = (std::max)(std::size_t(2), static_cast<std::size_t>(std::ceil(share * static_cast<double>(peak))));
     if (min_pts == tried) continue;
     tried = min_pts;
-    const std::size_t end = foreground_end(depths, eps, min_pts, at, workspace.counts);
+    find_core_points(depths, eps, min_pts, workspace.core);
+    const std::size_t end = foreground_end(depths, eps, at, workspace.core);
     if (end >= nearest && nearest != n) continue;
     nearest = end;
     chosen.min_pts = min_pts;
