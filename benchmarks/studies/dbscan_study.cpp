@@ -116,7 +116,7 @@ void print_table(const std::vector<std::vector<Box>>& boxes, bool all_background
   print("KANN-DBSCAN", rivals.back());
   Row best(sizes.size());
   for (const double eps : {0.05, 0.1, 0.15, 0.2, 0.3}) {
-    for (const std::size_t min_pts : {3, 5, 10, 20, 40}) {
+    for (const std::size_t min_pts : std::vector<std::size_t>{3, 5, 10, 20, 40}) {
       cfp::ForegroundOptions options;
       options.adaptive.rule = cfp::AdaptiveRule::fixed;
       options.adaptive.fixed = {eps, min_pts};

@@ -20,7 +20,7 @@ namespace cfp {
 /// One standard deviation of a depth measurement, in metres: constant + quadratic (z - nearest)^2.
 struct DepthNoise {
   double constant_m = 0.0012;    ///< >= 0
-  double quadratic = 0.0019;     ///< 1/m, >= 0; for stereo: constant 0, nearest 0, quadratic = sigma_disparity_px / (fx_px baseline_m)
+  double quadratic = 0.0019;     ///< 1/m, >= 0; for stereo: constant_m 0, nearest_m 0, quadratic = sigma_disparity_px / (fx_px baseline_m)
   double nearest_m = 0.4;        ///< defaults: structured light, Nguyen, Izadi and Lovell, 3DIMPVT 2012
 
   /// Example: 0.0140 m at z = 3 m with the defaults.
@@ -42,7 +42,7 @@ struct AdaptiveOptions {
   DbscanOptions fixed;                ///< for `fixed`, and where a rule has too few values to work on
   DepthNoise noise;
   double noise_factor = 3.0;          ///< eps of every rule but `fixed` is at least so many sigmas at the foreground's depth; >= 0
-  double min_eps_m = 0.1;             ///< foreground_density: a smaller radius tears bodies, limbs become background; > 0
+  double min_eps_m = 0.1;             ///< foreground_density: smallest radius; a smaller one tears bodies, limbs become background; > 0
   double max_eps_m = 0.3;             ///< foreground_density: a larger one bridges to the wall; >= min_eps_m
   double spacing_factor = 3.5;        ///< foreground_density: eps follows so many mean spacings, for boxes with few points; > 0
   double min_share = 0.15;            ///< nearer depths than this share of all may be a hand or spray: the foreground's depth is read here; (0, 1)
@@ -107,7 +107,7 @@ DbscanOptions density_options(span<const Scalar> depths, const AdaptiveOptions& 
   DbscanOptions chosen;
   chosen.eps = (std::min)((std::max)(options.min_eps_m, options.spacing_factor * spacing), options.max_eps_m);
   chosen.eps = (std::max)(chosen.eps, floor_m);
-  const Scalar eps = static_cast<Scalar>(chosen.eps);
+  const Scalar eps = detail::radius<Scalar>(chosen.eps);
   std::size_t peak = 0;
   for (std::size_t i = 0, begin = 0, end = 0; i < n && (i <= at || depths[i] - depths[at] <= eps); ++i) {
     while (!(depths[i] - depths[begin] <= eps)) ++begin;
@@ -135,11 +135,12 @@ DbscanOptions density_options(span<const Scalar> depths, const AdaptiveOptions& 
 /// eps (metres) and min_pts for depths that are valid and ascending.
 /// The default reads the foreground's depth z at `min_share`, sets eps to `spacing_factor` mean spacings around it within
 /// [min_eps_m, max_eps_m], counts the neighbours of the points up to z + eps, and asks of a core point `min_density` of the
-/// largest count. So min_pts grows with n and with the density of the foreground, not of the wall. While the foreground
+/// largest count, at least 2. So min_pts grows with n and with the density of the foreground, not of the wall. While the foreground
 /// then reaches more than `body_depth_m` behind z, that share is raised by 1.4: what connects a body to a wall or to a
 /// slanted plane is thinner than the body. The share with the nearest end stands.
-/// Fewer than three depths: `fixed`. Never less than noise_factor sigmas. O(n), but O(n min(n / 2, 200)) for KANN and O(n k)
-/// for the median. Allocates only when the workspace grows. Source: ours, paper IV-C leaves it open.
+/// Fewer than three depths, or an eps that overflows: `fixed`. eps of every other rule is at least noise_factor sigmas at z.
+/// O(n), but O(n min(n / 2, 200)) for KANN and O(n k) for the median. Allocates only when the workspace grows.
+/// Source: ours; paper IV-C leaves it open.
 template <typename Scalar>
 [[nodiscard]] DbscanOptions adaptive_options(span<const Scalar> depths, const AdaptiveOptions& options, AdaptiveWorkspace<Scalar>& workspace) {
   CFP_ASSERT(std::is_sorted(depths.begin(), depths.end()));

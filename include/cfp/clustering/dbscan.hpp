@@ -3,7 +3,10 @@
 /// In one dimension neighbourhoods are runs of the sorted values, so no tree and no quadratic search is needed.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "cfp/clustering/ascending.hpp"
@@ -44,6 +47,12 @@ struct DbscanWorkspace {
 
 namespace detail {
 
+// eps in the type of the values; a finite double beyond the range of float counts as the largest float.
+template <typename Scalar>
+[[nodiscard]] constexpr Scalar radius(double eps) noexcept {
+  return eps < static_cast<double>((std::numeric_limits<Scalar>::max)()) ? static_cast<Scalar>(eps) : (std::numeric_limits<Scalar>::max)();
+}
+
 // core[i] = whether at least min_pts of the ascending values lie within eps of value i.
 template <typename Scalar>
 void find_core_points(span<const Scalar> values, Scalar eps, std::size_t min_pts, std::vector<unsigned char>& core) {
@@ -79,7 +88,7 @@ DbscanResult sweep(span<const Scalar> values, const DbscanOptions& options, std:
     result.noise = n;
     return result;
   }
-  const Scalar eps = static_cast<Scalar>(options.eps);
+  const Scalar eps = radius<Scalar>(options.eps);
   find_core_points(values, eps, options.min_pts, core);
   const std::size_t none = n;
   std::size_t left = none;  // the last core point seen

@@ -43,7 +43,7 @@ DbscanVerdict verify_dbscan(span<const Scalar> values, const DbscanOptions& opti
                             const DbscanVerifierOptions& strictness = {}) {
   const std::size_t n = values.size();
   if (labels.size() != n) return {DbscanFault::label_count, 0};
-  const Scalar eps = static_cast<Scalar>(options.eps);
+  const Scalar eps = detail::radius<Scalar>(options.eps);
   const auto distance = [&](std::size_t a, std::size_t b) { return values[a] < values[b] ? values[b] - values[a] : values[a] - values[b]; };
   const auto near = [&](std::size_t a, std::size_t b) { return is_finite(values[a]) && is_finite(values[b]) && distance(a, b) <= eps; };
 

@@ -19,9 +19,9 @@ namespace cfp {
 
 struct ForegroundOptions {
   AdaptiveOptions adaptive;
-  double merge_gap_m = 0.2;     ///< a cluster that begins so near behind the foreground and ends within body_depth_m joins it; >= 0, 0: none
-  std::size_t min_points = 6;   ///< fewer valid depths: too_few_points; >= 1
-  std::size_t sure_points = 18; ///< with fewer valid depths the split must also hold for a smaller and a larger eps
+  double merge_gap_m = 0.2;      ///< a cluster that begins so near behind the foreground and ends within body_depth_m joins it; >= 0, 0: none
+  std::size_t min_points = 6;    ///< fewer valid depths: too_few_points; >= 1
+  std::size_t sure_points = 18;  ///< with fewer valid depths the split must also hold for a smaller and a larger eps
   bool invalid_is_foreground = true;  ///< label of points without a valid depth: true is the safe side
 };
 
@@ -31,12 +31,12 @@ struct ForegroundOptions {
   return options.min_points >= 1 ? nullptr : "min_points";
 }
 
-/// Every way of ending but `ok` says that the depths cannot tell, and labels every point foreground: the safe side, as the paper
-/// gives foreground points of a moving person the probability 0.
+/// Every way of ending but `ok` says that the depths cannot tell, and labels every point with a valid depth foreground: the safe
+/// side, as the paper gives foreground points of a moving person the probability 0.
 enum class ForegroundStatus : std::uint8_t {
   ok,
   too_few_points,  ///< fewer valid depths than min_points
-  no_cluster,      ///< no cluster reaches the minimum share: everything is noise
+  no_cluster,      ///< no cluster reaches past the minimum share of the points
   unstable         ///< few points, and a slightly smaller or larger eps splits them elsewhere
 };
 
@@ -101,14 +101,16 @@ std::size_t foreground_count(span<const Scalar> depths, const DbscanOptions& par
 
 }  // namespace detail
 
-/// mask[i] = 1 for foreground, 0 for background. Clusters the valid depths (finite, > 0) with `adaptive_options`; the foreground
-/// ends where the first cluster ends at or before whose end `min_share` of the points lie, and everything nearer goes with it: smaller
-/// clusters (a hand) and noise (spray at silhouettes). With min_share 0 it is the paper's cluster of the lowest mean
-/// depth and the noise before it.
+/// mask[i] = 1 for foreground, 0 for background. Clusters the valid depths (finite, > 0) with `adaptive_options`. The foreground ends
+/// where the first cluster ends that reaches past the nearest `adaptive.min_share` of the points; a cluster that begins within
+/// `merge_gap_m` behind it, and ends within `adaptive.body_depth_m` of the foreground's depth, joins it; everything nearer goes with
+/// it, smaller clusters (a hand) and noise (spray at silhouettes) alike. The result is a cut in depth.
 /// Fewer than `sure_points` valid depths: the split is repeated with eps x 0.7 and x 1.4, and unless both agree to within one
 /// point in ten, the status is `unstable`. One cluster only is `ok`: everything is foreground because it is one layer.
+/// Points without a valid depth take no part and get the label `invalid_is_foreground` says, whatever the status.
 /// O(n log n), in practice O(n); deterministic; permuting the points permutes the mask; allocates only when the workspace grows.
-/// Departure from the paper: the minimum share; without it the commonest failure is a tiny near cluster that wins.
+/// Departures from the paper, which takes the cluster of the lowest mean depth (dbscan_study shows what they bring): the minimum share,
+/// for without it a tiny near cluster wins; and joining, for plain clothes leave gaps in a body.
 template <typename Scalar>
 ForegroundResult depth_foreground(span<const Scalar> depths_m, const ForegroundOptions& options, ForegroundWorkspace<Scalar>& workspace, span<char> mask) {
   CFP_ASSERT(mask.size() == depths_m.size());

@@ -1,5 +1,5 @@
 /// @file k_distance.hpp
-/// Rules of the literature that read DBSCAN's eps and min_pts off the distances to the k-th neighbour (FIELD: k-distance
+/// Rules of the literature that read DBSCAN's eps and min_pts off the distances to the k-th neighbour (k-distance
 /// median, k-distance knee, KANN-DBSCAN), on ascending values, where a neighbour search is a walk. `adaptive.hpp` offers them by name.
 #pragma once
 
@@ -105,7 +105,7 @@ template <typename Scalar>
     trial.eps = 0;
     for (const Scalar distance : workspace.distances) trial.eps += static_cast<double>(distance) / static_cast<double>(n);
     if (!is_finite(trial.eps)) return fallback;
-    const Scalar eps = static_cast<Scalar>(trial.eps);
+    const Scalar eps = detail::radius<Scalar>(trial.eps);
     double pairs = 0;  // ordered pairs within eps, each value with itself included
     for (std::size_t i = 0, begin = 0; i < n; ++i) {
       while (!(values[i] - values[begin] <= eps)) ++begin;
