@@ -3,6 +3,9 @@
 //   02_depth_foreground image RGB.png DEPTH.png UNITS_PER_METRE OUT.png X1 Y1 X2 Y2 [X1 Y1 X2 Y2 ...]
 //   02_depth_foreground sequence TUM_FOLDER OUT_FOLDER [UNITS_PER_METRE = 5000]
 //
+// For instance, with the frame of five people (1000 units per metre) and its boxes:
+//   ... image rgb.png depth_mm.png 1000 out.png 15 62 155 480 143 95 245 480 276 103 384 442 362 103 470 462 460 50 606 480
+//
 // A TUM folder has rgb.txt, depth.txt (timestamp filename) and detections.txt (timestamp class score x1 y1 x2 y2). One picture is
 // written per frame, and a contact sheet of nine.
 #include <algorithm>
@@ -40,10 +43,8 @@ cv::Mat annotate(const cv::Mat& rgb, const cv::Mat& depth, double units_per_metr
       points.push_back(keypoint.pt);
       depths.push_back(static_cast<float>(depth.at<std::uint16_t>(cvRound(keypoint.pt.y), cvRound(keypoint.pt.x)) / units_per_metre));
     }
-    // README: depth_foreground
     std::vector<char> foreground(depths.size());
     const cfp::ForegroundResult result = cfp::depth_foreground<float>(depths, {}, workspace, foreground);
-    // README: end
     for (std::size_t i = 0; i < points.size(); ++i) {
       const cv::Scalar colour = depths[i] <= 0 ? cv::Scalar(160, 160, 160) : foreground[i] != 0 ? cv::Scalar(0, 0, 255) : cv::Scalar(0, 220, 0);
       cv::circle(picture, points[i], 2, colour, cv::FILLED, cv::LINE_AA);

@@ -1,14 +1,15 @@
 // Which rule for DBSCAN's eps and min_pts tells people from what is behind them? The default of clustering/adaptive.hpp rests on
 // the tables printed here.
 //
-//   dbscan_study [scenes per scenario, default 150] [seed stream, default "report"]
+//   dbscan_study [scenes per scenario, default 150] [seed stream, default "report"] [folder of the real recordings]
 //
 // The scenes (support/person_scene.hpp) were looked at under the stream "tune" while the default was chosen; the tables below
 // come from another stream. Every rule gets the same foreground selection and the same sensor floor; `best fixed` is, for
 // every column anew, the best of 25 fixed settings. Judged per box and averaged: the share of foreground points labelled
 // foreground, and of background points labelled background. Points without depth or with a depth mixed from two surfaces take part in
 // the clustering but are not judged. Table 1 judges the background behind the person's farthest surface, what depth can
-// decide; table 2 all background, with the ceiling that the best cut per box, knowing the truth, reaches.
+// decide; table 2 all background, with the ceiling that the best cut per box, knowing the truth, reaches. Pictures of real frames:
+// examples/02_depth_foreground.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
