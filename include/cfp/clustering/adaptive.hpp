@@ -45,7 +45,7 @@ struct AdaptiveOptions {
   double min_eps_m = 0.1;             ///< foreground_density: smallest radius; a smaller one tears bodies, limbs become background; > 0
   double max_eps_m = 0.3;             ///< foreground_density: a larger one bridges to the wall; >= min_eps_m
   double spacing_factor = 3.5;        ///< foreground_density: eps follows so many mean spacings, for boxes with few points; > 0
-  double min_share = 0.15;            ///< nearer depths than this share of all may be a hand or spray: the foreground's depth is read here; (0, 1)
+  double min_share = 0.15;            ///< nearer ones may be a hand or spray: the foreground's depth is read at this share of all; (0, 1)
   double min_density = 0.15;          ///< foreground_density: first share of the foreground's density that a core point must have; (0, 1]
   double max_density = 0.6;           ///< foreground_density: last share tried; [min_density, 1]
   double body_depth_m = 0.5;          ///< foreground_density: the share is raised while the foreground reaches farther behind its depth; > 0
@@ -99,7 +99,8 @@ std::size_t foreground_end(span<const Scalar> values, Scalar eps, std::size_t le
 }
 
 template <typename Scalar>
-DbscanOptions density_options(span<const Scalar> depths, const AdaptiveOptions& options, double floor_m, std::size_t at, AdaptiveWorkspace<Scalar>& workspace) {
+DbscanOptions density_options(span<const Scalar> depths, const AdaptiveOptions& options, double floor_m, std::size_t at,
+                              AdaptiveWorkspace<Scalar>& workspace) {
   const std::size_t n = depths.size();
   const auto around = (std::max)(std::size_t(3), static_cast<std::size_t>(std::lround(0.5 * std::sqrt(static_cast<double>(n)))));
   const std::size_t low = at > around ? at - around : 0, high = (std::min)(n - 1, at + around);
@@ -107,7 +108,7 @@ DbscanOptions density_options(span<const Scalar> depths, const AdaptiveOptions& 
   DbscanOptions chosen;
   chosen.eps = (std::min)((std::max)(options.min_eps_m, options.spacing_factor * spacing), options.max_eps_m);
   chosen.eps = (std::max)(chosen.eps, floor_m);
-  const Scalar eps = detail::radius<Scalar>(chosen.eps);
+  const Scalar eps = radius<Scalar>(chosen.eps);
   std::size_t peak = 0;
   for (std::size_t i = 0, begin = 0, end = 0; i < n && (i <= at || depths[i] - depths[at] <= eps); ++i) {
     while (!(depths[i] - depths[begin] <= eps)) ++begin;

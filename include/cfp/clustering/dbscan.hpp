@@ -144,7 +144,8 @@ DbscanResult dbscan(span<const Scalar> values, const DbscanOptions& options, Dbs
   const std::size_t invalid = values.size() - ascending.values.size();
   if (invalid > 0) std::fill(out, out + values.size(), dbscan_noise);
   const std::uint32_t* index = ascending.index.data();
-  DbscanResult result = detail::sweep(ascending.values, options, workspace.core, [out, index](std::size_t i, int label) { out[index[i]] = label; });
+  const auto emit = [out, index](std::size_t i, int label) { out[index[i]] = label; };
+  DbscanResult result = detail::sweep(ascending.values, options, workspace.core, emit);
   result.invalid = invalid;
   return result;
 }

@@ -95,7 +95,8 @@ DbscanVerdict verify_dbscan(span<const Scalar> values, const DbscanOptions& opti
     for (std::size_t j = 0; j < n; ++j) {
       if (core[j] == 0 || !near(i, j)) continue;
       own = own || labels[j] == labels[i];
-      const bool better = nearest == n || distance(i, j) < distance(i, nearest) || (distance(i, j) == distance(i, nearest) && values[j] < values[nearest]);
+      const bool better = nearest == n || distance(i, j) < distance(i, nearest) ||
+                          (distance(i, j) == distance(i, nearest) && values[j] < values[nearest]);
       if (better) nearest = j;
     }
     if (nearest == n) {

@@ -87,7 +87,9 @@ std::size_t foreground_count(span<const Scalar> depths, const DbscanOptions& par
       continue;
     }
     std::size_t end = i + 1;
-    for (std::size_t j = end; j < n && workspace.labels[j] <= workspace.labels[i]; ++j) end = workspace.labels[j] == workspace.labels[i] ? j + 1 : end;
+    for (std::size_t j = end; j < n && workspace.labels[j] <= workspace.labels[i]; ++j) {
+      if (workspace.labels[j] == workspace.labels[i]) end = j + 1;
+    }
     const bool enough = count > at;
     if (enough && !(static_cast<double>(depths[i]) - static_cast<double>(depths[count - 1]) <= options.merge_gap_m &&
                     static_cast<double>(depths[end - 1]) <= limit)) {
@@ -112,7 +114,8 @@ std::size_t foreground_count(span<const Scalar> depths, const DbscanOptions& par
 /// Departures from the paper, which takes the cluster of the lowest mean depth (dbscan_study shows what they bring): the minimum share,
 /// for without it a tiny near cluster wins; and joining, for plain clothes leave gaps in a body.
 template <typename Scalar>
-ForegroundResult depth_foreground(span<const Scalar> depths_m, const ForegroundOptions& options, ForegroundWorkspace<Scalar>& workspace, span<char> mask) {
+ForegroundResult depth_foreground(span<const Scalar> depths_m, const ForegroundOptions& options, ForegroundWorkspace<Scalar>& workspace,
+                                  span<char> mask) {
   CFP_ASSERT(mask.size() == depths_m.size());
   const Ascending<Scalar> ascending = sort_ascending(depths_m, workspace.ascending, [](Scalar depth) { return is_valid_depth(depth); });
   const span<const Scalar> depths = ascending.values;

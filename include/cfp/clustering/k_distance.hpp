@@ -73,7 +73,8 @@ template <typename Scalar>
   const std::vector<Scalar>& curve = workspace.distances;
   if (curve.empty()) return Scalar(0);
   std::sort(workspace.distances.begin(), workspace.distances.end());
-  const double last = static_cast<double>(curve.size() - 1), low = static_cast<double>(curve.front()), rise = static_cast<double>(curve.back()) - low;
+  const double last = static_cast<double>(curve.size() - 1), low = static_cast<double>(curve.front());
+  const double rise = static_cast<double>(curve.back()) - low;
   std::size_t knee = 0;
   double depth = 0;
   for (std::size_t i = 0; i < curve.size(); ++i) {
