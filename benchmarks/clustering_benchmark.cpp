@@ -28,7 +28,9 @@ std::vector<std::vector<Scalar>> make_boxes(std::size_t n) {
   for (auto& box : out) {
     for (std::size_t i = 0; i < n; ++i) {
       const double kind = random.uniform();
-      box.push_back(static_cast<Scalar>(kind < 0.5 ? 2.0 + 0.12 * random.normal() : kind < 0.9 ? 3.5 + 0.05 * random.normal() : random.uniform(1, 6)));
+      box.push_back(static_cast<Scalar>(kind < 0.5   ? 2.0 + 0.12 * random.normal()
+                                        : kind < 0.9 ? 3.5 + 0.05 * random.normal()
+                                                     : random.uniform(1, 6)));
     }
   }
   return out;
@@ -125,7 +127,8 @@ struct Cloud {
 void nanoflann_dbscan(benchmark::State& state) {
   run<float>(state, [](const std::vector<float>& values, std::vector<int>& labels) {
     const Cloud cloud{&values};
-    const nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Cloud, float, std::uint32_t>, Cloud, 1, std::uint32_t> tree(1, cloud);
+    const nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Cloud, float, std::uint32_t>, Cloud, 1, std::uint32_t>
+        tree(1, cloud);
     std::vector<std::pair<std::uint32_t, float>> found;
     const nanoflann::SearchParams unsorted(32, 0.0F, false);
     return flood<float>(

@@ -46,16 +46,21 @@ cv::Mat annotate(const cv::Mat& rgb, const cv::Mat& depth, double units_per_metr
     std::vector<char> foreground(depths.size());
     const cfp::ForegroundResult result = cfp::depth_foreground<float>(depths, {}, workspace, foreground);
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const cv::Scalar colour = depths[i] <= 0 ? cv::Scalar(160, 160, 160) : foreground[i] != 0 ? cv::Scalar(0, 0, 255) : cv::Scalar(0, 220, 0);
+      const cv::Scalar colour = depths[i] <= 0       ? cv::Scalar(160, 160, 160)
+                                : foreground[i] != 0 ? cv::Scalar(0, 0, 255)
+                                                     : cv::Scalar(0, 220, 0);
       cv::circle(picture, points[i], 2, colour, cv::FILLED, cv::LINE_AA);
     }
     char text[160];
     std::snprintf(text, sizeof text, "%.2f-%.2f m", result.near_m, result.far_m);
     cv::rectangle(picture, cv::Point2f(box.x1, box.y1), cv::Point2f(box.x2, box.y2), cv::Scalar(255, 160, 0), 1);
-    cv::putText(picture, text, cv::Point2f(box.x1 + 2, box.y1 + 12), cv::FONT_HERSHEY_SIMPLEX, 0.4, cv::Scalar(255, 255, 255), 1, cv::LINE_AA);
-    std::printf("box %.0f %.0f %.0f %.0f: %s, foreground %zu (%.2f to %.2f m), background %zu, without depth %zu, eps %.3f m, min_pts %zu\n",
-                static_cast<double>(box.x1), static_cast<double>(box.y1), static_cast<double>(box.x2), static_cast<double>(box.y2), to_string(result.status),
-                result.foreground, result.near_m, result.far_m, result.background, result.invalid, result.dbscan.eps, result.dbscan.min_pts);
+    cv::putText(picture, text, cv::Point2f(box.x1 + 2, box.y1 + 12), cv::FONT_HERSHEY_SIMPLEX, 0.4, cv::Scalar(255, 255, 255), 1,
+                cv::LINE_AA);
+    std::printf(
+        "box %.0f %.0f %.0f %.0f: %s, foreground %zu (%.2f to %.2f m), background %zu, without depth %zu, eps %.3f m, min_pts %zu\n",
+        static_cast<double>(box.x1), static_cast<double>(box.y1), static_cast<double>(box.x2), static_cast<double>(box.y2),
+        to_string(result.status), result.foreground, result.near_m, result.far_m, result.background, result.invalid, result.dbscan.eps,
+        result.dbscan.min_pts);
   }
   return picture;
 }
@@ -79,7 +84,8 @@ std::vector<Stamped> read_stamped(const std::filesystem::path& file) {
 }
 
 int run_sequence(const std::filesystem::path& folder, const std::filesystem::path& out, double units_per_metre) {
-  const std::vector<Stamped> images = read_stamped(folder / "rgb.txt"), depths = read_stamped(folder / "depth.txt"), detections = read_stamped(folder / "detections.txt");
+  const std::vector<Stamped> images = read_stamped(folder / "rgb.txt"), depths = read_stamped(folder / "depth.txt"),
+                             detections = read_stamped(folder / "detections.txt");
   if (images.empty() || depths.empty() || detections.empty()) {
     std::fprintf(stderr, "%s: needs rgb.txt, depth.txt and detections.txt with at least one line each\n", folder.c_str());
     return 1;
@@ -88,9 +94,11 @@ int run_sequence(const std::filesystem::path& folder, const std::filesystem::pat
   std::vector<cv::Mat> sheet;
   for (std::size_t i = 0; i < images.size(); ++i) {
     const Stamped& image = images[i];
-    const auto nearest = std::min_element(depths.begin(), depths.end(),
-                                          [&](const Stamped& a, const Stamped& b) { return std::abs(a.time - image.time) < std::abs(b.time - image.time); });
-    const cv::Mat rgb = cv::imread((folder / image.rest).string()), depth = cv::imread((folder / nearest->rest).string(), cv::IMREAD_UNCHANGED);
+    const auto nearest = std::min_element(depths.begin(), depths.end(), [&](const Stamped& a, const Stamped& b) {
+      return std::abs(a.time - image.time) < std::abs(b.time - image.time);
+    });
+    const cv::Mat rgb = cv::imread((folder / image.rest).string()),
+                  depth = cv::imread((folder / nearest->rest).string(), cv::IMREAD_UNCHANGED);
     if (rgb.empty() || depth.type() != CV_16U || depth.size() != rgb.size()) {
       std::fprintf(stderr, "frame %s: no colour image, or no 16-bit depth image of its size\n", image.rest.c_str());
       continue;
@@ -101,7 +109,9 @@ int run_sequence(const std::filesystem::path& folder, const std::filesystem::pat
       std::string name;
       double score = 0;
       Box box;
-      if (std::abs(detection.time - image.time) < 0.005 && words >> name >> score >> box.x1 >> box.y1 >> box.x2 >> box.y2 && name == "person") boxes.push_back(box);
+      if (std::abs(detection.time - image.time) < 0.005 && words >> name >> score >> box.x1 >> box.y1 >> box.x2 >> box.y2 &&
+          name == "person")
+        boxes.push_back(box);
     }
     std::printf("%s\n", image.rest.c_str());
     const cv::Mat picture = annotate(rgb, depth, units_per_metre, boxes);
@@ -134,7 +144,8 @@ int main(int argc, char* argv[]) {
     }
     std::vector<Box> boxes;
     for (int i = 6; i + 3 < argc; i += 4) {
-      boxes.push_back({std::strtof(argv[i], nullptr), std::strtof(argv[i + 1], nullptr), std::strtof(argv[i + 2], nullptr), std::strtof(argv[i + 3], nullptr)});
+      boxes.push_back({std::strtof(argv[i], nullptr), std::strtof(argv[i + 1], nullptr), std::strtof(argv[i + 2], nullptr),
+                       std::strtof(argv[i + 3], nullptr)});
     }
     return cv::imwrite(argv[5], annotate(rgb, depth, std::atof(argv[4]), boxes)) ? 0 : 1;
   }

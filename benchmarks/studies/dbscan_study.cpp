@@ -105,7 +105,8 @@ void print_table(const std::vector<std::vector<Box>>& boxes, bool all_background
       return label(points, options);
     });
   };
-  print("best cut (ceiling)", evaluate(boxes, all_background, [all_background](const Keypoints& points) { return best_cut(points, all_background); }));
+  print("best cut (ceiling)",
+        evaluate(boxes, all_background, [all_background](const Keypoints& points) { return best_cut(points, all_background); }));
   const Row ours = rule_row(cfp::AdaptiveRule::foreground_density);
   print("foreground density", ours);
   std::vector<Row> rivals;

@@ -2,7 +2,8 @@
 // person, ray-cast through a detection box, with structured-light noise. What is hard in real frames is in here on purpose:
 // limbs nearer than the body by more than the sensor's noise, walls a hand's breadth behind the back, floors and slanted walls
 // that cross the body's depth range, mixed ("flying") pixels along silhouettes, missing depth, and keypoints in clumps that
-// crowd at silhouettes and leave plain parts empty. Points of a crossing plane at the body's own depth cannot be told apart by depth at all; no rule reaches 100 %.
+// crowd at silhouettes and leave plain parts empty. Points of a crossing plane at the body's own depth cannot be told apart by depth at
+// all; no rule reaches 100 %.
 #pragma once
 
 #include <algorithm>
@@ -23,10 +24,12 @@ namespace cfp_study {
 using Eigen::Vector3d;
 
 enum class Scenario { wall_far, wall_close, slanted_wall, desk_and_clutter, two_people, outstretched_arm, sitting };
-inline constexpr std::array<Scenario, 7> scenarios{Scenario::wall_far,   Scenario::wall_close,       Scenario::slanted_wall, Scenario::desk_and_clutter,
-                                                   Scenario::two_people, Scenario::outstretched_arm, Scenario::sitting};
+inline constexpr std::array<Scenario, 7> scenarios{Scenario::wall_far,         Scenario::wall_close, Scenario::slanted_wall,
+                                                   Scenario::desk_and_clutter, Scenario::two_people, Scenario::outstretched_arm,
+                                                   Scenario::sitting};
 inline const char* name_of(Scenario scenario) {
-  constexpr std::array<const char*, 7> names{"wall far", "wall close", "slanted wall", "desk, clutter", "two people", "arm forward", "sitting"};
+  constexpr std::array<const char*, 7> names{"wall far",   "wall close",  "slanted wall", "desk, clutter",
+                                             "two people", "arm forward", "sitting"};
   return names[static_cast<std::size_t>(scenario)];
 }
 
@@ -52,7 +55,8 @@ inline double hit(const Capsule& c, const Vector3d& ray) {
   const Vector3d axis = (c.b - c.a).normalized();
   const double length = (c.b - c.a).norm();
   const Vector3d across = ray - axis * axis.dot(ray), offset = -c.a - axis * axis.dot(-c.a);
-  const double qa = across.squaredNorm(), qb = across.dot(offset), qc = offset.squaredNorm() - c.radius * c.radius, root = qb * qb - qa * qc;
+  const double qa = across.squaredNorm(), qb = across.dot(offset), qc = offset.squaredNorm() - c.radius * c.radius,
+               root = qb * qb - qa * qc;
   if (qa > 1e-12 && root > 0) {
     const double t = (-qb - std::sqrt(root)) / qa, at = axis.dot(ray * t - c.a);
     if (t > 0 && at > 0 && at < length) best = (std::min)(best, t);
@@ -63,9 +67,9 @@ inline double hit(const Capsule& c, const Vector3d& ray) {
 /// One box of a detector: for each cell of a grid over it what the sensor could see there.
 struct PersonScene {
   struct Cell {
-    double depth_m;        ///< true depth of the surface
-    double mixed_with_m;   ///< depth of the other surface at a silhouette, else 0
-    double weight;         ///< relative density of keypoints
+    double depth_m;       ///< true depth of the surface
+    double mixed_with_m;  ///< depth of the other surface at a silhouette, else 0
+    double weight;        ///< relative density of keypoints
     bool foreground;
   };
   std::vector<Cell> cells;
@@ -75,9 +79,10 @@ struct PersonScene {
 };
 
 struct Keypoints {
-  std::vector<double> depths;          ///< as measured; 0 = missing
-  std::vector<signed char> truth;      ///< 1 foreground, 0 background, -1 not judged (missing depth, or a mixed pixel: its depth is on neither surface)
-  std::vector<signed char> beyond;     ///< 1 for background behind the person's farthest surface: what depth alone can tell apart
+  std::vector<double> depths;  ///< as measured; 0 = missing
+  std::vector<signed char>
+      truth;  ///< 1 foreground, 0 background, -1 not judged (missing depth, or a mixed pixel: its depth is on neither surface)
+  std::vector<signed char> beyond;  ///< 1 for background behind the person's farthest surface: what depth alone can tell apart
 };
 
 namespace detail {
@@ -101,9 +106,11 @@ inline std::vector<Capsule> body(cfp::Random& random, Scenario scenario) {
       const double reach = u(0.35, 0.6), up = u(-0.25, 0.2), out = u(-0.2, 0.2);
       limb(shoulder, shoulder + 0.5 * Vector3d(out, up + 0.1, -reach), shoulder + Vector3d(out, up, -reach), 0.05, 0.045);
     } else if (sits) {
-      limb(shoulder, shoulder + Vector3d(side * 0.05, 0.28, u(-0.15, 0.05)), shoulder + Vector3d(side * u(-0.1, 0.05), u(0.25, 0.4), u(-0.4, -0.15)), 0.055, 0.045);
+      limb(shoulder, shoulder + Vector3d(side * 0.05, 0.28, u(-0.15, 0.05)),
+           shoulder + Vector3d(side * u(-0.1, 0.05), u(0.25, 0.4), u(-0.4, -0.15)), 0.055, 0.045);
     } else {
-      limb(shoulder, shoulder + Vector3d(side * u(0.02, 0.1), 0.28, 0.5 * swing), shoulder + Vector3d(side * u(0, 0.1), 0.52, swing - 0.05), 0.055, 0.045);
+      limb(shoulder, shoulder + Vector3d(side * u(0.02, 0.1), 0.28, 0.5 * swing), shoulder + Vector3d(side * u(0, 0.1), 0.52, swing - 0.05),
+           0.055, 0.045);
     }
     const Vector3d joint(side * 0.1, -hip, 0);
     if (sits) {
@@ -121,7 +128,8 @@ inline std::vector<Capsule> body(cfp::Random& random, Scenario scenario) {
 
 }  // namespace detail
 
-/// Draws one scene. Camera: 525 px focal length, 640 x 480, 1.0-1.5 m above the floor, level; person 1.2-4.5 m away, turned by up to 90 degrees.
+/// Draws one scene. Camera: 525 px focal length, 640 x 480, 1.0-1.5 m above the floor, level; person 1.2-4.5 m away, turned by up to 90
+/// degrees.
 inline PersonScene draw_scene(cfp::Random& random, Scenario scenario) {
   const auto u = [&](double a, double b) { return random.uniform(a, b); };
   const double height = u(1.0, 1.5), distance = u(1.2, 4.5);
@@ -153,7 +161,8 @@ inline PersonScene draw_scene(cfp::Random& random, Scenario scenario) {
     }
   }
   if (scenario == Scenario::two_people) {
-    const std::vector<Capsule> other = place(detail::body(random, Scenario::wall_far), x + u(-0.45, 0.45), distance + u(0.6, 1.6), u(-1.57, 1.57));
+    const std::vector<Capsule> other =
+        place(detail::body(random, Scenario::wall_far), x + u(-0.45, 0.45), distance + u(0.6, 1.6), u(-1.57, 1.57));
     others.insert(others.end(), other.begin(), other.end());
     planes[1].point.z() += 1.2;
   }
@@ -202,7 +211,8 @@ inline PersonScene draw_scene(cfp::Random& random, Scenario scenario) {
   scene.mixed_share = u(0.05, 0.25);
   scene.missing_share = u(0.0, 0.2);
   const double person_texture = std::exp(u(-0.9, 0.9)), floor_texture = u(0.1, 0.6);
-  // Keypoints come in clumps: every patch of 5 x 5 cells has its own texture, log-normal, so bodies show gaps in depth where they are plain.
+  // Keypoints come in clumps: every patch of 5 x 5 cells has its own texture, log-normal, so bodies show gaps in depth where they are
+  // plain.
   constexpr int patch = 5, patches_per_row = columns / patch + 1;
   std::vector<double> patch_texture(static_cast<std::size_t>(patches_per_row * (rows / patch + 1)));
   for (double& texture : patch_texture) texture = std::exp(1.2 * random.normal());
@@ -231,7 +241,8 @@ inline PersonScene draw_scene(cfp::Random& random, Scenario scenario) {
 inline Keypoints draw_keypoints(cfp::Random& random, const PersonScene& scene, std::size_t n) {
   Keypoints out;
   for (std::size_t i = 0; i < n; ++i) {
-    const auto at = std::upper_bound(scene.cumulative.begin(), scene.cumulative.end(), random.uniform() * scene.cumulative.back()) - scene.cumulative.begin();
+    const auto at = std::upper_bound(scene.cumulative.begin(), scene.cumulative.end(), random.uniform() * scene.cumulative.back()) -
+                    scene.cumulative.begin();
     const PersonScene::Cell& cell = scene.cells[(std::min)(static_cast<std::size_t>(at), scene.cells.size() - 1)];
     const bool mixed = cell.mixed_with_m > 0 && random.uniform() < scene.mixed_share, missing = random.uniform() < scene.missing_share;
     const double share = random.uniform(), surface = mixed ? cell.depth_m + share * (cell.mixed_with_m - cell.depth_m) : cell.depth_m;

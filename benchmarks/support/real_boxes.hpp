@@ -60,11 +60,17 @@ inline std::vector<RealBox> read_real_boxes(const std::string& data) {
       cfp::Box<float> box;
       if (!(words >> at >> name >> score >> box.x1 >> box.y1 >> box.x2 >> box.y2) || std::abs(at - time) > 0.005) continue;
       const bool left = box.x1 + box.x2 < 600.0F;
-      add_real_boxes(left ? "walking, left man" : "walking, right man", walking + image_name, walking + depth_name, 5000.0, {{box, left ? 2.28 : 2.0}}, out);
+      add_real_boxes(left ? "walking, left man" : "walking, right man", walking + image_name, walking + depth_name, 5000.0,
+                     {{box, left ? 2.28 : 2.0}}, out);
     }
   }
   add_real_boxes("five people", five + "rgb.png", five + "depth_mm.png", 1000.0,
-                 {{{15, 62, 155, 480}, 2.4}, {{143, 95, 245, 480}, 2.5}, {{276, 103, 384, 442}, 3.3}, {{362, 103, 470, 462}, 3.1}, {{460, 50, 606, 480}, 2.3}}, out);
+                 {{{15, 62, 155, 480}, 2.4},
+                  {{143, 95, 245, 480}, 2.5},
+                  {{276, 103, 384, 442}, 3.3},
+                  {{362, 103, 470, 462}, 3.1},
+                  {{460, 50, 606, 480}, 2.3}},
+                 out);
   return out;
 }
 
@@ -79,10 +85,11 @@ inline void print_real_boxes(const std::string& data) {
     cfp::AdaptiveRule rule;
     cfp::DbscanOptions fixed;
   };
-  const Rule rules[] = {{"foreground density", cfp::AdaptiveRule::foreground_density, {}}, {"k-distance median", cfp::AdaptiveRule::k_distance_median, {}},
-                        {"k-distance knee", cfp::AdaptiveRule::k_distance_knee, {}},       {"KANN-DBSCAN", cfp::AdaptiveRule::kann, {}},
-                        {"fixed 0.05 m / 5", cfp::AdaptiveRule::fixed, {0.05, 5}},         {"fixed 0.1 m / 5", cfp::AdaptiveRule::fixed, {0.1, 5}},
-                        {"fixed 0.15 m / 10", cfp::AdaptiveRule::fixed, {0.15, 10}},       {"fixed 0.2 m / 10", cfp::AdaptiveRule::fixed, {0.2, 10}}};
+  const Rule rules[] = {
+      {"foreground density", cfp::AdaptiveRule::foreground_density, {}}, {"k-distance median", cfp::AdaptiveRule::k_distance_median, {}},
+      {"k-distance knee", cfp::AdaptiveRule::k_distance_knee, {}},       {"KANN-DBSCAN", cfp::AdaptiveRule::kann, {}},
+      {"fixed 0.05 m / 5", cfp::AdaptiveRule::fixed, {0.05, 5}},         {"fixed 0.1 m / 5", cfp::AdaptiveRule::fixed, {0.1, 5}},
+      {"fixed 0.15 m / 10", cfp::AdaptiveRule::fixed, {0.15, 10}},       {"fixed 0.2 m / 10", cfp::AdaptiveRule::fixed, {0.2, 10}}};
   const char* groups[] = {"walking, left man", "walking, right man", "five people"};
   std::printf("| foreground / background kept, %% |");
   for (const char* group : groups) {
@@ -109,8 +116,10 @@ inline void print_real_boxes(const std::string& data) {
         int f = 0, f_kept = 0, b = 0, b_kept = 0;
         for (std::size_t i = 0; i < mask.size(); ++i) {
           if (!cfp::is_valid_depth(box.depths[i])) continue;
-          if (box.depths[i] <= box.limit_m) ++f, f_kept += mask[i] != 0 ? 1 : 0;
-          else ++b, b_kept += mask[i] == 0 ? 1 : 0;
+          if (box.depths[i] <= box.limit_m)
+            ++f, f_kept += mask[i] != 0 ? 1 : 0;
+          else
+            ++b, b_kept += mask[i] == 0 ? 1 : 0;
         }
         if (f > 0) foreground += 100.0 * f_kept / f, ++boxes_f;
         if (b > 0) background += 100.0 * b_kept / b, ++boxes_b;

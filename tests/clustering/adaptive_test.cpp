@@ -12,8 +12,8 @@
 
 namespace {
 
-constexpr cfp::AdaptiveRule rules[] = {cfp::AdaptiveRule::foreground_density, cfp::AdaptiveRule::k_distance_median, cfp::AdaptiveRule::k_distance_knee,
-                                       cfp::AdaptiveRule::kann, cfp::AdaptiveRule::fixed};
+constexpr cfp::AdaptiveRule rules[] = {cfp::AdaptiveRule::foreground_density, cfp::AdaptiveRule::k_distance_median,
+                                       cfp::AdaptiveRule::k_distance_knee, cfp::AdaptiveRule::kann, cfp::AdaptiveRule::fixed};
 
 std::vector<double> random_depths(cfp::Random& random, std::size_t n) {
   std::vector<double> depths;
@@ -106,9 +106,14 @@ TEST_CASE("The default's min_pts grows with n at unchanged shape", "[clustering]
 TEMPLATE_TEST_CASE("Every rule keeps eps above the sensor's noise and survives hostile depths", "[clustering]", float, double) {
   cfp::AdaptiveWorkspace<TestType> workspace;
   const TestType big = (std::numeric_limits<TestType>::max)(), tiny = std::numeric_limits<TestType>::denorm_min();
-  const std::vector<std::vector<TestType>> inputs{
-      {},       {TestType(1)},  {1, 1}, std::vector<TestType>(100, TestType(3)), {tiny, tiny, 1, big}, {tiny, tiny, tiny, 2 * tiny}, {1, 2, 3, big, big, big},
-      {1, 1, 1, 1, 1, 1, 1, 1e30F}};
+  const std::vector<std::vector<TestType>> inputs{{},
+                                                  {TestType(1)},
+                                                  {1, 1},
+                                                  std::vector<TestType>(100, TestType(3)),
+                                                  {tiny, tiny, 1, big},
+                                                  {tiny, tiny, tiny, 2 * tiny},
+                                                  {1, 2, 3, big, big, big},
+                                                  {1, 1, 1, 1, 1, 1, 1, 1e30F}};
   for (const cfp::AdaptiveRule rule : rules) {
     for (const auto& input : inputs) {
       cfp::AdaptiveOptions options;

@@ -35,7 +35,8 @@ TEMPLATE_TEST_CASE("DBSCAN gives scikit-learn's clusters", "[clustering]", float
     for (std::size_t i = 0; i < n; ++i) {
       CHECK((theirs[i] < 0) == (ours[i] < 0));
       std::size_t neighbours = 0;
-      for (const TestType other : values) neighbours += (other < values[i] ? values[i] - other : other - values[i]) <= static_cast<TestType>(options.eps) ? 1U : 0U;
+      for (const TestType other : values)
+        neighbours += (other < values[i] ? values[i] - other : other - values[i]) <= static_cast<TestType>(options.eps) ? 1U : 0U;
       if (neighbours < options.min_pts) continue;
       ++their_core;
       CHECK(partner.emplace(theirs[i], ours[i]).first->second == ours[i]);

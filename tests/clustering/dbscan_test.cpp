@@ -74,8 +74,10 @@ TEMPLATE_TEST_CASE("DBSCAN agrees with the definition where each way of sorting 
 
 TEST_CASE("A border point joins its nearest core point and the lower one of two", "[clustering]") {
   // Core points: 0 and 1 alone; each sees its group of three, itself and the border point between.
-  CHECK(cluster<double>({-0.375, -0.375, -0.125, 0, 0.5, 1, 1.125, 1.375, 1.375}, 0.5, 5).labels == std::vector<int>({0, 0, 0, 0, 0, 1, 1, 1, 1}));
-  CHECK(cluster<double>({1.375, 1.375, 1.125, 1, 0.5, 0, -0.125, -0.375, -0.375}, 0.5, 5).labels == std::vector<int>({1, 1, 1, 1, 0, 0, 0, 0, 0}));
+  CHECK(cluster<double>({-0.375, -0.375, -0.125, 0, 0.5, 1, 1.125, 1.375, 1.375}, 0.5, 5).labels ==
+        std::vector<int>({0, 0, 0, 0, 0, 1, 1, 1, 1}));
+  CHECK(cluster<double>({1.375, 1.375, 1.125, 1, 0.5, 0, -0.125, -0.375, -0.375}, 0.5, 5).labels ==
+        std::vector<int>({1, 1, 1, 1, 0, 0, 0, 0, 0}));
   CHECK(cluster<double>({-0.375, -0.375, -0.125, 0, 0.5625, 1, 1.125, 1.375, 1.375}, 0.5625, 5).labels ==
         std::vector<int>({0, 0, 0, 0, 1, 1, 1, 1, 1}));
 }

@@ -34,7 +34,8 @@ void add_layer(std::vector<double>& depths, std::size_t n, double from, double s
 }
 
 std::size_t kept(const std::vector<char>& mask, std::size_t first, std::size_t count) {
-  return static_cast<std::size_t>(std::count(mask.begin() + static_cast<std::ptrdiff_t>(first), mask.begin() + static_cast<std::ptrdiff_t>(first + count), 1));
+  return static_cast<std::size_t>(
+      std::count(mask.begin() + static_cast<std::ptrdiff_t>(first), mask.begin() + static_cast<std::ptrdiff_t>(first + count), 1));
 }
 
 cfp::ForegroundOptions fixed(double eps, std::size_t min_pts) {
@@ -161,12 +162,14 @@ TEST_CASE("Twelve points with a clear gap can be told apart, and one layer is al
 }
 
 TEMPLATE_TEST_CASE("Depth foreground survives hostile depths", "[clustering]", float, double) {
-  const TestType nan = std::numeric_limits<TestType>::quiet_NaN(), big = (std::numeric_limits<TestType>::max)(), tiny = std::numeric_limits<TestType>::denorm_min();
+  const TestType nan = std::numeric_limits<TestType>::quiet_NaN(), big = (std::numeric_limits<TestType>::max)(),
+                 tiny = std::numeric_limits<TestType>::denorm_min();
   cfp::Random random(31, "hostile");
   for (int round = 0; round < 300; ++round) {
     std::vector<TestType> depths(random.index(80));
     for (TestType& depth : depths) {
-      const TestType choices[] = {nan, 0, -1, big, -big, tiny, TestType(2), TestType(2.1), TestType(1e30F), static_cast<TestType>(random.uniform(0.5, 6))};
+      const TestType choices[] = {
+          nan, 0, -1, big, -big, tiny, TestType(2), TestType(2.1), TestType(1e30F), static_cast<TestType>(random.uniform(0.5, 6))};
       depth = choices[random.index(10)];
     }
     const Outcome out = run(depths);

@@ -20,9 +20,7 @@ std::vector<double> grid_values() {
   for (const int steps : *rc::gen::container<std::vector<int>>(rc::gen::inRange(0, 512))) values.push_back(steps / 64.0);
   return values;
 }
-cfp::DbscanOptions any_options() {
-  return {*rc::gen::inRange(0, 40) / 64.0, static_cast<std::size_t>(*rc::gen::inRange(1, 10))};
-}
+cfp::DbscanOptions any_options() { return {*rc::gen::inRange(0, 40) / 64.0, static_cast<std::size_t>(*rc::gen::inRange(1, 10))}; }
 
 template <typename Scalar>
 std::vector<int> labels_of(const std::vector<Scalar>& values, const cfp::DbscanOptions& options) {
@@ -110,8 +108,10 @@ TEST_CASE("Depth foreground properties", "[properties]") {
     double far = 0, near = 1e9;
     for (std::size_t i = 0; i < depths.size(); ++i) {
       if (!cfp::is_valid_depth(depths[i])) continue;
-      if (mask[i] != 0) far = std::max(far, depths[i]);
-      else near = std::min(near, depths[i]);
+      if (mask[i] != 0)
+        far = std::max(far, depths[i]);
+      else
+        near = std::min(near, depths[i]);
     }
     RC_ASSERT(far < near);
   });

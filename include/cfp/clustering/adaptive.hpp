@@ -19,9 +19,9 @@ namespace cfp {
 
 /// One standard deviation of a depth measurement, in metres: constant + quadratic (z - nearest)^2.
 struct DepthNoise {
-  double constant_m = 0.0012;    ///< >= 0
-  double quadratic = 0.0019;     ///< 1/m, >= 0; for stereo: constant_m 0, nearest_m 0, quadratic = sigma_disparity_px / (fx_px baseline_m)
-  double nearest_m = 0.4;        ///< defaults: structured light, Nguyen, Izadi and Lovell, 3DIMPVT 2012
+  double constant_m = 0.0012;  ///< >= 0
+  double quadratic = 0.0019;   ///< 1/m, >= 0; for stereo: constant_m 0, nearest_m 0, quadratic = sigma_disparity_px / (fx_px baseline_m)
+  double nearest_m = 0.4;      ///< defaults: structured light, Nguyen, Izadi and Lovell, 3DIMPVT 2012
 
   /// Example: 0.0140 m at z = 3 m with the defaults.
   [[nodiscard]] constexpr double sigma_m(double depth_m) const noexcept {
@@ -39,18 +39,18 @@ enum class AdaptiveRule : std::uint8_t {
 
 struct AdaptiveOptions {
   AdaptiveRule rule = AdaptiveRule::foreground_density;
-  DbscanOptions fixed;                ///< for `fixed`, and where a rule has too few values to work on
+  DbscanOptions fixed;  ///< for `fixed`, and where a rule has too few values to work on
   DepthNoise noise;
-  double noise_factor = 3.0;          ///< eps of every rule but `fixed` is at least so many sigmas at the foreground's depth; >= 0
-  double min_eps_m = 0.1;             ///< foreground_density: smallest radius; a smaller one tears bodies, limbs become background; > 0
-  double max_eps_m = 0.3;             ///< foreground_density: a larger one bridges to the wall; >= min_eps_m
-  double spacing_factor = 3.5;        ///< foreground_density: eps follows so many mean spacings, for boxes with few points; > 0
-  double min_share = 0.15;            ///< nearer ones may be a hand or spray: the foreground's depth is read at this share of all; (0, 1)
-  double min_density = 0.15;          ///< foreground_density: first share of the foreground's density that a core point must have; (0, 1]
-  double max_density = 0.6;           ///< foreground_density: last share tried; [min_density, 1]
-  double body_depth_m = 0.5;          ///< foreground_density: the share is raised while the foreground reaches farther behind its depth; > 0
-  double k_factor = 3.0;              ///< k_distance_median; > 0
-  double k_fraction = 0.05;           ///< k_distance_median: k = max(2, fraction of n); (0, 1)
+  double noise_factor = 3.0;    ///< eps of every rule but `fixed` is at least so many sigmas at the foreground's depth; >= 0
+  double min_eps_m = 0.1;       ///< foreground_density: smallest radius; a smaller one tears bodies, limbs become background; > 0
+  double max_eps_m = 0.3;       ///< foreground_density: a larger one bridges to the wall; >= min_eps_m
+  double spacing_factor = 3.5;  ///< foreground_density: eps follows so many mean spacings, for boxes with few points; > 0
+  double min_share = 0.15;      ///< nearer ones may be a hand or spray: the foreground's depth is read at this share of all; (0, 1)
+  double min_density = 0.15;    ///< foreground_density: first share of the foreground's density that a core point must have; (0, 1]
+  double max_density = 0.6;     ///< foreground_density: last share tried; [min_density, 1]
+  double body_depth_m = 0.5;    ///< foreground_density: the share is raised while the foreground reaches farther behind its depth; > 0
+  double k_factor = 3.0;        ///< k_distance_median; > 0
+  double k_fraction = 0.05;     ///< k_distance_median: k = max(2, fraction of n); (0, 1)
 };
 
 [[nodiscard]] constexpr const char* invalid_field(const AdaptiveOptions& o) noexcept {
@@ -143,7 +143,8 @@ DbscanOptions density_options(span<const Scalar> depths, const AdaptiveOptions& 
 /// O(n), but O(n min(n / 2, 200)) for KANN and O(n k) for the median. Allocates only when the workspace grows.
 /// Source: ours; paper IV-C leaves it open.
 template <typename Scalar>
-[[nodiscard]] DbscanOptions adaptive_options(span<const Scalar> depths, const AdaptiveOptions& options, AdaptiveWorkspace<Scalar>& workspace) {
+[[nodiscard]] DbscanOptions adaptive_options(span<const Scalar> depths, const AdaptiveOptions& options,
+                                             AdaptiveWorkspace<Scalar>& workspace) {
   CFP_ASSERT(std::is_sorted(depths.begin(), depths.end()));
   const std::size_t n = depths.size();
   if (n < 3 || options.rule == AdaptiveRule::fixed) return options.fixed;

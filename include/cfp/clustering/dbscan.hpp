@@ -31,11 +31,11 @@ struct DbscanOptions {
 }
 
 struct DbscanResult {
-  Status status = Status::ok;    ///< invalid_input: options outside their range, everything is noise. No clusters is ok.
-  std::size_t clusters = 0;      ///< labels run from 0 to clusters - 1
+  Status status = Status::ok;  ///< invalid_input: options outside their range, everything is noise. No clusters is ok.
+  std::size_t clusters = 0;    ///< labels run from 0 to clusters - 1
   std::size_t core_points = 0;
-  std::size_t noise = 0;         ///< finite values in no cluster
-  std::size_t invalid = 0;       ///< NaN and infinite values; they get the noise label and are nobody's neighbour
+  std::size_t noise = 0;    ///< finite values in no cluster
+  std::size_t invalid = 0;  ///< NaN and infinite values; they get the noise label and are nobody's neighbour
 };
 
 /// Reused from call to call; grows to the largest input seen, then allocates nothing.
@@ -70,8 +70,10 @@ void find_core_points(span<const Scalar> values, Scalar eps, std::size_t min_pts
     std::size_t first = i < reach ? 0 : i - reach, last = i;
     while (first < last) {
       const std::size_t middle = first + (last - first) / 2;
-      if (v[i] - v[middle] <= eps) last = middle;
-      else first = middle + 1;
+      if (v[i] - v[middle] <= eps)
+        last = middle;
+      else
+        first = middle + 1;
     }
     core[i] = first + reach < n && v[first + reach] - v[i] <= eps ? 1 : 0;
   }
@@ -122,7 +124,8 @@ DbscanResult sweep(span<const Scalar> values, const DbscanOptions& options, std:
 /// DBSCAN of values that are finite and ascending already (asserted in debug builds): `labels[i]` belongs to `values[i]`.
 /// As `dbscan` otherwise. O(n log min_pts), in practice O(n).
 template <typename Scalar>
-DbscanResult dbscan_ascending(span<const Scalar> values, const DbscanOptions& options, DbscanWorkspace<Scalar>& workspace, span<int> labels) {
+DbscanResult dbscan_ascending(span<const Scalar> values, const DbscanOptions& options, DbscanWorkspace<Scalar>& workspace,
+                              span<int> labels) {
   CFP_ASSERT(labels.size() == values.size());
   CFP_ASSERT(std::is_sorted(values.begin(), values.end()));
   int* out = labels.data();

@@ -15,21 +15,21 @@ namespace cfp {
 /// What is wrong with a labelling; the first fault in this order is reported.
 enum class DbscanFault : std::uint8_t {
   none,
-  label_count,      ///< not one label per value
-  invalid_labelled, ///< a NaN or infinite value has a label other than noise
-  core_is_noise,    ///< a core point is labelled noise
-  cluster_torn,     ///< two core points that are density-connected have different labels
-  clusters_joined,  ///< two core points that are not density-connected share a label
-  noise_labelled,   ///< a value without a core point within eps carries a cluster's label
-  border_is_noise,  ///< a value within eps of a core point is labelled noise
-  border_foreign,   ///< a border point has the label of a cluster without a core point within eps of it
-  border_not_nearest, ///< a border point does not have the label of its nearest core point (ties: the lower value)
-  numbering         ///< labels are not 0, 1, 2, … by ascending position
+  label_count,         ///< not one label per value
+  invalid_labelled,    ///< a NaN or infinite value has a label other than noise
+  core_is_noise,       ///< a core point is labelled noise
+  cluster_torn,        ///< two core points that are density-connected have different labels
+  clusters_joined,     ///< two core points that are not density-connected share a label
+  noise_labelled,      ///< a value without a core point within eps carries a cluster's label
+  border_is_noise,     ///< a value within eps of a core point is labelled noise
+  border_foreign,      ///< a border point has the label of a cluster without a core point within eps of it
+  border_not_nearest,  ///< a border point does not have the label of its nearest core point (ties: the lower value)
+  numbering            ///< labels are not 0, 1, 2, … by ascending position
 };
 
 struct DbscanVerifierOptions {
-  bool nearest_border = true;       ///< false: any core point within eps will do, as in the original definition
-  bool ascending_numbers = true;    ///< false: any numbering
+  bool nearest_border = true;     ///< false: any core point within eps will do, as in the original definition
+  bool ascending_numbers = true;  ///< false: any numbering
 };
 
 struct DbscanVerdict {
@@ -95,8 +95,8 @@ DbscanVerdict verify_dbscan(span<const Scalar> values, const DbscanOptions& opti
     for (std::size_t j = 0; j < n; ++j) {
       if (core[j] == 0 || !near(i, j)) continue;
       own = own || labels[j] == labels[i];
-      const bool better = nearest == n || distance(i, j) < distance(i, nearest) ||
-                          (distance(i, j) == distance(i, nearest) && values[j] < values[nearest]);
+      const bool better =
+          nearest == n || distance(i, j) < distance(i, nearest) || (distance(i, j) == distance(i, nearest) && values[j] < values[nearest]);
       if (better) nearest = j;
     }
     if (nearest == n) {

@@ -19,9 +19,9 @@ namespace cfp {
 
 struct ForegroundOptions {
   AdaptiveOptions adaptive;
-  double merge_gap_m = 0.2;      ///< a cluster that begins so near behind the foreground and ends within body_depth_m joins it; >= 0, 0: none
-  std::size_t min_points = 6;    ///< fewer valid depths: too_few_points; >= 1
-  std::size_t sure_points = 18;  ///< with fewer valid depths the split must also hold for a smaller and a larger eps
+  double merge_gap_m = 0.2;    ///< a cluster that begins so near behind the foreground and ends within body_depth_m joins it; >= 0, 0: none
+  std::size_t min_points = 6;  ///< fewer valid depths: too_few_points; >= 1
+  std::size_t sure_points = 18;       ///< with fewer valid depths the split must also hold for a smaller and a larger eps
   bool invalid_is_foreground = true;  ///< label of points without a valid depth: true is the safe side
 };
 
@@ -42,21 +42,25 @@ enum class ForegroundStatus : std::uint8_t {
 
 [[nodiscard]] constexpr const char* to_string(ForegroundStatus status) noexcept {
   switch (status) {
-    case ForegroundStatus::ok: return "ok";
-    case ForegroundStatus::too_few_points: return "too few points";
-    case ForegroundStatus::no_cluster: return "no cluster";
-    case ForegroundStatus::unstable: return "unstable";
+    case ForegroundStatus::ok:
+      return "ok";
+    case ForegroundStatus::too_few_points:
+      return "too few points";
+    case ForegroundStatus::no_cluster:
+      return "no cluster";
+    case ForegroundStatus::unstable:
+      return "unstable";
   }
   return "unknown";
 }
 
 struct ForegroundResult {
   ForegroundStatus status = ForegroundStatus::too_few_points;
-  DbscanOptions dbscan;        ///< eps (m) and min_pts that were used
+  DbscanOptions dbscan;  ///< eps (m) and min_pts that were used
   std::size_t clusters = 0;
-  std::size_t foreground = 0;  ///< points labelled foreground, those without a valid depth not counted
-  std::size_t background = 0;  ///< points labelled background, likewise
-  std::size_t invalid = 0;     ///< points without a valid depth
+  std::size_t foreground = 0;    ///< points labelled foreground, those without a valid depth not counted
+  std::size_t background = 0;    ///< points labelled background, likewise
+  std::size_t invalid = 0;       ///< points without a valid depth
   double near_m = 0, far_m = 0;  ///< nearest and farthest foreground depth; 0 without valid depths
 };
 
