@@ -44,7 +44,7 @@ struct AdaptiveOptions {
   double noise_factor = 3.0;    ///< eps of every rule but `fixed` is at least so many sigmas at the foreground's depth; >= 0
   double min_eps_m = 0.1;       ///< foreground_density: smallest radius; a smaller one tears bodies, limbs become background; > 0
   double max_eps_m = 0.3;       ///< foreground_density: a larger one bridges to the wall; >= min_eps_m
-  double spacing_factor = 3.5;  ///< foreground_density: eps follows so many mean spacings, for boxes with few points; > 0
+  double spacing_factor = 3.0;  ///< foreground_density: eps follows so many mean spacings, for boxes with few points; > 0
   double min_share = 0.15;      ///< nearer ones may be a hand or spray: the foreground's depth is read at this share of all; (0, 1)
   double min_density = 0.15;    ///< foreground_density: first share of the foreground's density that a core point must have; (0, 1]
   double max_density = 0.6;     ///< foreground_density: last share tried; [min_density, 1]
