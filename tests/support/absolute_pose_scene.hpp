@@ -1,0 +1,63 @@
+// A map seen by a camera at a known pose: points, noisy pixels, mismatches, and weights that know more or less about them.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "cfp/core/random.hpp"
+#include "cfp/geometry/camera.hpp"
+#include "cfp/math/se3.hpp"
+
+namespace cfp_test {
+
+struct AbsolutePoseOptions {
+  std::size_t points = 300;
+  double outlier_share = 0;
+  double noise_px = 1;          // standard deviation per coordinate
+  double outlier_min_px = 10;   // mismatches are shifted at least this far, uniformly over the image otherwise
+};
+
+template <typename Scalar>
+struct AbsolutePoseScene {
+  cfp::SE3<double> T_cam_world;
+  std::vector<std::array<Scalar, 3>> world;
+  std::vector<std::array<Scalar, 2>> pixels;
+  std::vector<Scalar> weights;  // static probabilities of a decent front end: inliers 0.5 to 1, mismatches 0 to 0.5
+  std::vector<char> is_inlier;
+};
+
+template <typename Scalar, typename Camera>
+AbsolutePoseScene<Scalar> make_absolute_pose_scene(cfp::Random& random, const Camera& camera, const AbsolutePoseOptions& options) {
+  using CameraScalar = typename Camera::ScalarType;
+  AbsolutePoseScene<Scalar> scene;
+  const cfp::Vector3<double> axis = cfp::Vector3<double>(random.normal(), random.normal(), random.normal()).normalized();
+  scene.T_cam_world.rotation = cfp::so3_exp<double>(random.uniform(0, 3) * axis);
+  scene.T_cam_world.translation = cfp::Vector3<double>(random.normal(), random.normal(), random.normal());
+  const cfp::SE3<double> T_world_cam = scene.T_cam_world.inverse();
+  while (scene.world.size() < options.points) {
+    const cfp::Vector2<double> u(random.uniform(0, 640), random.uniform(0, 480));
+    cfp::Vector3<CameraScalar> ray(0, 0, 1);
+    if (!camera.unproject(u.cast<CameraScalar>(), ray)) continue;
+    const cfp::Vector3<double> x = T_world_cam * (random.uniform(0.6, 5) * ray.template cast<double>());
+    const bool inlier = random.uniform() >= options.outlier_share;
+    cfp::Vector2<double> measured = u + options.noise_px * cfp::Vector2<double>(random.normal(), random.normal());
+    if (!inlier) measured = cfp::Vector2<double>(random.uniform(0, 640), random.uniform(0, 480));
+    if (!inlier && (measured - u).norm() < options.outlier_min_px) continue;
+    scene.world.push_back({static_cast<Scalar>(x.x()), static_cast<Scalar>(x.y()), static_cast<Scalar>(x.z())});
+    scene.pixels.push_back({static_cast<Scalar>(measured.x()), static_cast<Scalar>(measured.y())});
+    scene.weights.push_back(static_cast<Scalar>(inlier ? random.uniform(0.5, 1) : random.uniform(0, 0.5)));
+    scene.is_inlier.push_back(inlier ? 1 : 0);
+  }
+  return scene;
+}
+
+/// Distance of the camera centres, m, and angle between the rotations, rad.
+template <typename Scalar>
+std::array<double, 2> pose_distance(const cfp::SE3<Scalar>& T, const cfp::SE3<double>& truth) {
+  const cfp::SE3<double> estimate = T.template cast<double>();
+  return {(estimate.inverse().translation - truth.inverse().translation).norm(),
+          cfp::so3_log<double>(estimate.rotation * truth.rotation.transpose()).norm()};
+}
+
+}  // namespace cfp_test
