@@ -32,10 +32,16 @@ struct PinholeCamera {
     const Scalar u = fx * x + cx;
     const Scalar v = fy * y + cy;
     if (!is_finite(u) || !is_finite(v)) return false;
-    // Not a comma initialiser: g++ 12.2 at -O3 -DNDEBUG loses the second coordinate of one inlined into a loop.
+    // No comma initialisers in cfp: g++ 12.2 at -O3 -DNDEBUG loses coefficients of those it inlines into a loop.
     pixel[0] = u;
     pixel[1] = v;
-    if (jacobian != nullptr) *jacobian << fx * inv_z, Scalar(0), -fx * x * inv_z, Scalar(0), fy * inv_z, -fy * y * inv_z;
+    if (jacobian != nullptr) {
+      jacobian->setZero();
+      (*jacobian)(0, 0) = fx * inv_z;
+      (*jacobian)(0, 2) = -fx * x * inv_z;
+      (*jacobian)(1, 1) = fy * inv_z;
+      (*jacobian)(1, 2) = -fy * y * inv_z;
+    }
     return true;
   }
 
@@ -45,14 +51,17 @@ struct PinholeCamera {
     const Scalar x = (pixel.x() - cx) / fx;
     const Scalar y = (pixel.y() - cy) / fy;
     if (!is_finite(x) || !is_finite(y)) return false;
-    ray << x, y, Scalar(1);
+    ray = Vector3<Scalar>(x, y, Scalar(1));
     return true;
   }
 
   /// The intrinsic matrix.
   [[nodiscard]] Matrix3<Scalar> matrix() const noexcept {
-    Matrix3<Scalar> K;
-    K << fx, Scalar(0), cx, Scalar(0), fy, cy, Scalar(0), Scalar(0), Scalar(1);
+    Matrix3<Scalar> K = Matrix3<Scalar>::Identity();
+    K(0, 0) = fx;
+    K(1, 1) = fy;
+    K(0, 2) = cx;
+    K(1, 2) = cy;
     return K;
   }
 };

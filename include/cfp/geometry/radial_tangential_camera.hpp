@@ -70,13 +70,18 @@ struct RadialTangentialCamera {
     const Scalar u = fx * d.x + cx;
     const Scalar v = fy * d.y + cy;
     if (!is_finite(u) || !is_finite(v)) return false;
-    // Not a comma initialiser: g++ 12.2 at -O3 -DNDEBUG loses the second coordinate of one inlined into a loop.
     pixel[0] = u;
     pixel[1] = v;
     if (jacobian != nullptr) {
       const Scalar fx_z = fx * inv_z;
       const Scalar fy_z = fy * inv_z;
-      *jacobian << fx_z * d.xx, fx_z * d.xy, -fx_z * (d.xx * x + d.xy * y), fy_z * d.xy, fy_z * d.yy, -fy_z * (d.xy * x + d.yy * y);
+      Matrix23<Scalar>& J = *jacobian;
+      J(0, 0) = fx_z * d.xx;
+      J(0, 1) = fx_z * d.xy;
+      J(0, 2) = -fx_z * (d.xx * x + d.xy * y);
+      J(1, 0) = fy_z * d.xy;
+      J(1, 1) = fy_z * d.yy;
+      J(1, 2) = -fy_z * (d.xy * x + d.yy * y);
     }
     return true;
   }
@@ -111,7 +116,7 @@ struct RadialTangentialCamera {
       step_y = (d.xx * ey - d.xy * ex) * inv_determinant;
     }
     if (!(error_sq <= enough_sq)) return false;
-    ray << x, y, Scalar(1);
+    ray = Vector3<Scalar>(x, y, Scalar(1));
     return true;
   }
 

@@ -29,8 +29,13 @@ using Matrix6 = Eigen::Matrix<Scalar, 6, 6>;
 /// The skew-symmetric matrix with hat(a) b = a x b.
 template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> hat(const Vector3<Scalar>& a) noexcept {
-  Matrix3<Scalar> m;
-  m << Scalar(0), -a.z(), a.y(), a.z(), Scalar(0), -a.x(), -a.y(), a.x(), Scalar(0);
+  Matrix3<Scalar> m = Matrix3<Scalar>::Zero();
+  m(0, 1) = -a.z();
+  m(0, 2) = a.y();
+  m(1, 0) = a.z();
+  m(1, 2) = -a.x();
+  m(2, 0) = -a.y();
+  m(2, 1) = a.x();
   return m;
 }
 
