@@ -78,6 +78,7 @@ TEST_CASE("A distorted camera is served through the same interface", "[optimizat
   for (int trial = 0; trial < 10; ++trial) {
     const auto scene = make_absolute_pose_scene<double>(random, distorted, scene_options(300, 0.4));
     const auto result = pnp_ransac(distorted, {scene.world}, {scene.pixels}, {}, {}, PnpRansacOptions{}, workspace);
+    INFO(to_string(result.reason) << " " << result.matches << " " << result.iterations);
     REQUIRE(result.has_pose());
     CHECK(cfp_test::pose_distance(result.T_cam_world, scene.T_cam_world)[0] < 0.03);
   }

@@ -52,7 +52,9 @@ Status fundamental_8point(PointSpan<Scalar, 2> prev, PointSpan<Scalar, 2> cur, s
     if (!(w > 0)) continue;
     const Vector3<double> p = scale_prev(prev(i, 0), prev(i, 1)), q = scale_cur(cur(i, 0), cur(i, 1));
     Eigen::Matrix<double, 9, 1> row;
-    row << q.x() * p, q.y() * p, p;
+    row.head<3>() = q.x() * p;
+    row.segment<3>(3) = q.y() * p;
+    row.tail<3>() = p;
     const Eigen::Matrix<double, 9, 1> weighted = w / scale_prev.largest_weight * row;
     for (int c = 0; c < 9; ++c) M.col(c).noalias() += row[c] * weighted;
   }

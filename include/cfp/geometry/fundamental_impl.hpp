@@ -42,8 +42,10 @@ struct PixelScaling {
     return {factor * (static_cast<double>(u) - x), factor * (static_cast<double>(v) - y), 1.0};
   }
   [[nodiscard]] Matrix3<double> matrix() const noexcept {
-    Matrix3<double> T;
-    T << factor, 0, -factor * x, 0, factor, -factor * y, 0, 0, 1;
+    Matrix3<double> T = Matrix3<double>::Identity();
+    T(0, 0) = T(1, 1) = factor;
+    T(0, 2) = -factor * x;
+    T(1, 2) = -factor * y;
     return T;
   }
 };

@@ -79,9 +79,11 @@ inline void refine_homography(const PairArrays& pairs, double limit, int iterati
       const double x = (dx * dx + dy * dy) / limit;
       if (!(x < 9)) continue;  // weight below a hundredth
       const double w = pairs.weights()[i] / ((1 + x) * (1 + x));
-      Eigen::Matrix<double, 8, 1> ju, jv;
-      ju << p * inverse, Vector3<double>::Zero(), -u * inverse * p.head<2>();
-      jv << Vector3<double>::Zero(), p * inverse, -v * inverse * p.head<2>();
+      Eigen::Matrix<double, 8, 1> ju = Eigen::Matrix<double, 8, 1>::Zero(), jv = Eigen::Matrix<double, 8, 1>::Zero();
+      ju.head<3>() = p * inverse;
+      ju.tail<2>() = -u * inverse * p.head<2>();
+      jv.segment<3>(3) = p * inverse;
+      jv.tail<2>() = -v * inverse * p.head<2>();
       A += ju.lazyProduct((w * ju).transpose()) + jv.lazyProduct((w * jv).transpose());
       g += w * (dx * ju + dy * jv);
     }

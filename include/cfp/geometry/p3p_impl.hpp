@@ -84,12 +84,15 @@ namespace cfp::detail {
 [[nodiscard]] inline int p3p_depths(const Vector3<double> (&y)[3], const Vector3<double> (&x)[3], double (&depths)[4][3]) noexcept {
   const double cosine[3] = {y[0].dot(y[1]), y[0].dot(y[2]), y[1].dot(y[2])};
   const double length_sq[3] = {(x[0] - x[1]).squaredNorm(), (x[0] - x[2]).squaredNorm(), (x[1] - x[2]).squaredNorm()};
-  Matrix3<double> M01, M02, M12;
-  M01 << 1, -cosine[0], 0, -cosine[0], 1, 0, 0, 0, 0;
-  M02 << 1, 0, -cosine[1], 0, 0, 0, -cosine[1], 0, 1;
-  M12 << 0, 0, 0, 0, 1, -cosine[2], 0, -cosine[2], 1;
-  const Matrix3<double> D1 = M01 * length_sq[2] - M12 * length_sq[0];
-  const Matrix3<double> D2 = M02 * length_sq[2] - M12 * length_sq[1];
+  const auto edge = [&](int k) {
+    const int i = k == 2 ? 1 : 0, j = k == 0 ? 1 : 2;
+    Matrix3<double> M = Matrix3<double>::Zero();
+    M(i, i) = M(j, j) = 1;
+    M(i, j) = M(j, i) = -cosine[k];
+    return M;
+  };
+  const Matrix3<double> D1 = edge(0) * length_sq[2] - edge(2) * length_sq[0];
+  const Matrix3<double> D2 = edge(1) * length_sq[2] - edge(2) * length_sq[1];
   // det(D1 + g D2): coefficients through the cofactors, both matrices symmetric.
   Matrix3<double> cofactor1, cofactor2;
   for (int i = 0; i < 3; ++i) {
