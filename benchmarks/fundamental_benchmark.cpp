@@ -37,7 +37,8 @@ double median(std::vector<double> values) {
 
 Method ours(const char* name, double threshold_px, std::size_t max_iterations) {
   auto workspace = std::make_shared<cfp::FundamentalRansacWorkspace>();
-  return {name, [=](const Scene& scene, double& iterations) {
+  return {name,
+          [=](const Scene& scene, double& iterations) {
             cfp::FundamentalRansacOptions options;
             options.threshold_px = threshold_px;
             options.max_iterations = max_iterations;
@@ -45,14 +46,19 @@ Method ours(const char* name, double threshold_px, std::size_t max_iterations) {
             const auto result = cfp::fundamental_ransac<double>(scene.prev, scene.cur, {}, mask, options, *workspace);
             iterations = static_cast<double>(result.iterations);
             return result.F;
-          }, {}, {}, 0};
+          },
+          {},
+          {},
+          0};
 }
 
 #ifdef CFP_HAVE_OPENCV
 Method opencv(const char* name, int method, double threshold_px) {
-  return {name, [=](const Scene& scene, double& iterations) {
+  return {name,
+          [=](const Scene& scene, double& iterations) {
             const int n = static_cast<int>(scene.prev.size());
-            const cv::Mat prev(n, 2, CV_64F, const_cast<double*>(scene.prev.front().data())), cur(n, 2, CV_64F, const_cast<double*>(scene.cur.front().data()));
+            const cv::Mat prev(n, 2, CV_64F, const_cast<double*>(scene.prev.front().data())),
+                cur(n, 2, CV_64F, const_cast<double*>(scene.cur.front().data()));
             cv::Mat mask;
             const cv::Mat found = cv::findFundamentalMat(prev, cur, method, threshold_px, 0.99, 1000, mask);
             iterations = 0;
@@ -63,7 +69,10 @@ Method opencv(const char* name, int method, double threshold_px) {
               }
             }
             return F;
-          }, {}, {}, 0};
+          },
+          {},
+          {},
+          0};
 }
 #endif
 

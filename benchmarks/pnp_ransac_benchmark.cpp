@@ -37,7 +37,8 @@ double median(std::vector<double> values) {
 
 Method ours(const char* name, cfp::Sampling sampling, bool weighted) {
   auto workspace = std::make_shared<cfp::PnpRansacWorkspace>();
-  return {name, [=](const Scene& scene, double& iterations) {
+  return {name,
+          [=](const Scene& scene, double& iterations) {
             cfp::PnpRansacOptions options;
             options.sampling = sampling;
             std::vector<char> mask(scene.world.size());
@@ -45,23 +46,34 @@ Method ours(const char* name, cfp::Sampling sampling, bool weighted) {
             const auto result = cfp::pnp_ransac(camera, {scene.world}, {scene.pixels}, weights, mask, options, *workspace);
             iterations = static_cast<double>(result.iterations);
             return result.T_cam_world;
-          }, {}, {}, {}, {}};
+          },
+          {},
+          {},
+          {},
+          {}};
 }
 
 #ifdef CFP_HAVE_OPENCV
 Method opencv(const char* name, int flags) {
-  return {name, [=](const Scene& scene, double&) {
+  return {name,
+          [=](const Scene& scene, double&) {
             const int n = static_cast<int>(scene.world.size());
-            const cv::Mat world(n, 1, CV_64FC3, const_cast<double*>(scene.world.front().data())), pixels(n, 1, CV_64FC2, const_cast<double*>(scene.pixels.front().data()));
+            const cv::Mat world(n, 1, CV_64FC3, const_cast<double*>(scene.world.front().data())),
+                pixels(n, 1, CV_64FC2, const_cast<double*>(scene.pixels.front().data()));
             const cv::Matx33d K(camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1);
             cv::Vec3d rotation, translation;
             cv::Mat inliers;
             cfp::SE3<double> T;
-            if (!cv::solvePnPRansac(world, pixels, K, cv::noArray(), rotation, translation, false, 1000, 2.5F, 0.99, inliers, flags)) return T;
+            if (!cv::solvePnPRansac(world, pixels, K, cv::noArray(), rotation, translation, false, 1000, 2.5F, 0.99, inliers, flags))
+              return T;
             T.rotation = cfp::so3_exp<double>(cfp::Vector3<double>(rotation[0], rotation[1], rotation[2]));
             T.translation = cfp::Vector3<double>(translation[0], translation[1], translation[2]);
             return T;
-          }, {}, {}, {}, {}};
+          },
+          {},
+          {},
+          {},
+          {}};
 }
 #endif
 
@@ -73,7 +85,8 @@ int main(int argc, char* argv[]) {
 #ifdef CFP_HAVE_OPENCV
   cv::setNumThreads(1);
 #endif
-  std::printf("%-24s %5s %4s %8s %10s %10s %10s %10s %6s\n", "method", "N", "out", "weights", "median mm", "worst mm", "median deg", "median us", "its");
+  std::printf("%-24s %5s %4s %8s %10s %10s %10s %10s %6s\n", "method", "N", "out", "weights", "median mm", "worst mm", "median deg",
+              "median us", "its");
   for (const bool weak : {false, true}) {
     for (const double outliers : {0.3, 0.6}) {
       for (const std::size_t points : {300U, 1000U}) {
@@ -87,8 +100,9 @@ int main(int argc, char* argv[]) {
           if (!weak) continue;
           for (std::size_t k = 0; k < points; ++k) scenes.back().weights[k] = random.uniform(0, scenes.back().is_inlier[k] != 0 ? 1 : 0.7);
         }
-        std::vector<Method> methods{ours("cfp, no weights", cfp::Sampling::uniform, false), ours("cfp, uniform sampling", cfp::Sampling::uniform, true),
-                                    ours("cfp, weighted sampling", cfp::Sampling::weighted, true), ours("cfp, progressive", cfp::Sampling::progressive, true)};
+        std::vector<Method> methods{
+            ours("cfp, no weights", cfp::Sampling::uniform, false), ours("cfp, uniform sampling", cfp::Sampling::uniform, true),
+            ours("cfp, weighted sampling", cfp::Sampling::weighted, true), ours("cfp, progressive", cfp::Sampling::progressive, true)};
 #ifdef CFP_HAVE_OPENCV
         if (!weak) {
           methods.push_back(opencv("cv P3P", cv::SOLVEPNP_P3P));
@@ -111,8 +125,9 @@ int main(int argc, char* argv[]) {
           }
         }
         for (const Method& method : methods) {
-          std::printf("%-24s %5zu %3.0f%% %8s %10.3f %10.3f %10.4f %10.1f %6.0f\n", method.name.c_str(), points, 100 * outliers, weak ? "weak" : "good",
-                      1000 * median(method.translation_m), 1000 * *std::max_element(method.translation_m.begin(), method.translation_m.end()),
+          std::printf("%-24s %5zu %3.0f%% %8s %10.3f %10.3f %10.4f %10.1f %6.0f\n", method.name.c_str(), points, 100 * outliers,
+                      weak ? "weak" : "good", 1000 * median(method.translation_m),
+                      1000 * *std::max_element(method.translation_m.begin(), method.translation_m.end()),
                       180 / cfp::pi<double> * median(method.rotation_rad), median(method.times_us), median(method.iterations));
         }
       }

@@ -71,7 +71,7 @@ TEMPLATE_TEST_CASE("F survives mismatches", "[geometry]", float, double) {
         (scene.is_inlier[i] != 0 ? kept : caught) += mask[i];
       }
       CHECK(kept > 0.8 * (300 - mismatches));  // 95 % under the true F
-      CHECK(caught <= 0.2 * mismatches + 3);  // a shift along the line cannot be seen
+      CHECK(caught <= 0.2 * mismatches + 3);   // a shift along the line cannot be seen
       CHECK_THAT(double(result.F.norm()), WithinAbs(1, 1e-6));
       CHECK(std::abs(double(result.F.determinant())) < 1e-7);
     }
@@ -96,7 +96,11 @@ TEST_CASE("Without noise mismatches move F by a fiftieth of the threshold at mos
 TEST_CASE("Pairs that a homography explains give a reason and no F", "[geometry]") {
   cfp::Random random(33, "degenerate");
   FundamentalRansacWorkspace workspace;
-  struct Case { SceneShape shape; double translation_m, rotation_rad; FundamentalReason with_camera, without; };
+  struct Case {
+    SceneShape shape;
+    double translation_m, rotation_rad;
+    FundamentalReason with_camera, without;
+  };
   const Case cases[] = {{SceneShape::volume, 0, 0.035, FundamentalReason::pure_rotation, FundamentalReason::homography},
                         {SceneShape::plane, 0.1, 0.035, FundamentalReason::planar, FundamentalReason::homography},
                         {SceneShape::volume, 0, 0, FundamentalReason::no_motion, FundamentalReason::no_motion}};
@@ -118,7 +122,8 @@ TEST_CASE("Pairs that a homography explains give a reason and no F", "[geometry]
         double squares = 0;
         for (std::size_t i = 0; i < scene.world.size(); ++i) {
           const Eigen::Vector3d mapped = result.homography * Eigen::Vector3d(scene.exact_prev[i][0], scene.exact_prev[i][1], 1);
-          squares += (mapped.hnormalized() - Eigen::Vector2d(scene.exact_cur[i][0], scene.exact_cur[i][1])).squaredNorm() / double(scene.world.size());
+          squares += (mapped.hnormalized() - Eigen::Vector2d(scene.exact_cur[i][0], scene.exact_cur[i][1])).squaredNorm() /
+                     double(scene.world.size());
         }
         CHECK(std::sqrt(squares) < 0.5);
       }
@@ -164,7 +169,8 @@ TEST_CASE("Absent pairs change nothing, weights guide the search", "[geometry]")
   cfp::Random random(36, "weights");
   FundamentalRansacWorkspace workspace;
   auto scene = make_two_view_scene<double>(random, noisy(300, 0.3));
-  const auto expected = fundamental_ransac<double>(scene.prev, scene.cur, std::vector<double>(300, 1.0), {}, FundamentalRansacOptions{}, workspace);
+  const auto expected =
+      fundamental_ransac<double>(scene.prev, scene.cur, std::vector<double>(300, 1.0), {}, FundamentalRansacOptions{}, workspace);
   std::vector<double> weights(300, 1.0);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::array<double, 2> hostile[] = {{nan, 0}, {1, std::numeric_limits<double>::infinity()}, {1e300, 5}, {5, 5}, {7, 7}, {9, 9}};

@@ -38,7 +38,8 @@ TEMPLATE_TEST_CASE("Eight points recover the exact F", "[geometry]", float, doub
     REQUIRE(cfp::fundamental_8point<TestType>(scene.prev, scene.cur, {}, F) == Status::ok);
     // Float pixels carry 3e-5 px of rounding, which eight points alone may amplify.
     for (std::size_t i = 0; i < scene.prev.size(); ++i) {
-      const double distance = double(cfp::sampson_distance<TestType>(F, {scene.prev[i][0], scene.prev[i][1]}, {scene.cur[i][0], scene.cur[i][1]}));
+      const double distance =
+          double(cfp::sampson_distance<TestType>(F, {scene.prev[i][0], scene.prev[i][1]}, {scene.cur[i][0], scene.cur[i][1]}));
       CHECK(distance >= 0);
       CHECK(distance < (std::is_same_v<TestType, float> ? 5e-2 : 1e-6));
     }
@@ -91,7 +92,8 @@ TEST_CASE("Pure translations along an axis, with coefficients that vanish, are s
     REQUIRE(cfp::fundamental_8point<double>(scene.prev, scene.cur, {}, F) == Status::ok);
     CHECK(difference<double>(F, F_true) < 1e-8);
     std::array<Matrix3<double>, 3> solutions;
-    const int count = cfp::fundamental_7point<double>(PointSpan<double, 2>(scene.prev.front().data(), 7), PointSpan<double, 2>(scene.cur.front().data(), 7), solutions);
+    const int count = cfp::fundamental_7point<double>(PointSpan<double, 2>(scene.prev.front().data(), 7),
+                                                      PointSpan<double, 2>(scene.cur.front().data(), 7), solutions);
     double best = 1;
     for (int k = 0; k < count; ++k) best = (std::min)(best, difference<double>(solutions[std::size_t(k)], F_true));
     CHECK(best < 1e-8);
@@ -154,7 +156,8 @@ TEST_CASE("Pairs that do not determine F are reported", "[geometry]") {
   auto rotation = make_two_view_scene<double>(random, options);
   CHECK(cfp::fundamental_8point<double>(rotation.prev, rotation.cur, {}, F) == Status::degenerate);
   std::array<Matrix3<double>, 3> solutions;
-  CHECK(cfp::fundamental_7point<double>(PointSpan<double, 2>(plane.prev.front().data(), 7), PointSpan<double, 2>(plane.cur.front().data(), 7), solutions) == 0);
+  CHECK(cfp::fundamental_7point<double>(PointSpan<double, 2>(plane.prev.front().data(), 7),
+                                        PointSpan<double, 2>(plane.cur.front().data(), 7), solutions) == 0);
   std::vector<std::array<double, 2>> equal(20, {3.0, 4.0});
   CHECK(cfp::fundamental_8point<double>(equal, equal, {}, F) == Status::degenerate);
   const std::vector<std::array<double, 2>> few(7, {3.0, 4.0});
@@ -177,6 +180,7 @@ TEST_CASE("The solvers allocate nothing", "[geometry]") {
   std::array<Matrix3<double>, 3> solutions;
   CHECK(cfp_test::allocations_in([&] {
           (void)cfp::fundamental_8point<double>(scene.prev, scene.cur, {}, F);
-          (void)cfp::fundamental_7point<double>(PointSpan<double, 2>(scene.prev.front().data(), 7), PointSpan<double, 2>(scene.cur.front().data(), 7), solutions);
+          (void)cfp::fundamental_7point<double>(PointSpan<double, 2>(scene.prev.front().data(), 7),
+                                                PointSpan<double, 2>(scene.cur.front().data(), 7), solutions);
         }) == 0);
 }

@@ -16,7 +16,8 @@ TEMPLATE_TEST_CASE("A cubic gives back the roots it was built from", "[math]", f
     const TestType gap = (std::min)(expected[1] - expected[0], expected[2] - expected[1]);
     if (gap < TestType(0.05)) continue;
     TestType roots[3];
-    REQUIRE(real_cubic_roots(-(expected[0] + expected[1] + expected[2]), expected[0] * expected[1] + expected[0] * expected[2] + expected[1] * expected[2],
+    REQUIRE(real_cubic_roots(-(expected[0] + expected[1] + expected[2]),
+                             expected[0] * expected[1] + expected[0] * expected[2] + expected[1] * expected[2],
                              -expected[0] * expected[1] * expected[2], roots) == 3);
     std::sort(roots, roots + 3);
     const TestType tolerance = TestType(100) * std::numeric_limits<TestType>::epsilon() / (gap * gap);

@@ -45,7 +45,8 @@ TEST_CASE("Weighted draws come in proportion to the weights", "[math]") {
 
 TEST_CASE("Weights of any scale and inequality still give samples", "[math]") {
   cfp::Random random(3, "sampling");
-  for (const std::vector<double>& weights : {std::vector<double>{1e-310, 1e-310, 1e-310}, {1e308, 1e308, 1e308}, {1e308, 1e-308, 1e-308}, {5e-324, 1, 1}}) {
+  for (const std::vector<double>& weights :
+       {std::vector<double>{1e-310, 1e-310, 1e-310}, {1e308, 1e308, 1e308}, {1e308, 1e-308, 1e-308}, {5e-324, 1, 1}}) {
     MinimalSampler sampler;
     sampler.reset(3, weights, 3, Sampling::weighted, 1000);
     std::array<std::uint32_t, 3> sample{};
@@ -84,7 +85,8 @@ TEST_CASE("The number of draws follows the confidence formula and its limits", "
   std::iota(order.begin(), order.end(), 0U);
   const auto first = [](std::uint32_t i) { return i < 20; };
   CHECK(cfp::progressive_ransac_iterations(order, first, 3, 0.99, 1000) == 1);
-  CHECK(cfp::progressive_ransac_iterations(order, [](std::uint32_t) { return false; }, 3, 0.99, 1000) == 1000);
+  CHECK(cfp::progressive_ransac_iterations(
+            order, [](std::uint32_t) { return false; }, 3, 0.99, 1000) == 1000);
 }
 
 TEST_CASE("A sampler reset to a size it has seen allocates nothing", "[math]") {

@@ -212,6 +212,7 @@ TEST_CASE("RANSAC options outside their range are named; a second call allocates
     options = {};
     options.sampling = sampling;
     (void)pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {scene.weights}, mask, options, workspace);
-    CHECK(cfp_test::allocations_in([&] { (void)pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {scene.weights}, mask, options, workspace); }) == 0);
+    CHECK(cfp_test::allocations_in(
+              [&] { (void)pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {scene.weights}, mask, options, workspace); }) == 0);
   }
 }

@@ -14,8 +14,8 @@ namespace cfp_test {
 struct AbsolutePoseOptions {
   std::size_t points = 300;
   double outlier_share = 0;
-  double noise_px = 1;          // standard deviation per coordinate
-  double outlier_min_px = 10;   // mismatches are shifted at least this far, uniformly over the image otherwise
+  double noise_px = 1;         // standard deviation per coordinate
+  double outlier_min_px = 10;  // mismatches are shifted at least this far, uniformly over the image otherwise
 };
 
 template <typename Scalar>

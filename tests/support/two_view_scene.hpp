@@ -19,11 +19,11 @@ enum class SceneShape { volume, plane, volume_and_plane };
 struct TwoViewOptions {
   std::size_t pairs = 200;
   double outlier_share = 0;
-  double noise_px = 0;             // standard deviation per coordinate, both images
+  double noise_px = 0;  // standard deviation per coordinate, both images
   double translation_m = 0.1;
   double rotation_rad = 2 * cfp::pi<double> / 180;
   double outlier_min_px = 3, outlier_max_px = 40;
-  double plane_share = 0.8;        // of the static points, volume_and_plane only
+  double plane_share = 0.8;  // of the static points, volume_and_plane only
   SceneShape shape = SceneShape::volume;
 };
 
@@ -55,7 +55,8 @@ TwoViewScene<Scalar> make_two_view_scene(cfp::Random& random, const TwoViewOptio
     const cfp::Vector2<double> u(random.uniform(0, 640), random.uniform(0, 480));
     cfp::Vector3<double> ray;
     scene.camera.unproject(u, ray);
-    const bool on_plane = options.shape == SceneShape::plane || (options.shape == SceneShape::volume_and_plane && random.uniform() < options.plane_share);
+    const bool on_plane =
+        options.shape == SceneShape::plane || (options.shape == SceneShape::volume_and_plane && random.uniform() < options.plane_share);
     const cfp::Vector3<double> point = ray * (on_plane ? 1.2 / tilt.dot(ray) : random.uniform(0.6, 5));
     cfp::Vector2<double> v(0, 0);
     if (!scene.camera.project(scene.T_cur_prev * point, v) || v.x() < 0 || v.x() >= 640 || v.y() < 0 || v.y() >= 480) continue;
@@ -66,7 +67,8 @@ TwoViewScene<Scalar> make_two_view_scene(cfp::Random& random, const TwoViewOptio
       shift = radius * cfp::Vector2<double>(std::cos(angle), std::sin(angle));
     }
     const auto pixel = [&](const cfp::Vector2<double>& x, double noise) {
-      return std::array<Scalar, 2>{static_cast<Scalar>(x.x() + noise * random.normal()), static_cast<Scalar>(x.y() + noise * random.normal())};
+      return std::array<Scalar, 2>{static_cast<Scalar>(x.x() + noise * random.normal()),
+                                   static_cast<Scalar>(x.y() + noise * random.normal())};
     };
     scene.world.push_back(point);
     scene.exact_prev.push_back(pixel(u, 0));

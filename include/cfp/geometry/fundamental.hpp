@@ -1,7 +1,8 @@
 /// @file fundamental.hpp
-/// The fundamental matrix without robustness: eight-point (least squares, weighted) and seven-point (minimal) solvers. F maps a pixel of the previous image to its line in the current one: x_cur^T F x_prev = 0 with
-/// homogeneous pixels, l_cur = F x_prev (the paper's F_{k,k-1}). Every F returned has unit Frobenius norm and rank 2.
-/// For distances under F see epipolar.hpp, for pairs with mismatches fundamental_ransac.hpp. Source of the solvers: Hartley and Zisserman, "Multiple View Geometry", ch. 11.
+/// The fundamental matrix without robustness: eight-point (least squares, weighted) and seven-point (minimal) solvers. F maps a pixel of
+/// the previous image to its line in the current one: x_cur^T F x_prev = 0 with homogeneous pixels, l_cur = F x_prev (the paper's
+/// F_{k,k-1}). Every F returned has unit Frobenius norm and rank 2. For distances under F see epipolar.hpp, for pairs with mismatches
+/// fundamental_ransac.hpp. Source of the solvers: Hartley and Zisserman, "Multiple View Geometry", ch. 11.
 #pragma once
 
 #include <algorithm>
@@ -69,7 +70,8 @@ Status fundamental_8point(PointSpan<Scalar, 2> prev, PointSpan<Scalar, 2> cur, s
 /// solutions untouched, when the seven do not determine finitely many (six or more on a plane, repeated or non-finite points).
 /// Works in double. Allocates nothing; about a microsecond.
 template <typename Scalar>
-[[nodiscard]] int fundamental_7point(PointSpan<Scalar, 2> prev, PointSpan<Scalar, 2> cur, std::array<Matrix3<Scalar>, 3>& solutions) noexcept {
+[[nodiscard]] int fundamental_7point(PointSpan<Scalar, 2> prev, PointSpan<Scalar, 2> cur,
+                                     std::array<Matrix3<Scalar>, 3>& solutions) noexcept {
   CFP_ASSERT(prev.size() == 7 && cur.size() == 7);
   detail::PixelScaling scale_prev, scale_cur;
   if (detail::scale_pixels<Scalar>(prev, cur, {}, scale_prev, scale_cur) < 7 || !scale_prev.valid() || !scale_cur.valid()) return 0;

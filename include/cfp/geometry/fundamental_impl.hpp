@@ -2,6 +2,7 @@
 /// Inner parts of fundamental.hpp and fundamental_ransac.hpp: scaling of pixels, the seven-point core. Not an interface.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <utility>
@@ -26,7 +27,8 @@ template <typename Scalar>
 
 // The weight of a pair; 0 for one that counts as absent.
 template <typename Scalar>
-[[nodiscard]] double pair_weight(const PointSpan<Scalar, 2>& prev, const PointSpan<Scalar, 2>& cur, const span<const Scalar>& weights, std::size_t i) noexcept {
+[[nodiscard]] double pair_weight(const PointSpan<Scalar, 2>& prev, const PointSpan<Scalar, 2>& cur, const span<const Scalar>& weights,
+                                 std::size_t i) noexcept {
   const double w = weights.empty() ? 1.0 : static_cast<double>(weights[i]);
   return w > 0 && is_finite(w) && usable_pair(prev, cur, i) ? w : 0.0;
 }
@@ -52,8 +54,8 @@ struct PixelScaling {
 
 // Weighted centroid to the origin, weighted mean distance to sqrt 2, in each image. Returns the number of pairs present.
 template <typename Scalar>
-std::size_t scale_pixels(const PointSpan<Scalar, 2>& prev, const PointSpan<Scalar, 2>& cur, const span<const Scalar>& weights, PixelScaling& scale_prev,
-                         PixelScaling& scale_cur) noexcept {
+std::size_t scale_pixels(const PointSpan<Scalar, 2>& prev, const PointSpan<Scalar, 2>& cur, const span<const Scalar>& weights,
+                         PixelScaling& scale_prev, PixelScaling& scale_cur) noexcept {
   std::size_t used = 0;
   double largest = 0;
   for (std::size_t i = 0; i < prev.size(); ++i) {
@@ -86,7 +88,8 @@ std::size_t scale_pixels(const PointSpan<Scalar, 2>& prev, const PointSpan<Scala
 }
 
 // F of pixels from F of scaled pixels, unit norm.
-[[nodiscard]] inline Matrix3<double> unscaled(const Matrix3<double>& F, const PixelScaling& scale_prev, const PixelScaling& scale_cur) noexcept {
+[[nodiscard]] inline Matrix3<double> unscaled(const Matrix3<double>& F, const PixelScaling& scale_prev,
+                                              const PixelScaling& scale_cur) noexcept {
   return (scale_cur.matrix().transpose() * F * scale_prev.matrix()).normalized();
 }
 
@@ -137,7 +140,8 @@ std::size_t scale_pixels(const PointSpan<Scalar, 2>& prev, const PointSpan<Scala
 [[nodiscard]] inline int solve_seven_point(const double (&p)[7][2], const double (&q)[7][2], Matrix3<double> (&F)[3]) noexcept {
   double A[7][9];
   for (int i = 0; i < 7; ++i) {
-    const double row[9] = {q[i][0] * p[i][0], q[i][0] * p[i][1], q[i][0], q[i][1] * p[i][0], q[i][1] * p[i][1], q[i][1], p[i][0], p[i][1], 1.0};
+    const double row[9] = {q[i][0] * p[i][0], q[i][0] * p[i][1], q[i][0], q[i][1] * p[i][0], q[i][1] * p[i][1], q[i][1],
+                           p[i][0],           p[i][1],           1.0};
     for (int c = 0; c < 9; ++c) A[i][c] = row[c];
   }
   Matrix3<double> a, b;
@@ -161,7 +165,8 @@ std::size_t scale_pixels(const PointSpan<Scalar, 2>& prev, const PointSpan<Scala
     cofactor_b.col(i) = b.col((i + 1) % 3).cross(b.col((i + 2) % 3));
   }
   double roots[3];
-  const int count = real_cubic_roots(cofactor_b.cwiseProduct(a).sum() / det_b, cofactor_a.cwiseProduct(b).sum() / det_b, a.determinant() / det_b, roots);
+  const int count =
+      real_cubic_roots(cofactor_b.cwiseProduct(a).sum() / det_b, cofactor_a.cwiseProduct(b).sum() / det_b, a.determinant() / det_b, roots);
   for (int k = 0; k < count; ++k) F[k] = (a + roots[k] * b).normalized();
   return count;
 }

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Cholesky>
@@ -80,7 +82,8 @@ template <typename T>
 [[nodiscard]] inline double msac_cost(const PairArrays& pairs, const Matrix3<double>& F, double limit, double bound) noexcept {
   const Matrix3<float> f = F.cast<float>();
   const float limit_f = static_cast<float>(limit);
-  const float *px = pairs.fast_array(0), *py = pairs.fast_array(1), *qx = pairs.fast_array(2), *qy = pairs.fast_array(3), *w = pairs.fast_array(4);
+  const float *px = pairs.fast_array(0), *py = pairs.fast_array(1), *qx = pairs.fast_array(2), *qy = pairs.fast_array(3),
+              *w = pairs.fast_array(4);
   constexpr std::size_t width = Lane<float>::SizeAtCompileTime;
   const double stop = bound * limit;
   double sum = 0;
@@ -129,8 +132,7 @@ template <typename T>
 }
 
 // Normal equations over the nine entries (row-major) of F of sum w rho(d^2 / scale), and that sum; rho(x) = x / (1 + x), the loss
-// of Geman and McClure: bounded like MSAC's, but smooth, so that pairs near the threshold count by degrees. cfp_fundamental_loss_study
-// compares it with others.
+// of Geman and McClure: bounded like MSAC's, but smooth, so that pairs near the threshold count by degrees.
 struct SampsonSystem {
   Eigen::Matrix<double, 9, 9> H;
   Eigen::Matrix<double, 9, 1> g;
@@ -164,7 +166,15 @@ void sampson_system(const PairArrays& pairs, const T* const (&in)[5], const Matr
     // d(e/n)/dF_ij = (q_i p_j - k (l_i p_j [i < 2] + m_j q_i [j < 2])) / n with k = e / n^2; rows below are without the 1/n.
     const L k = e * inverse_n2;
     const L a0 = q[0] - k * l0, a1 = q[1] - k * l1, b0 = k * m0, b1 = k * m1;
-    const L J[9] = {a0 * p[0] - b0 * q[0], a0 * p[1] - b1 * q[0], a0, a1 * p[0] - b0 * q[1], a1 * p[1] - b1 * q[1], a1, p[0] - b0, p[1] - b1, L::Ones()};
+    const L J[9] = {a0 * p[0] - b0 * q[0],
+                    a0 * p[1] - b1 * q[0],
+                    a0,
+                    a1 * p[0] - b0 * q[1],
+                    a1 * p[1] - b1 * q[1],
+                    a1,
+                    p[0] - b0,
+                    p[1] - b1,
+                    L::Ones()};
     int entry = 0;
     for (int r = 0; r < 9; ++r) {
       const L wj = weight * J[r];
@@ -194,11 +204,15 @@ struct FactoredF {
     c = norm > 0 ? svd.singularValues()[0] / norm : 1;
     s = norm > 0 ? svd.singularValues()[1] / norm : 0;
   }
-  [[nodiscard]] Matrix3<double> matrix() const noexcept { return c * U.col(0) * V.col(0).transpose() + s * U.col(1) * V.col(1).transpose(); }
+  [[nodiscard]] Matrix3<double> matrix() const noexcept {
+    return c * U.col(0) * V.col(0).transpose() + s * U.col(1) * V.col(1).transpose();
+  }
   // d vec(F) (row-major) / d (a, b, t).
   [[nodiscard]] Eigen::Matrix<double, 9, 7> tangents() const noexcept {
     Eigen::Matrix<double, 9, 7> B;
-    const auto set = [&](int column, const Matrix3<double>& M) { Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(B.col(column).data()) = M; };
+    const auto set = [&](int column, const Matrix3<double>& M) {
+      Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(B.col(column).data()) = M;
+    };
     const auto uv = [&](int i, int j) -> Matrix3<double> { return U.col(i) * V.col(j).transpose(); };
     set(0, s * uv(2, 1));
     set(1, -c * uv(2, 0));
@@ -221,7 +235,8 @@ struct FactoredF {
 // Levenberg-Marquardt on sum w rho(d^2 / scale) from F (scaled pixels, rank 2). Ends after max_evaluations, or when a step promises
 // less than `tolerance` of the cost. Returns the number of evaluations; F is replaced only by one of lower cost.
 template <typename T>
-int refine_scaled(const PairArrays& pairs, const T* const (&in)[5], double scale, int max_evaluations, double tolerance, Matrix3<double>& F) noexcept {
+int refine_scaled(const PairArrays& pairs, const T* const (&in)[5], double scale, int max_evaluations, double tolerance,
+                  Matrix3<double>& F) noexcept {
   FactoredF current(F);
   SampsonSystem system, trial_system;
   sampson_system<T>(pairs, in, current.matrix(), scale, system);

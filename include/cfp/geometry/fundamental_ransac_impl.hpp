@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <vector>
 
 #include <Eigen/Core>
@@ -12,6 +14,7 @@
 
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/fundamental_kernels_impl.hpp"
+#include "cfp/geometry/fundamental_ransac_types.hpp"
 #include "cfp/geometry/homography_impl.hpp"
 #include "cfp/math/sampling.hpp"
 
@@ -39,7 +42,8 @@ struct FundamentalSearch {
   [[nodiscard]] double transfer_limit() const noexcept { return 3 * limit; }
   [[nodiscard]] double transfer_noise_limit() const noexcept { return 3 * noise_limit; }
 
-  // Scales of the refinement loss in squared thresholds, wide in the search and near the inliers' spread in the end.
+  // Scales of the refinement loss in squared thresholds: wide in the search; the final one is the flat optimum of
+  // cfp_fundamental_scale_study.
   static constexpr double search_scale = 4, final_scale = 2.5;
 
   void local_optimization(FundamentalCandidate& candidate) const noexcept {
@@ -58,7 +62,8 @@ struct FundamentalSearch {
     const bool by_weight = sampler.sampling() == Sampling::weighted;
     double inliers = 0;
     for (std::size_t i = 0; i < pairs.size; ++i) inliers += is_inlier(i) ? (by_weight ? pairs.weights()[i] : 1.0) : 0.0;
-    return ransac_iterations(inliers / (by_weight ? pairs.total_weight : static_cast<double>(pairs.size)), 7, options.confidence, options.max_iterations);
+    return ransac_iterations(inliers / (by_weight ? pairs.total_weight : static_cast<double>(pairs.size)), 7, options.confidence,
+                             options.max_iterations);
   }
 
   FundamentalCandidate run() noexcept {
@@ -225,7 +230,9 @@ struct FundamentalSearch {
   // taken in its place when it explains nine tenths of the same pairs.
   FundamentalReason classify(const PinholeCamera<double>* camera, Matrix3<double>& H) const noexcept {
     constexpr double same = 0.9;
-    const auto scaled = [&](const Matrix3<double>& G) -> Matrix3<double> { return pairs.scale_cur.matrix() * G * pairs.scale_prev.matrix().inverse(); };
+    const auto scaled = [&](const Matrix3<double>& G) -> Matrix3<double> {
+      return pairs.scale_cur.matrix() * G * pairs.scale_prev.matrix().inverse();
+    };
     const Matrix3<double> identity = scaled(Matrix3<double>::Identity());
     if (explained_by(identity, H) >= same) {
       H = identity;
@@ -234,11 +241,13 @@ struct FundamentalSearch {
     if (camera == nullptr) return FundamentalReason::homography;
     const Matrix3<double> K = camera->matrix();
     const Matrix3<double> K_inverse = K.inverse();
-    const Matrix3<double> ray_prev = K_inverse * pairs.scale_prev.matrix().inverse(), ray_cur = K_inverse * pairs.scale_cur.matrix().inverse();
+    const Matrix3<double> ray_prev = K_inverse * pairs.scale_prev.matrix().inverse(),
+                          ray_cur = K_inverse * pairs.scale_cur.matrix().inverse();
     Matrix3<double> M = Matrix3<double>::Zero();
     for (std::size_t i = 0; i < pairs.size; ++i) {
       if (!(transfer_sq(pairs, H, i) <= transfer_noise_limit())) continue;
-      const Vector3<double> p = ray_prev * Vector3<double>(pairs.array(0)[i], pairs.array(1)[i], 1), q = ray_cur * Vector3<double>(pairs.array(2)[i], pairs.array(3)[i], 1);
+      const Vector3<double> p = ray_prev * Vector3<double>(pairs.array(0)[i], pairs.array(1)[i], 1),
+                            q = ray_cur * Vector3<double>(pairs.array(2)[i], pairs.array(3)[i], 1);
       M += pairs.weights()[i] * q.normalized() * p.normalized().transpose();
     }
     if (!M.allFinite()) return FundamentalReason::homography;

@@ -4,6 +4,8 @@
 
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -24,7 +26,8 @@ namespace cfp::detail {
 // Sum of w min(d^2 / limit, 1), d the transfer distance.
 [[nodiscard]] inline double transfer_cost(const PairArrays& pairs, const Matrix3<double>& H, double limit) noexcept {
   const Matrix3<float> h = H.cast<float>();
-  const float *px = pairs.fast_array(0), *py = pairs.fast_array(1), *qx = pairs.fast_array(2), *qy = pairs.fast_array(3), *w = pairs.fast_array(4);
+  const float *px = pairs.fast_array(0), *py = pairs.fast_array(1), *qx = pairs.fast_array(2), *qy = pairs.fast_array(3),
+              *w = pairs.fast_array(4);
   const float limit_f = static_cast<float>(limit);
   double sum = 0;
   for (std::size_t block = 0; block < pairs.padded_size(); block += PairArrays::padding) {
@@ -44,14 +47,16 @@ namespace cfp::detail {
 
 // The homography compatible with F that maps three pairs: H = [e']x F - e' v^T. Hartley and Zisserman, result 13.6. False for
 // collinear points or a degenerate F.
-[[nodiscard]] inline bool homography_from_fundamental(const PairArrays& pairs, const Matrix3<double>& F, const std::uint32_t (&sample)[3], Matrix3<double>& H) noexcept {
+[[nodiscard]] inline bool homography_from_fundamental(const PairArrays& pairs, const Matrix3<double>& F, const std::uint32_t (&sample)[3],
+                                                      Matrix3<double>& H) noexcept {
   const FactoredF factors(F);
   const Vector3<double> e = factors.U.col(2);
   const Matrix3<double> A = hat(e) * F;
   Matrix3<double> M;
   Vector3<double> b;
   for (int k = 0; k < 3; ++k) {
-    const Vector3<double> p(pairs.array(0)[sample[k]], pairs.array(1)[sample[k]], 1), q(pairs.array(2)[sample[k]], pairs.array(3)[sample[k]], 1);
+    const Vector3<double> p(pairs.array(0)[sample[k]], pairs.array(1)[sample[k]], 1),
+        q(pairs.array(2)[sample[k]], pairs.array(3)[sample[k]], 1);
     const Vector3<double> across = q.cross(e);
     M.row(k) = p.transpose();
     b[k] = q.cross(A * p).dot(across) / across.squaredNorm();

@@ -3,6 +3,7 @@
 /// Source: Persson and Nordberg: "Lambda Twist: an accurate fast robust perspective three point (P3P) solver", ECCV 2018.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>

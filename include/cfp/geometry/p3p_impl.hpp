@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Core>
 #include <Eigen/LU>
@@ -27,7 +28,8 @@ namespace cfp::detail {
 [[nodiscard]] inline bool plane_pair(const Matrix3<double>& D, Vector3<double> (&normals)[2]) noexcept {
   // Eigenvalues 0 and the roots of s^2 - tr s + m, m the sum of the principal minors.
   const double trace = D.trace();
-  const double minors = D(0, 0) * D(1, 1) - D(0, 1) * D(0, 1) + D(0, 0) * D(2, 2) - D(0, 2) * D(0, 2) + D(1, 1) * D(2, 2) - D(1, 2) * D(1, 2);
+  const double minors =
+      D(0, 0) * D(1, 1) - D(0, 1) * D(0, 1) + D(0, 0) * D(2, 2) - D(0, 2) * D(0, 2) + D(1, 1) * D(2, 2) - D(1, 2) * D(1, 2);
   if (!(minors <= 0)) return false;
   const double root = std::sqrt(0.25 * trace * trace - minors);
   const double large = trace > 0 ? 0.5 * trace + root : 0.5 * trace - root;
@@ -110,7 +112,8 @@ namespace cfp::detail {
   double best = 0;
   for (int k = 0; k < root_count; ++k) {
     const Matrix3<double> D = swap ? Matrix3<double>(D2 + roots[k] * D1) : Matrix3<double>(D1 + roots[k] * D2);
-    const double minors = D(0, 0) * D(1, 1) - D(0, 1) * D(0, 1) + D(0, 0) * D(2, 2) - D(0, 2) * D(0, 2) + D(1, 1) * D(2, 2) - D(1, 2) * D(1, 2);
+    const double minors =
+        D(0, 0) * D(1, 1) - D(0, 1) * D(0, 1) + D(0, 0) * D(2, 2) - D(0, 2) * D(0, 2) + D(1, 1) * D(2, 2) - D(1, 2) * D(1, 2);
     const double quality = -minors / D.squaredNorm();
     Vector3<double> candidate[2];
     if (!(quality > best) || !plane_pair(D, candidate)) continue;

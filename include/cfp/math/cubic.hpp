@@ -23,7 +23,8 @@ template <typename Scalar>
   int count = 1;
   // The margin keeps a double root that rounding would otherwise turn into a pair of complex ones.
   if (r * r <= q3 * (Scalar(1) + Scalar(16) * std::numeric_limits<Scalar>::epsilon())) {
-    const Scalar angle = std::acos((std::max)(Scalar(-1), (std::min)(Scalar(1), q3 > Scalar(0) ? r / std::sqrt(q3) : Scalar(0)))) / Scalar(3);
+    const Scalar angle =
+        std::acos((std::max)(Scalar(-1), (std::min)(Scalar(1), q3 > Scalar(0) ? r / std::sqrt(q3) : Scalar(0)))) / Scalar(3);
     const Scalar radius = Scalar(-2) * std::sqrt((std::max)(q, Scalar(0)));
     const Scalar step = Scalar(2) / Scalar(3) * pi<Scalar>;
     for (int i = 0; i < 3; ++i) roots[i] = radius * std::cos(angle + Scalar(i - 1) * step) - third;

@@ -50,7 +50,8 @@ class MinimalSampler {
     const bool with_newest = draws_ <= phase_end_;
     const std::uint32_t fixed = with_newest ? 1 : 0;
     if (with_newest) out[0] = prefix_ - 1;
-    for (std::uint32_t i = fixed; i < sample_size_; ++i) out[i] = draw_unused(random, prefix_ - fixed, span<const std::uint32_t>(out.data(), i));
+    for (std::uint32_t i = fixed; i < sample_size_; ++i)
+      out[i] = draw_unused(random, prefix_ - fixed, span<const std::uint32_t>(out.data(), i));
     for (std::uint32_t& i : out) i = order_[i];
   }
 
@@ -100,7 +101,8 @@ class MinimalSampler {
     order_.resize(size_);
     std::iota(order_.begin(), order_.end(), 0U);
     if (!weights.empty()) {
-      std::sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) { return weights[a] != weights[b] ? weights[a] > weights[b] : a < b; });
+      std::sort(order_.begin(), order_.end(),
+                [&](std::uint32_t a, std::uint32_t b) { return weights[a] != weights[b] ? weights[a] > weights[b] : a < b; });
     }
     draws_ = 0;
     prefix_ = sample_size_;
@@ -138,8 +140,8 @@ class MinimalSampler {
 /// The same for progressive sampling: the inlier share is the largest among the prefixes of the order that hold clearly more
 /// inliers than `sample_size` plus the tenth that a wrong model may catch by chance (3 standard deviations above it).
 template <typename IsInlier>
-[[nodiscard]] std::size_t progressive_ransac_iterations(span<const std::uint32_t> order, IsInlier&& is_inlier, int sample_size, double confidence,
-                                                        std::size_t limit) {
+[[nodiscard]] std::size_t progressive_ransac_iterations(span<const std::uint32_t> order, IsInlier&& is_inlier, int sample_size,
+                                                        double confidence, std::size_t limit) {
   constexpr double chance = 0.1;
   double inliers = 0, n = 0, best_share = 0;
   for (const std::uint32_t i : order) {

@@ -18,6 +18,7 @@
 #include "cfp/geometry/p3p.hpp"
 #include "cfp/math/sampling.hpp"
 #include "cfp/math/se3.hpp"
+#include "cfp/optimization/pnp_ransac_types.hpp"
 
 namespace cfp::detail {
 
@@ -33,7 +34,7 @@ struct MatchArrays {
   Vector3<double> origin = Vector3<double>::Zero();
   std::vector<std::uint32_t> index;  // position in the caller's arrays
   std::vector<double> exact;
-  std::vector<float> fast;           // the same rounded, for scoring
+  std::vector<float> fast;  // the same rounded, for scoring
 
   [[nodiscard]] const double* array(std::size_t row) const noexcept { return exact.data() + row * capacity; }
   [[nodiscard]] const float* fast_array(std::size_t row) const noexcept { return fast.data() + row * capacity; }
@@ -193,7 +194,8 @@ struct PnpSearch {
     const bool by_weight = sampler.sampling() == Sampling::weighted;
     double inliers = 0;
     for (std::size_t i = 0; i < matches.size; ++i) inliers += is_inlier(i) ? (by_weight ? matches.weights()[i] : 1.0) : 0.0;
-    return ransac_iterations(inliers / (by_weight ? matches.total_weight : static_cast<double>(matches.size)), 3, options.confidence, options.max_iterations);
+    return ransac_iterations(inliers / (by_weight ? matches.total_weight : static_cast<double>(matches.size)), 3, options.confidence,
+                             options.max_iterations);
   }
 
   PnpCandidate run() {
