@@ -18,22 +18,10 @@
 #include "cfp/core/packet.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/math/se3.hpp"
+#include "cfp/optimization/pose_columns.hpp"
 #include "cfp/optimization/robust_loss.hpp"
 
 namespace cfp::detail {
-
-/// The observations, one array per quantity: [0, mono) pixels, [stereo_begin, stereo_end) pixels with u_right. Arrays are padded
-/// to whole packets with weight 0.
-template <typename Scalar>
-struct PoseColumns {
-  Scalar *x = nullptr, *y = nullptr, *z = nullptr;            // point relative to the start position, world axes, m
-  Scalar *u = nullptr, *v = nullptr, *u_right = nullptr;      // px; pinhole: (pixel - centre) / focal length
-  Scalar *information = nullptr;                              // 1 / sigma^2
-  Scalar *weight = nullptr;                                   // w / mean w
-  Scalar *active = nullptr;                                   // weight, or 0 for an outlier left out
-  Scalar *error = nullptr;                                    // s; negative: behind the camera, |s| as last seen in front
-  std::size_t mono = 0, stereo_begin = 0, stereo_end = 0;
-};
 
 struct PoseSystem {
   Matrix6<double> H = Matrix6<double>::Zero();  // upper triangle: sum of W J^T J

@@ -1,0 +1,125 @@
+#include "cfp/optimization/pose_system.hpp"
+
+#include <type_traits>
+#include <vector>
+
+#include "cfp/optimization/weighted_pnp.hpp"
+#include "support/catch.hpp"
+#include "support/pose_scene.hpp"
+
+namespace {
+
+using cfp::Matrix6;
+using cfp::Vector6;
+using cfp::detail::PoseColumns;
+using cfp::detail::PoseSystem;
+
+/// The residual of one observation in pixels, written down once more: u, v and, with a depth, u_right.
+Eigen::Vector3d residual(const cfp::SE3<double>& T, const Eigen::Vector3d& X, const cfp::PinholeCamera<double>& camera, double baseline_fx, bool stereo) {
+  const Eigen::Vector3d p = T.rotation * X + T.translation;
+  const double u = camera.fx * p.x() / p.z() + camera.cx;
+  return {u, camera.fy * p.y() / p.z() + camera.cy, stereo ? u - baseline_fx / p.z() : 0.0};
+}
+
+/// Normal equations of one observation (residual r, information W) from central differences through the library's update.
+PoseSystem numeric_system(const cfp::SE3<double>& T, const Eigen::Vector3d& X, const Eigen::Vector3d& r, double W, const cfp::PinholeCamera<double>& camera,
+                          double baseline_fx, bool stereo) {
+  Eigen::Matrix<double, 3, 6> J;
+  for (int k = 0; k < 6; ++k) {
+    const double h = 1e-6;
+    const Vector6<double> step = Vector6<double>::Unit(k) * h;
+    J.col(k) = (residual(cfp::se3_exp<double>(step) * T, X, camera, baseline_fx, stereo) -
+                residual(cfp::se3_exp<double>(Vector6<double>(-step)) * T, X, camera, baseline_fx, stereo)) / (2 * h);
+  }
+  PoseSystem system;
+  system.H = W * J.transpose() * J;
+  system.g = W * J.transpose() * r;
+  return system;
+}
+
+/// The camera interface without the type the packet path looks for.
+struct PlainCamera {
+  using ScalarType = double;
+  cfp::PinholeCamera<double> pinhole;
+  bool project(const cfp::Vector3<double>& p, cfp::Vector2<double>& pixel, cfp::Matrix23<double>* J = nullptr) const noexcept { return pinhole.project(p, pixel, J); }
+};
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("Pose system: H and g equal those of numeric Jacobians, pixel and depth, packet, scalar and any camera", "[optimization]", float, double) {
+  using Scalar = TestType;
+  using P = cfp::Packet<Scalar>;
+  const double tolerance = std::is_same_v<Scalar, float> ? 2e-4 : 1e-6;
+  const cfp::PinholeCamera<double> camera{535.4, 539.2, 320.1, 247.6};
+  const double baseline_fx = 40;
+  cfp::Random random(4, "jacobian");
+  for (int i = 0; i < 100; ++i) {
+    const cfp::SE3<double> T{cfp::so3_exp<double>(cfp_test::random_direction(random) * random.uniform(0, 3)), cfp_test::random_direction(random) * 0.3};
+    const Eigen::Vector3d p(random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(0.6, 4));
+    const Eigen::Vector3d X = T.rotation.transpose() * (p - T.translation);
+    const double information = random.uniform(0.2, 2), weight = random.uniform(0.1, 1);
+    const bool stereo = i % 2 == 1;
+    const Eigen::Vector3d r(random.uniform(-4, 4), random.uniform(-4, 4), stereo ? random.uniform(-4, 4) : 0.0);
+    const Eigen::Vector3d measured = residual(T, X, camera, baseline_fx, stereo) - r;
+
+    const std::size_t lanes = static_cast<std::size_t>(cfp::lanes_of<P>);
+    std::vector<Scalar> storage[10];
+    PoseColumns<Scalar> columns;
+    Scalar** pointers[10] = {&columns.x, &columns.y, &columns.z, &columns.u, &columns.v, &columns.u_right, &columns.information, &columns.active, &columns.error, &columns.weight};
+    const auto fill = [&](bool normalised) {
+      const double fu = normalised ? 1 / camera.fx : 1, fv = normalised ? 1 / camera.fy : 1, cu = normalised ? camera.cx : 0, cv = normalised ? camera.cy : 0;
+      const double values[10] = {X.x(), X.y(), X.z(), (measured[0] - cu) * fu, (measured[1] - cv) * fv, (measured[2] - cu) * fu, information, weight, 0, weight};
+      for (int c = 0; c < 10; ++c) {
+        storage[c].assign(lanes, Scalar(c == 6 ? 1 : 0));  // the other lanes: padding
+        storage[c][0] = static_cast<Scalar>(values[c]);
+        *pointers[c] = storage[c].data();
+      }
+    };
+    const PoseSystem expected = numeric_system(T, X, r, weight * information, camera, baseline_fx, stereo);
+    const auto check = [&](const PoseSystem& system) {
+      const Matrix6<double> H = system.H.selfadjointView<Eigen::Upper>();
+      CAPTURE(i, stereo, H, expected.H, system.g.transpose(), expected.g.transpose());
+      CHECK((H - expected.H).norm() < tolerance * expected.H.norm());
+      CHECK((system.g - expected.g).norm() < 20 * tolerance * expected.g.norm());
+      CHECK(system.cost == Approx(weight * information * r.squaredNorm()).epsilon(20 * tolerance));
+    };
+    const auto add = [&](auto is_stereo) {
+      constexpr bool s = decltype(is_stereo)::value;
+      PoseSystem packet, scalar, general;
+      fill(true);
+      cfp::detail::add_pinhole<P, s>(columns, 0, lanes, camera, baseline_fx, T, cfp::Trivial<P>{}, packet);
+      CHECK(static_cast<double>(columns.error[0]) == Approx(information * r.squaredNorm()).epsilon(20 * tolerance));
+      fill(true);
+      cfp::detail::add_pinhole<Scalar, s>(columns, 0, 1, camera, baseline_fx, T, cfp::Trivial<Scalar>{}, scalar);
+      fill(false);
+      cfp::detail::add_camera<s>(columns, 0, 1, PlainCamera{camera}, baseline_fx, T, cfp::Trivial<double>{}, general);
+      check(packet);
+      check(scalar);
+      check(general);
+    };
+    stereo ? add(std::true_type()) : add(std::false_type());
+  }
+}
+
+TEST_CASE("Pose system: a point behind the camera keeps the error it last had in front and adds nothing to H and g", "[optimization]") {
+  using P = cfp::Packet<double>;
+  const cfp::PinholeCamera<double> camera{500, 500, 320, 240};
+  std::vector<double> x(8), y(8), z(8, 2.0), u(8, 0.01), v(8), information(8, 1.0), active(8), error(8);
+  active[0] = 1;
+  PoseColumns<double> columns;
+  columns.x = x.data(), columns.y = y.data(), columns.z = z.data(), columns.u = u.data(), columns.v = v.data();
+  columns.information = information.data(), columns.active = active.data(), columns.error = error.data();
+  const cfp::SE3<double> front, behind{cfp::Matrix3<double>::Identity(), {0, 0, -3}};
+  const std::size_t lanes = static_cast<std::size_t>(cfp::lanes_of<P>);
+  PoseSystem first, second, third;
+  cfp::detail::add_pinhole<P, false>(columns, 0, lanes, camera, 0, front, cfp::Trivial<P>{}, first);
+  CHECK(first.cost == Approx(25.0));
+  cfp::detail::add_pinhole<P, false>(columns, 0, lanes, camera, 0, behind, cfp::Trivial<P>{}, second);
+  CHECK(second.cost == Approx(25.0));
+  CHECK(second.H.norm() == 0);
+  CHECK(second.g.norm() == 0);
+  CHECK(error[0] < 0);
+  cfp::detail::add_pinhole<P, false>(columns, 0, lanes, camera, 0, front, cfp::Trivial<P>{}, third);
+  CHECK(third.cost == Approx(25.0));
+  CHECK(error[0] == Approx(25.0));
+}
