@@ -97,3 +97,14 @@ TEMPLATE_TEST_CASE("Losses: a packet of residuals gives the scalar results", "[o
     }
   }
 }
+
+TEST_CASE("Losses: a weight outside equals one inside when the scale goes with its root", "[optimization]") {
+  for (const cfp::LossType type : all_types) {
+    for (const double w : {0.01, 0.3, 1.0}) {
+      for (const double s : {0.0, 0.5, 3.0, 7.0, 400.0}) {
+        const cfp::RobustLoss<double> outside{type, 1.7}, inside{type, 1.7 * std::sqrt(w)};
+        CHECK(w * outside.value(s) == Approx(inside.value(w * s)).epsilon(1e-12));
+      }
+    }
+  }
+}

@@ -90,10 +90,10 @@ struct PoseColumns {
         has_right = (right > 0) & (right <= 1e7);
       }
       // Not `&&`: one branch that is nearly always right instead of ten.
-      const bool usable = (w > 0) & (w <= 1e30) & (inverse_sq >= 1e-12) & (inverse_sq <= 1e12) & (std::abs(dx) <= 1e9) & (std::abs(dy) <= 1e9) &
+      const bool usable = (w >= 1e-30) & (w <= 1e30) & (inverse_sq >= 1e-12) & (inverse_sq <= 1e12) & (std::abs(dx) <= 1e9) & (std::abs(dy) <= 1e9) &
                           (std::abs(dz) <= 1e9) & (std::abs(pu) <= 1e7) & (std::abs(pv) <= 1e7);
       if (!usable) {
-        ++(w == 0 ? result.zero_weight : result.invalid);
+        ++(w >= 0 && w < 1e-30 ? result.zero_weight : result.invalid);
         continue;
       }
       const std::size_t slot = has_right ? depth_slot++ : pixel_slot++;

@@ -110,13 +110,13 @@ enum class PoseStop : std::uint8_t {
 }
 
 /// The caller's arrays, parallel, of n observations; nothing is kept. Optional spans are empty or of length n.
-/// An observation counts when point, pixel, weight and sigma are finite, the weight positive and at most 1e30, sigma within
+/// An observation counts when point, pixel, weight and sigma are finite, the weight within [1e-30, 1e30], sigma within
 /// [1e-6, 1e6] px, the pixel within 1e7 px and the point within 1e9 m of the camera; others are skipped and counted.
 template <typename Scalar>
 struct PoseObservations {
   PointSpan<Scalar, 3> points;            ///< X, world frame, m
   PointSpan<Scalar, 2> pixels;            ///< px
-  span<const Scalar> weights;             ///< w >= 0, static probabilities for example; empty: 1. w = 0 is as good as absent
+  span<const Scalar> weights;             ///< w >= 0, static probabilities for example; empty: 1. Below 1e-30, 0 for example: as good as absent
   span<const Scalar> sigmas;              ///< px, ORB-SLAM2: the scale factor of the octave; empty: 1
   span<const Scalar> inverse_sigmas_sq;   ///< 1/px^2, instead of sigmas (ORB-SLAM2: mvInvLevelSigma2 of the octave)
   span<const Scalar> depths;              ///< m, instead of u_right; not > 0 or NaN: the observation is a pixel only
@@ -134,7 +134,7 @@ struct WeightedPnPResult {
   double effective = 0;  ///< (sum w)^2 / sum w^2 of the used observations: how many of full weight they amount to
   int used = 0;          ///< observations in the problem
   int used_stereo = 0;   ///< of these with a depth
-  int zero_weight = 0;   ///< skipped: weight 0
+  int zero_weight = 0;   ///< skipped: weight below 1e-30
   int invalid = 0;       ///< skipped: not finite, negative weight or out of range
   int inliers = 0;       ///< s within the threshold and in front of the camera, at the returned pose
   int rounds = 0;        ///< rounds run
