@@ -84,14 +84,13 @@ struct PoseColumns {
       if (has_depths) {
         const double depth = static_cast<double>(observations.depths[i]);
         right = pu - baseline_fx / depth;
-        has_right = (depth > 0) & (std::abs(right) <= 1e7);
+        has_right = depth > 0 && std::abs(right) <= 1e7;
       } else if (has_u_right) {
         right = static_cast<double>(observations.u_right[i]);
-        has_right = (right > 0) & (right <= 1e7);
+        has_right = right > 0 && right <= 1e7;
       }
-      // Not `&&`: one branch that is nearly always right instead of ten.
-      const bool usable = (w >= 1e-30) & (w <= 1e30) & (inverse_sq >= 1e-12) & (inverse_sq <= 1e12) & (std::abs(dx) <= 1e9) & (std::abs(dy) <= 1e9) &
-                          (std::abs(dz) <= 1e9) & (std::abs(pu) <= 1e7) & (std::abs(pv) <= 1e7);
+      const bool usable = w >= 1e-30 && w <= 1e30 && inverse_sq >= 1e-12 && inverse_sq <= 1e12 && std::abs(dx) <= 1e9 && std::abs(dy) <= 1e9 &&
+                          std::abs(dz) <= 1e9 && std::abs(pu) <= 1e7 && std::abs(pv) <= 1e7;
       if (!usable) {
         ++(w >= 0 && w < 1e-30 ? result.zero_weight : result.invalid);
         continue;
