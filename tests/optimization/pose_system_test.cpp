@@ -37,13 +37,6 @@ PoseSystem numeric_system(const cfp::SE3<double>& T, const Eigen::Vector3d& X, c
   return system;
 }
 
-/// The camera interface without the type the packet path looks for.
-struct PlainCamera {
-  using ScalarType = double;
-  cfp::PinholeCamera<double> pinhole;
-  bool project(const cfp::Vector3<double>& p, cfp::Vector2<double>& pixel, cfp::Matrix23<double>* J = nullptr) const noexcept { return pinhole.project(p, pixel, J); }
-};
-
 }  // namespace
 
 TEMPLATE_TEST_CASE("Pose system: H and g equal those of numeric Jacobians, pixel and depth, packet, scalar and any camera", "[optimization]", float, double) {
@@ -92,7 +85,7 @@ TEMPLATE_TEST_CASE("Pose system: H and g equal those of numeric Jacobians, pixel
       fill(true);
       cfp::detail::add_pinhole<Scalar, s>(columns, 0, 1, camera, baseline_fx, T, cfp::Trivial<Scalar>{}, scalar);
       fill(false);
-      cfp::detail::add_camera<s>(columns, 0, 1, PlainCamera{camera}, baseline_fx, T, cfp::Trivial<double>{}, general);
+      cfp::detail::add_camera<s>(columns, 0, 1, cfp_test::PlainCamera{camera}, baseline_fx, T, cfp::Trivial<double>{}, general);
       check(packet);
       check(scalar);
       check(general);

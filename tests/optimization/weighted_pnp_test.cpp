@@ -168,6 +168,19 @@ TEMPLATE_TEST_CASE("Weighted PnP: packets and scalars give the same pose within 
   }
 }
 
+TEMPLATE_TEST_CASE("Weighted PnP: any type with the camera interface gives the pinhole camera's pose", "[optimization]", float, double) {
+  const auto scene = make_pose_scene<TestType>(12, mixed());
+  const cfp_test::PlainCamera plain{scene.camera};
+  cfp::WeightedPnPWorkspace<TestType> workspace;
+  for (const cfp::WeightedPnPOptions& options : {cfp::WeightedPnPOptions(), cfp::orb_slam2_pose_options()}) {
+    const auto a = cfp::refine_pose(scene.observations(), scene.camera, scene.start, options, workspace);
+    const auto b = cfp::refine_pose(scene.observations(), plain, scene.start, options, workspace);
+    CHECK(centre_distance(a.T_cam_world, b.T_cam_world) < 5e-5);
+    CHECK(a.used_stereo == b.used_stereo);
+    CHECK((a.information - b.information).norm() < 1e-3 * a.information.norm());
+  }
+}
+
 TEST_CASE("Weighted PnP: float is as accurate as double, wherever the origin is", "[optimization]") {
   std::vector<double> ratio;
   for (std::uint64_t seed = 0; seed < 100; ++seed) {

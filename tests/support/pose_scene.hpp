@@ -44,6 +44,13 @@ struct PoseScene {
   }
 };
 
+/// The camera interface without the type the packet path looks for.
+struct PlainCamera {
+  using ScalarType = double;
+  cfp::PinholeCamera<double> pinhole;
+  bool project(const cfp::Vector3<double>& p, cfp::Vector2<double>& pixel, cfp::Matrix23<double>* J = nullptr) const noexcept { return pinhole.project(p, pixel, J); }
+};
+
 inline cfp::Vector3<double> random_direction(cfp::Random& random) {
   cfp::Vector3<double> d(random.normal(), random.normal(), random.normal());
   return d / d.norm();

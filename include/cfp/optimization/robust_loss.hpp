@@ -1,7 +1,7 @@
 /// @file robust_loss.hpp
 /// Robust losses rho(s) of the squared normalised residual s = |r|^2 / sigma^2 >= 0, with rho(0) = 0 and rho'(0) = 1, so
 /// that every loss is least squares near the truth. All are non-decreasing, concave and finite for finite s; rho' lies in
-/// [0, 1]. `delta` > 0 is the scale in units of r / sigma: 1 % to 5 % tail of a Gaussian residual, for example sqrt(5.991).
+/// [0, 1]. `delta` > 0 is the scale in units of |r| / sigma, for example sqrt(5.991), the 95 % bound of a pixel's noise.
 /// A weight belongs outside: cost = sum of w rho(s), gradient weight w rho'(s).
 /// Scalar is float, double, a dual number such as ceres::Jet, or a Packet (core/packet.hpp: many residuals at once).
 /// s = +inf gives the limit (rho' = 0); a negative or NaN s is the caller's to exclude. Nothing allocates.

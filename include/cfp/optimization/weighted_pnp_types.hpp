@@ -53,7 +53,7 @@ struct WeightedPnPOptions {
 };
 
 /// ORB-SLAM2's Optimizer::PoseOptimization: 4 rounds of at most 10 iterations, each from the start pose, Huber in the first
-/// three, outliers left out (and allowed back in) after every round. Converges every round to 1e-8 of the cost.
+/// three, outliers left out (and allowed back in) after every round. A round ends early when the next step promises less than 1e-8.
 [[nodiscard]] inline WeightedPnPOptions orb_slam2_pose_options() noexcept {
   WeightedPnPOptions options;
   options.rounds = {PoseRound{LossType::huber, 1, 10, 1e-8, true, false}, PoseRound{LossType::huber, 1, 10, 1e-8, true, true},
@@ -126,8 +126,8 @@ struct PoseObservations {
 
 struct WeightedPnPResult {
   SE3<double> T_cam_world;
-  /// Inverse covariance of xi: sum of w rho'(s) J^T J / sigma^2 of the last round at the returned pose, times 1 px^-2. Zero when
-  /// the pose was not refined. A covariance in the statistical sense only for weights that are 0 or 1.
+  /// Information of xi (1/m^2, 1/(m rad), 1/rad^2): sum of w rho'(s) J^T J / sigma^2 of the last round at the returned pose. Its
+  /// inverse is a covariance in the statistical sense only for weights that are 0 or 1. Zero when the pose was not refined.
   Eigen::Matrix<double, 6, 6, Eigen::DontAlign> information = Eigen::Matrix<double, 6, 6, Eigen::DontAlign>::Zero();
   double cost = 0;       ///< sum of w rho(s) of the last round
   double chi2 = 0;       ///< sum of w s over the inliers
