@@ -137,8 +137,8 @@ void add_camera(const PoseColumns<Scalar>& columns, std::size_t begin, std::size
   constexpr int rows = stereo ? 3 : 2;
   for (std::size_t i = begin; i < end; ++i) {
     const Vector3<double> p = T * Vector3<double>(static_cast<double>(columns.x[i]), static_cast<double>(columns.y[i]), static_cast<double>(columns.z[i]));
-    Vector2<C> pixel;
-    Matrix23<C> Jp;
+    Vector2<C> pixel = Vector2<C>::Zero();
+    Matrix23<C> Jp = Matrix23<C>::Zero();
     const bool front = camera.project(p.template cast<C>(), pixel, &Jp) && p.z() > static_cast<double>(Tolerance<Scalar>::min_depth);
     double r[3] = {0, 0, 0}, J[3][6] = {};
     double s = static_cast<double>(std::abs(columns.error[i]));
