@@ -37,7 +37,7 @@ struct BaIndex {
   std::vector<std::size_t> slot_begin;  // per point
   std::vector<int> free_slots;          // per point: its first slots, those of free poses
   std::vector<int> slot_rank;
-  // Pairs a >= b of the free slots of a point, at pair_begin + a (a + 1) / 2 + b: their block in the reduced system.
+  // Pairs a <= b of the free slots of a point, from pair_begin on, a slowest: their block (b, a) in the reduced system.
   std::vector<std::size_t> pair_begin;
   std::vector<int> pair_block;
   std::vector<int> block_row, block_column;
@@ -240,17 +240,18 @@ inline void find_blocks(BaIndex& index) {
   for (int k = 0; k < index.free_poses; ++k) {
     for (std::size_t o = index.segment_begin[2 * to_index(k)]; o < index.segment_begin[2 * to_index(k) + 2]; ++o) {
       if (index.slot[o] % 2 != 0) continue;
-      const std::size_t j = to_index(index.point[o]), first = index.slot_begin[j], a = index.slot[o] / 2 - first;
-      int* pairs = index.pair_block.data() + index.pair_begin[j] + a * (a + 1) / 2;
-      for (std::size_t b = 0; b <= a; ++b) {
-        const std::size_t column = to_index(index.slot_rank[first + b]);
+      const std::size_t j = to_index(index.point[o]), first = index.slot_begin[j], b = index.slot[o] / 2 - first;
+      int* pair = index.pair_block.data() + index.pair_begin[j] + b;
+      std::size_t stride = to_index(index.free_slots[j]) - 1;
+      for (std::size_t a = 0; a <= b; ++a, pair += stride--) {
+        const std::size_t column = to_index(index.slot_rank[first + a]);
         if (index.stamp[column] != k) {
           index.stamp[column] = k;
           index.stamp_block[column] = static_cast<int>(index.block_row.size());
           index.block_row.push_back(k);
           index.block_column.push_back(static_cast<int>(column));
         }
-        pairs[b] = index.stamp_block[column];
+        *pair = index.stamp_block[column];
       }
     }
     index.diagonal_block[to_index(k)] = index.stamp_block[to_index(k)];

@@ -21,7 +21,7 @@ struct BaSchur {
   static constexpr std::size_t point_doubles = 10;  // V'^-1 (00 01 02 11 12 22), g, D
   std::vector<double> blocks[ba_parts];             // 36 per block, column-major
   std::vector<double> right_side[ba_parts];         // 6 per free rank
-  std::vector<double> scratch[ba_parts];            // 36 per free slot of one point: W^T, W V'^-1
+  std::vector<double> scratch[ba_parts];            // ba_slot_scratch per free slot of one point
   std::vector<double> points;
 };
 
@@ -55,23 +55,52 @@ inline void multiply_symmetric(const double* S, const double (&x)[3], double (&y
   y[2] = S[2] * x[0] + S[4] * x[1] + S[5] * x[2];
 }
 
-/// W^T = N G^T = [N, (hat(d) N)^T] as a column-major 3x6 matrix.
-inline void cross_block(const double* N, double x, double y, double z, double* Wt) noexcept {
-  Wt[0] = N[0], Wt[1] = N[1], Wt[2] = N[2];
-  Wt[3] = N[1], Wt[4] = N[3], Wt[5] = N[4];
-  Wt[6] = N[2], Wt[7] = N[4], Wt[8] = N[5];
-  Wt[9] = y * N[2] - z * N[1], Wt[10] = y * N[4] - z * N[3], Wt[11] = y * N[5] - z * N[4];
-  Wt[12] = z * N[0] - x * N[2], Wt[13] = z * N[1] - x * N[4], Wt[14] = z * N[2] - x * N[5];
-  Wt[15] = x * N[1] - y * N[0], Wt[16] = x * N[3] - y * N[1], Wt[17] = x * N[4] - y * N[2];
+/// What the pairs of one slot need: W = G N = [N; hat(d) N] (6x3), V'^-1 N (3x3), both column-major, and d = x - c.
+inline constexpr int ba_slot_scratch = 30;
+
+inline void fill_scratch(const double* N, const double (&d)[3], const double* V_inverse, double* scratch) noexcept {
+  const double n[3][3] = {{N[0], N[1], N[2]}, {N[1], N[3], N[4]}, {N[2], N[4], N[5]}};
+  for (int c = 0; c < 3; ++c) {
+    double column[3];
+    multiply_symmetric(V_inverse, n[c], column);
+    double* const W = scratch + 6 * c;
+    W[0] = n[0][c], W[1] = n[1][c], W[2] = n[2][c];
+    W[3] = d[1] * n[2][c] - d[2] * n[1][c];
+    W[4] = d[2] * n[0][c] - d[0] * n[2][c];
+    W[5] = d[0] * n[1][c] - d[1] * n[0][c];
+    for (int r = 0; r < 3; ++r) scratch[18 + 3 * c + r] = column[r];
+    scratch[27 + c] = d[c];
+  }
+}
+
+/// Takes W_b V'^-1 W_a^T from the blocks (b, a) of all pairs a <= b < count of the slots of one point. Half of each block follows from the
+/// other: with T = W_b V'^-1 N_a it is [T, T hat(d_a)^T].
+inline void subtract_pairs(const double* scratch, int count, const int* pair, double* blocks) noexcept {
+  using Column = Eigen::Map<Vector6<double>>;
+  using ConstColumn = Eigen::Map<const Vector6<double>>;
+  for (int a = 0; a < count; ++a) {
+    const double* const p = scratch + ba_slot_scratch * a + 18;
+    const double x = p[9], y = p[10], z = p[11];
+    for (int b = a; b < count; ++b, ++pair) {
+      const ConstColumn w0(scratch + ba_slot_scratch * b), w1(scratch + ba_slot_scratch * b + 6), w2(scratch + ba_slot_scratch * b + 12);
+      double* const block = blocks + 36 * to_index(*pair);
+      const Vector6<double> t0 = w0 * p[0] + w1 * p[1] + w2 * p[2];
+      const Vector6<double> t1 = w0 * p[3] + w1 * p[4] + w2 * p[5];
+      const Vector6<double> t2 = w0 * p[6] + w1 * p[7] + w2 * p[8];
+      Column(block) -= t0;
+      Column(block + 6) -= t1;
+      Column(block + 12) -= t2;
+      Column(block + 18) -= t2 * y - t1 * z;
+      Column(block + 24) -= t0 * z - t2 * x;
+      Column(block + 30) -= t1 * x - t0 * y;
+    }
+  }
 }
 
 /// The share of one part of the points in the reduced system; part 0 starts from the poses' own blocks. False when a point's
 /// block is not positive definite, which only rounding or overflow can cause.
 [[nodiscard]] inline bool eliminate_points(const BaIndex& index, const BaState& state, const BaLinearization& linear, double lambda, int part,
                                            BaSchur& schur) noexcept {
-  using Block = Eigen::Map<Matrix6<double>>;
-  using Wide = Eigen::Map<const Eigen::Matrix<double, 3, 6>>;
-  using Tall = Eigen::Map<Eigen::Matrix<double, 6, 3>>;
   double* const blocks = schur.blocks[part].data();
   double* const right_side = schur.right_side[part].data();
   double* const scratch = schur.scratch[part].data();
@@ -96,32 +125,26 @@ inline void cross_block(const double* N, double x, double y, double z, double* W
     }
     const double scale = damping_scale(sum[0] + sum[3] + sum[5]);
     const double V[6] = {sum[0] + lambda * scale, sum[1], sum[2], sum[3] + lambda * scale, sum[4], sum[5] + lambda * scale};
-    const double g[3] = {sum[6], sum[7], sum[8]};
+    const double gradient[3] = {sum[6], sum[7], sum[8]};
     double* const point = schur.points.data() + BaSchur::point_doubles * j;
     if (!invert_symmetric(V, point)) return false;
-    point[6] = g[0], point[7] = g[1], point[8] = g[2], point[9] = scale;
+    std::copy(gradient, gradient + 3, point + 6), point[9] = scale;
     double Vg[3];
-    multiply_symmetric(point, g, Vg);
+    multiply_symmetric(point, gradient, Vg);
 
     const double* x = state.points.data() + 3 * j;
     const int* rank = index.slot_rank.data() + index.slot_begin[j];
-    const int* pair = index.pair_block.data() + index.pair_begin[j];
     for (int a = 0; a < index.free_slots[j]; ++a, slot += BaLinearization::slot_doubles) {
       const double* c = state.poses[to_index(rank[a])].center;
-      double* const Wt = scratch + 36 * a;
-      cross_block(slot, x[0] - c[0], x[1] - c[1], x[2] - c[2], Wt);
-      Tall WV(Wt + 18);
-      for (int r = 0; r < 6; ++r) {
-        const double w[3] = {Wt[3 * r], Wt[3 * r + 1], Wt[3 * r + 2]};
-        double y[3];
-        multiply_symmetric(point, w, y);
-        WV(r, 0) = y[0], WV(r, 1) = y[1], WV(r, 2) = y[2];
-        right_side[6 * rank[a] + r] += w[0] * Vg[0] + w[1] * Vg[1] + w[2] * Vg[2];
-      }
-      for (int b = 0; b <= a; ++b, ++pair) {
-        Block(blocks + 36 * to_index(*pair)).noalias() -= WV.lazyProduct(Wide(scratch + 36 * b));
-      }
+      const double d[3] = {x[0] - c[0], x[1] - c[1], x[2] - c[2]};
+      fill_scratch(slot, d, point, scratch + ba_slot_scratch * a);
+      double n[3];
+      multiply_symmetric(slot, Vg, n);
+      double* const g = right_side + 6 * rank[a];
+      g[0] += n[0], g[1] += n[1], g[2] += n[2];
+      g[3] += d[1] * n[2] - d[2] * n[1], g[4] += d[2] * n[0] - d[0] * n[2], g[5] += d[0] * n[1] - d[1] * n[0];
     }
+    subtract_pairs(scratch, index.free_slots[j], index.pair_block.data() + index.pair_begin[j], blocks);
   }
   return true;
 }

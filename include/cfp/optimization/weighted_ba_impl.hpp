@@ -65,7 +65,7 @@ void prepare(const BaProblem<Camera, Scalar>& problem, WeightedBaWorkspace& work
   for (std::size_t part = 0; part < to_index(ba_parts); ++part) {
     work.schur.blocks[part].resize(36 * index.block_row.size());
     work.schur.right_side[part].resize(6 * free_poses);
-    work.schur.scratch[part].resize(36 * to_index(index.max_free_slots));
+    work.schur.scratch[part].resize(to_index(ba_slot_scratch * index.max_free_slots));
   }
   work.schur.points.resize(BaSchur::point_doubles * points);
   work.pose_steps.resize(6 * free_poses);
