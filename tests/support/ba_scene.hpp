@@ -20,7 +20,7 @@ struct BaSceneOptions {
   int fixed = 2;                  ///< the first poses, held at the truth
   double outlier_share = 0.05;    ///< observations moved by up to 40 px
   double noise_px = 1;
-  double rgbd_share = 0;          ///< observations with u_right
+  double stereo_share = 0;          ///< observations with u_right
   double start_position_m = 0.01; ///< standard deviation of the start of free poses
   double start_angle_deg = 0.5;
   double start_point_m = 0.02;
@@ -30,22 +30,22 @@ struct BaSceneOptions {
 
 struct BaScene {
   cfp::PinholeCamera<double> camera{535.4, 539.2, 320.1, 247.6};
-  double fx_baseline = 40;
+  double baseline_fx = 40;
   std::vector<cfp::SE3<double>> true_poses, poses;
   std::vector<cfp::Vector3<double>> true_points, points;
   std::vector<char> fixed;
   std::vector<int> pose, point;
   std::vector<cfp::Vector2<double>> pixels;
-  std::vector<double> right_u, sigma, weights;
+  std::vector<double> u_right, sigma, weights;
 
   [[nodiscard]] cfp::BaProblem<> problem() {
     cfp::BaProblem<> p;
     p.poses = poses;
     p.points = points;
     p.cameras = cfp::span<const cfp::PinholeCamera<double>>(&camera, 1);
-    p.observations = {pose, point, pixels, right_u, sigma, weights};
+    p.observations = {pose, point, pixels, u_right, sigma, weights};
     p.fixed_poses = fixed;
-    p.fx_baseline_px_m = fx_baseline;
+    p.baseline_fx = baseline_fx;
     return p;
   }
   /// Root mean square distance of the camera centres to the truth, m.
@@ -95,13 +95,13 @@ inline BaScene make_ba_scene(const BaSceneOptions& options, std::uint64_t seed) 
         const double sigma = options.octaves ? std::pow(1.2, random.index(8)) : 1.0;
         const bool outlier = random.uniform() < options.outlier_share;
         const double du = outlier ? random.uniform(-40, 40) : 0, dv = outlier ? random.uniform(-40, 40) : 0;
-        const double right = pixel.x() - scene.fx_baseline / p.z() + sigma * options.noise_px * random.normal() + (outlier ? random.uniform(-40, 40) : 0);
+        const double right = pixel.x() - scene.baseline_fx / p.z() + sigma * options.noise_px * random.normal() + (outlier ? random.uniform(-40, 40) : 0);
         pixel.x() += sigma * options.noise_px * random.normal() + du;
         pixel.y() += sigma * options.noise_px * random.normal() + dv;
         scene.pose.push_back(k);
         scene.point.push_back(j);
         scene.pixels.push_back(pixel);
-        scene.right_u.push_back(random.uniform() < options.rgbd_share ? right : -1.0);
+        scene.u_right.push_back(random.uniform() < options.stereo_share ? right : -1.0);
         scene.sigma.push_back(sigma);
         scene.weights.push_back(options.random_weights ? random.uniform() : 1.0);
         ++views;

@@ -53,19 +53,19 @@ struct BaIndex {
 /// One observation as numbers; false when it is invalid.
 struct BaMeasurement {
   double u = 0, v = 0, disparity = 0, weight = 1, inv_sigma_sq = 1;
-  bool rgbd = false;
+  bool stereo = false;
 };
 
 template <typename Scalar>
-[[nodiscard]] bool read_measurement(const BaObservations<Scalar>& observations, std::size_t i, double fx_baseline, BaMeasurement& m) noexcept {
+[[nodiscard]] bool read_measurement(const BaObservations<Scalar>& observations, std::size_t i, double baseline_fx, BaMeasurement& m) noexcept {
   m.u = static_cast<double>(observations.pixels(i, 0));
   m.v = static_cast<double>(observations.pixels(i, 1));
   m.weight = observations.weights.empty() ? 1.0 : static_cast<double>(observations.weights[i]);
-  const double sigma = observations.sigma_px.empty() ? 1.0 : static_cast<double>(observations.sigma_px[i]);
+  const double sigma = observations.sigmas.empty() ? 1.0 : static_cast<double>(observations.sigmas[i]);
   m.inv_sigma_sq = 1 / (sigma * sigma);
-  const double right = observations.right_u.empty() ? -1.0 : static_cast<double>(observations.right_u[i]);
-  m.rgbd = right >= 0 && is_finite(right) && fx_baseline > 0 && is_finite(fx_baseline);
-  m.disparity = m.rgbd ? m.u - right : 0.0;
+  const double right = observations.u_right.empty() ? -1.0 : static_cast<double>(observations.u_right[i]);
+  m.stereo = right > 0 && is_finite(right) && baseline_fx > 0 && is_finite(baseline_fx);
+  m.disparity = m.stereo ? m.u - right : 0.0;
   return is_finite(m.u) && is_finite(m.v) && m.weight >= 0 && is_finite(m.weight) && sigma > 0 && m.inv_sigma_sq > 0 &&
          is_finite(m.inv_sigma_sq);
 }
@@ -73,13 +73,13 @@ template <typename Scalar>
 /// |r|^2 / sigma^2 of one observation; false when the camera does not see the point.
 template <typename Camera>
 [[nodiscard]] bool squared_error(const Camera& camera, const SE3<double>& T_cam_world, const Vector3<double>& point, const BaMeasurement& m,
-                                 double fx_baseline, double& error) noexcept {
+                                 double baseline_fx, double& error) noexcept {
   using Real = typename Camera::ScalarType;
   const Vector3<double> p = T_cam_world * point;
   Vector2<Real> pixel;
   if (!camera.project(p.template cast<Real>(), pixel)) return false;
   const double du = static_cast<double>(pixel.x()) - m.u, dv = static_cast<double>(pixel.y()) - m.v;
-  const double dr = m.rgbd ? du + m.disparity - fx_baseline / p.z() : 0.0;
+  const double dr = m.stereo ? du + m.disparity - baseline_fx / p.z() : 0.0;
   error = (du * du + dv * dv + dr * dr) * m.inv_sigma_sq;
   return true;
 }
@@ -105,7 +105,7 @@ void select_observations(const BaProblem<Camera, Scalar>& problem, BaIndex& inde
     const int k = observations.pose[i], j = observations.point[i];
     BaMeasurement m;
     if (!(k >= 0 && to_index(k) < problem.poses.size() && j >= 0 && to_index(j) < problem.points.size()) ||
-        !read_measurement(observations, i, problem.fx_baseline_px_m, m)) {
+        !read_measurement(observations, i, problem.baseline_fx, m)) {
       ++result.invalid;
       continue;
     }
@@ -120,7 +120,7 @@ void select_observations(const BaProblem<Camera, Scalar>& problem, BaIndex& inde
       continue;
     }
     double error = 0;
-    if (!squared_error(camera_of(problem.cameras, k), pose, point, m, problem.fx_baseline_px_m, error)) {
+    if (!squared_error(camera_of(problem.cameras, k), pose, point, m, problem.baseline_fx, error)) {
       ++result.behind;
     } else if (!is_finite(error * m.weight)) {
       ++result.invalid;
@@ -194,8 +194,8 @@ void sort_by_pose(const BaProblem<Camera, Scalar>& problem, BaIndex& index) {
   const std::size_t ranks = index.pose_of_rank.size(), n = index.kept.size();
   BaMeasurement m;
   const auto segment_of = [&](int i) {
-    (void)read_measurement(observations, to_index(i), problem.fx_baseline_px_m, m);
-    return 2 * to_index(index.rank_of[to_index(observations.pose[to_index(i)])]) + (m.rgbd ? 1U : 0U);
+    (void)read_measurement(observations, to_index(i), problem.baseline_fx, m);
+    return 2 * to_index(index.rank_of[to_index(observations.pose[to_index(i)])]) + (m.stereo ? 1U : 0U);
   };
   index.segment_begin.assign(2 * ranks + 1, 0);
   for (const int i : index.kept) ++index.segment_begin[segment_of(i) + 1];

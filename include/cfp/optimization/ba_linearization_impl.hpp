@@ -133,8 +133,8 @@ inline void store_pose(const BaPoseSums& sums, double* target) noexcept {
 }
 
 /// One segment of one pose: fills its slots, adds to the pose's sums (null: the pose is fixed) and returns the cost.
-template <bool Rgbd, typename Camera, typename Loss>
-double linearize_segment(const BaIndex& index, std::size_t begin, std::size_t end, const Camera& camera, double fx_baseline, const Loss& loss,
+template <bool Stereo, typename Camera, typename Loss>
+double linearize_segment(const BaIndex& index, std::size_t begin, std::size_t end, const Camera& camera, double baseline_fx, const Loss& loss,
                          const BaPose& pose, const double* points, double* slots, BaPoseSums* sums) noexcept {
   BaChunk chunk;
   BaChunk::Array N[6], n[3], omega;
@@ -154,13 +154,13 @@ double linearize_segment(const BaIndex& index, std::size_t begin, std::size_t en
       const double ru = chunk.residual_u[i] -= index.u[o];
       const double rv = chunk.residual_v[i] -= index.v[o];
       double s = ru * ru + rv * rv;
-      if constexpr (Rgbd) {
-        residual_r[i] = ru + index.disparity[o] - fx_baseline / chunk.depth[i];
+      if constexpr (Stereo) {
+        residual_r[i] = ru + index.disparity[o] - baseline_fx / chunk.depth[i];
         s += residual_r[i] * residual_r[i];
       }
       s *= index.inv_sigma_sq[o];
-      if (!(chunk.depth[i] > Tolerance<double>::min_depth)) s = std::numeric_limits<double>::quiet_NaN();
-      cost += index.weight[o] * loss.value(s);
+      const bool seen = chunk.depth[i] > Tolerance<double>::min_depth;
+      cost += seen ? index.weight[o] * loss.value(s) : std::numeric_limits<double>::quiet_NaN();
       omega[i] = index.weight[o] * index.inv_sigma_sq[o] * loss.first(s);
     }
     for (int i = 0; i < padded; ++i) {
@@ -178,11 +178,11 @@ double linearize_segment(const BaIndex& index, std::size_t begin, std::size_t en
       n[1][i] = wu * u1 + wv * v1;
       n[2][i] = wu * u2 + wv * v2;
     }
-    if constexpr (Rgbd) {
+    if constexpr (Stereo) {
       for (int i = count; i < padded; ++i) residual_r[i] = 0;
       const double* R2 = pose.rotation + 6;
       for (int i = 0; i < padded; ++i) {
-        const double t = fx_baseline / (chunk.depth[i] * chunk.depth[i]);
+        const double t = baseline_fx / (chunk.depth[i] * chunk.depth[i]);
         const double u0 = chunk.row_u[0][i] + t * R2[0], u1 = chunk.row_u[1][i] + t * R2[1], u2 = chunk.row_u[2][i] + t * R2[2];
         const double a0 = omega[i] * u0, a1 = omega[i] * u1, a2 = omega[i] * u2, r = residual_r[i];
         N[0][i] += a0 * u0;
@@ -213,16 +213,16 @@ double linearize_segment(const BaIndex& index, std::size_t begin, std::size_t en
 }
 
 /// All observations of one rank.
-template <typename Camera, typename MonoLoss, typename RgbdLoss>
-void linearize_pose(const BaIndex& index, int rank, const Camera& camera, double fx_baseline, const MonoLoss& mono, const RgbdLoss& rgbd,
+template <typename Camera, typename MonoLoss, typename StereoLoss>
+void linearize_pose(const BaIndex& index, int rank, const Camera& camera, double baseline_fx, const MonoLoss& mono, const StereoLoss& stereo,
                     const BaState& state, BaLinearization& out) noexcept {
   const std::size_t r = to_index(rank);
   BaPoseSums sums = {};
   BaPoseSums* const target = rank < index.free_poses ? &sums : nullptr;
   const std::size_t* begin = index.segment_begin.data() + 2 * r;
   const double* points = state.points.data();
-  out.costs[r] = linearize_segment<false>(index, begin[0], begin[1], camera, fx_baseline, mono, state.poses[r], points, out.slots.data(), target) +
-                 linearize_segment<true>(index, begin[1], begin[2], camera, fx_baseline, rgbd, state.poses[r], points, out.slots.data(), target);
+  out.costs[r] = linearize_segment<false>(index, begin[0], begin[1], camera, baseline_fx, mono, state.poses[r], points, out.slots.data(), target) +
+                 linearize_segment<true>(index, begin[1], begin[2], camera, baseline_fx, stereo, state.poses[r], points, out.slots.data(), target);
   if (target != nullptr) store_pose(sums, out.poses.data() + r * BaLinearization::pose_doubles);
 }
 

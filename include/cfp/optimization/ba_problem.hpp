@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstring>
 
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
@@ -22,8 +23,8 @@ struct BaObservations {
   span<const int> pose;             ///< index into BaProblem::poses
   span<const int> point;            ///< index into BaProblem::points
   PointSpan<Scalar, 2> pixels;      ///< (u, v)
-  span<const Scalar> right_u = {};  ///< u_right = u - fx b / z of a stereo or RGB-D observation; negative or not finite: mono. Empty: all mono
-  span<const Scalar> sigma_px = {}; ///< standard deviation, for example 1.2^octave. Empty: all 1
+  span<const Scalar> u_right = {};  ///< px, u - fx b / z of a stereo or RGB-D observation; not > 0 or NaN: a pixel only. Empty: all mono
+  span<const Scalar> sigmas = {}; ///< px, ORB-SLAM2: the scale factor of the octave. Empty: all 1
   span<const Scalar> weights = {};  ///< w >= 0, for example the static probability. Empty: all 1
 };
 
@@ -35,22 +36,30 @@ struct BaProblem {
   span<const Camera> cameras;         ///< one for all poses, or one per pose; any type like PinholeCamera
   BaObservations<Scalar> observations;
   span<const char> fixed_poses = {};  ///< per pose: not 0 = held. Empty: all free
-  double fx_baseline_px_m = 0;        ///< fx b of the stereo or RGB-D observations, px m; not positive: all observations are mono
+  double baseline_fx = 0;             ///< fx times stereo baseline, px m (ORB-SLAM2: Camera.bf); not > 0: all observations are mono
 };
 
 struct WeightedBaOptions {
   LevenbergMarquardtOptions levenberg_marquardt;
   LossType loss = LossType::huber;
-  double mono_threshold = 5.991;  ///< delta^2 of the loss for two residuals: the 95 % point of chi-squared with 2 degrees of freedom
-  double rgbd_threshold = 7.815;  ///< delta^2 of the loss for three residuals: 3 degrees of freedom
+  double chi2_mono = 5.991;    ///< delta^2 of the loss for two residuals, > 0: 95 % of chi^2 with 2 degrees of freedom
+  double chi2_stereo = 7.815;  ///< delta^2 of the loss for three residuals, > 0: 3 degrees of freedom
 };
 
 /// The first field outside its range, or nullptr.
 [[nodiscard]] inline const char* invalid_field(const WeightedBaOptions& options) noexcept {
-  if (const char* field = invalid_field(options.levenberg_marquardt)) return field;
+  constexpr const char* nested[] = {"levenberg_marquardt.max_iterations",        "levenberg_marquardt.initial_damping",
+                                    "levenberg_marquardt.min_damping",           "levenberg_marquardt.max_damping",
+                                    "levenberg_marquardt.min_relative_decrease", "levenberg_marquardt.min_absolute_decrease"};
+  if (const char* field = invalid_field(options.levenberg_marquardt)) {
+    for (const char* name : nested) {
+      if (std::strcmp(std::strchr(name, '.') + 1, field) == 0) return name;
+    }
+    return "levenberg_marquardt";
+  }
   if (invalid_field(RobustLoss<double>{options.loss, 1.0}) != nullptr) return "loss";
-  if (!(options.mono_threshold > 0) || !is_finite(options.mono_threshold)) return "mono_threshold";
-  if (!(options.rgbd_threshold > 0) || !is_finite(options.rgbd_threshold)) return "rgbd_threshold";
+  if (!(options.chi2_mono > 0) || !is_finite(options.chi2_mono)) return "chi2_mono";
+  if (!(options.chi2_stereo > 0) || !is_finite(options.chi2_stereo)) return "chi2_stereo";
   return nullptr;
 }
 

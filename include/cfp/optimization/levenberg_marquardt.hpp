@@ -15,7 +15,7 @@ namespace cfp {
 struct LevenbergMarquardtOptions {
   int max_iterations = 10;              ///< steps tried, accepted or not, >= 0
   double initial_damping = 1e-4;        ///< relative to the scale of the Hessian's diagonal, > 0
-  double min_damping = 1e-10;           ///< > 0: below it rounding would make an undetermined system singular
+  double min_damping = 1e-8;            ///< > 0: below it rounding would make an undetermined system singular
   double max_damping = 1e10;            ///< >= min_damping; beyond it no step helps
   double min_relative_decrease = 1e-6;  ///< stop when a step promises or brings less than this share of the cost, >= 0
   double min_absolute_decrease = 1e-9;  ///< stop when a step promises less than this, >= 0

@@ -41,10 +41,10 @@ WeightedBaResult adjust_bundle(const BaProblem<Camera, Scalar>& problem, const W
   detail::build_index(problem, workspace.index, result);
   detail::prepare(problem, workspace, result);
   if (result.used > 0) {
-    with_loss<double>(options.loss, std::sqrt(options.mono_threshold), [&](auto mono) {
-      auto rgbd = mono;
-      rgbd.delta = std::sqrt(options.rgbd_threshold);
-      detail::minimize(problem, options.levenberg_marquardt, mono, rgbd, workspace, executor, result);
+    with_loss<double>(options.loss, std::sqrt(options.chi2_mono), [&](auto mono) {
+      auto stereo = mono;
+      stereo.delta = std::sqrt(options.chi2_stereo);
+      detail::minimize(problem, options.levenberg_marquardt, mono, stereo, workspace, executor, result);
     });
     if (result.accepted > 0) detail::write_back(problem, workspace);
   }

@@ -36,8 +36,8 @@ void assert_shapes([[maybe_unused]] const BaProblem<Camera, Scalar>& problem) no
   [[maybe_unused]] const auto& o = problem.observations;
   [[maybe_unused]] const std::size_t n = o.pose.size();
   CFP_ASSERT(o.point.size() == n && o.pixels.size() == n);
-  CFP_ASSERT(o.right_u.empty() || o.right_u.size() == n);
-  CFP_ASSERT(o.sigma_px.empty() || o.sigma_px.size() == n);
+  CFP_ASSERT(o.u_right.empty() || o.u_right.size() == n);
+  CFP_ASSERT(o.sigmas.empty() || o.sigmas.size() == n);
   CFP_ASSERT(o.weights.empty() || o.weights.size() == n);
   CFP_ASSERT(problem.fixed_poses.empty() || problem.fixed_poses.size() == problem.poses.size());
   CFP_ASSERT(n == 0 || problem.cameras.size() == 1 || problem.cameras.size() == problem.poses.size());
@@ -82,13 +82,13 @@ void prepare(const BaProblem<Camera, Scalar>& problem, WeightedBaWorkspace& work
 }
 
 /// The normal equations at a state; returns the cost, NaN when a point is behind a camera that used to see it.
-template <typename Camera, typename Scalar, typename MonoLoss, typename RgbdLoss, typename Executor>
-double linearize(const BaProblem<Camera, Scalar>& problem, const MonoLoss& mono, const RgbdLoss& rgbd, const BaIndex& index, const BaState& state,
+template <typename Camera, typename Scalar, typename MonoLoss, typename StereoLoss, typename Executor>
+double linearize(const BaProblem<Camera, Scalar>& problem, const MonoLoss& mono, const StereoLoss& stereo, const BaIndex& index, const BaState& state,
                  BaLinearization& linear, Executor& executor) {
   executor(ba_parts, [&](int part) {
     for (int r = index.rank_part[to_index(part)]; r < index.rank_part[to_index(part) + 1]; ++r) {
       const Camera& camera = camera_of(problem.cameras, index.pose_of_rank[to_index(r)]);
-      linearize_pose(index, r, camera, problem.fx_baseline_px_m, mono, rgbd, state, linear);
+      linearize_pose(index, r, camera, problem.baseline_fx, mono, stereo, state, linear);
     }
   });
   double cost = 0;
@@ -123,10 +123,10 @@ template <typename Executor>
   return is_finite(promised);
 }
 
-template <typename Camera, typename Scalar, typename MonoLoss, typename RgbdLoss, typename Executor>
-void minimize(const BaProblem<Camera, Scalar>& problem, const LevenbergMarquardtOptions& options, const MonoLoss& mono, const RgbdLoss& rgbd,
+template <typename Camera, typename Scalar, typename MonoLoss, typename StereoLoss, typename Executor>
+void minimize(const BaProblem<Camera, Scalar>& problem, const LevenbergMarquardtOptions& options, const MonoLoss& mono, const StereoLoss& stereo,
               WeightedBaWorkspace& work, Executor& executor, WeightedBaResult& result) {
-  double cost = linearize(problem, mono, rgbd, work.index, work.state, work.linear, executor);
+  double cost = linearize(problem, mono, stereo, work.index, work.state, work.linear, executor);
   result.reason = StopReason::not_finite;
   if (!is_finite(cost)) return;
   result.initial_cost = result.final_cost = cost;
@@ -140,7 +140,7 @@ void minimize(const BaProblem<Camera, Scalar>& problem, const LevenbergMarquardt
         result.reason = damping.last_step_rejected() ? StopReason::no_progress : StopReason::converged;
         break;
       }
-      const double next_cost = linearize(problem, mono, rgbd, work.index, work.next_state, work.next_linear, executor);
+      const double next_cost = linearize(problem, mono, stereo, work.index, work.next_state, work.next_linear, executor);
       const double decrease = cost - next_cost;
       if (damping.accept(decrease / promised)) {
         std::swap(work.state, work.next_state);
@@ -190,9 +190,9 @@ void write_squared_errors(const BaProblem<Camera, Scalar>& problem, span<double>
     BaMeasurement m;
     double error = -1;
     const bool judged = k >= 0 && to_index(k) < problem.poses.size() && j >= 0 && to_index(j) < problem.points.size() &&
-                        read_measurement(observations, i, problem.fx_baseline_px_m, m) &&
+                        read_measurement(observations, i, problem.baseline_fx, m) &&
                         squared_error(camera_of(problem.cameras, k), problem.poses[to_index(k)], problem.points[to_index(j)], m,
-                                      problem.fx_baseline_px_m, error);
+                                      problem.baseline_fx, error);
     squared_errors[i] = judged && is_finite(error) ? error : -1;
   }
 }
