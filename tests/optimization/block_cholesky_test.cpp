@@ -52,7 +52,7 @@ TEST_CASE("The block factorisation solves as a dense one, in natural and in mini
   struct Case {
     int size, band, far;
   };
-  for (const Case c : {Case{0, 0, 0}, Case{1, 0, 0}, Case{2, 1, 0}, Case{9, 8, 0}, Case{40, 2, 15}, Case{100, 4, 30}}) {
+  for (const Case c : {Case{0, 0, 0}, Case{1, 0, 0}, Case{2, 1, 0}, Case{9, 8, 0}, Case{40, 2, 15}, Case{80, 79, 0}, Case{100, 4, 30}}) {
     System system(c.size, c.band, c.far, 5);
     for (const int natural_order_limit : {0, 1000}) {
       CAPTURE(c.size, natural_order_limit);

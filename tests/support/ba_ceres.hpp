@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <ceres/ceres.h>
+#include <glog/logging.h>
 
 #include "cfp/math/se3.hpp"
 #include "cfp/optimization/ba_problem.hpp"
@@ -133,6 +134,7 @@ CeresResult solve_with_ceres(const cfp::BaProblem<Camera, Scalar>& p, const cfp:
   solver.linear_solver_ordering = ordering;
   solver.max_num_iterations = options.levenberg_marquardt.max_iterations;
   solver.logging_type = ceres::SILENT;
+  FLAGS_minloglevel = google::ERROR;  // a failed factorisation is part of its normal course
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
   for (std::size_t k = 0; k < p.poses.size(); ++k) {

@@ -24,12 +24,13 @@ class BlockCholesky {
  public:
   static constexpr int block_size = 6;
   static constexpr std::size_t block_doubles = 36;
+  static constexpr int dense_limit = 64;  ///< up to this many block rows the factor is never treated as dense
 
   /// Symbolic factorisation for `size` block rows whose non-zero blocks on and below the diagonal are (rows[i], columns[i]),
   /// rows[i] >= columns[i], each once, all diagonal ones among them, in any order. Up to `natural_order_limit` rows the
   /// order is kept (any fill is cheap there) and nothing allocates after a first call of that size; beyond it an
   /// approximate minimum degree order is computed, which allocates.
-  void analyze(int size, span<const int> rows, span<const int> columns, int natural_order_limit = 64) {
+  void analyze(int size, span<const int> rows, span<const int> columns, int natural_order_limit = dense_limit) {
     CFP_ASSERT(size >= 0 && rows.size() == columns.size());
     size_ = size;
     position_.resize(static_cast<std::size_t>(size));
@@ -40,12 +41,16 @@ class BlockCholesky {
     }
     find_fill(rows, columns);
     locate_inputs(rows, columns);
+    dense_ = size > dense_limit && 4 * row_.size() > to(size) * to(size);
+    values_.resize(dense_ ? 0 : row_.size() * block_doubles);
+    dense_values_.resize(dense_ ? block_size * size : 0, dense_ ? block_size * size : 0);
   }
 
   /// Factorises the matrix whose block i (in the order given to analyze) is blocks[36 i …]; of diagonal blocks the lower
   /// triangle is read. False when it is not positive definite (NaN included).
   [[nodiscard]] bool factorize(span<const double> blocks) noexcept {
     CFP_ASSERT(blocks.size() == input_.size() * block_doubles);
+    if (dense_) return factorize_dense(blocks);
     std::fill(values_.begin(), values_.end(), 0.0);
     for (std::size_t i = 0; i < input_.size(); ++i) {
       const ConstBlock source(blocks.data() + i * block_doubles);
@@ -63,25 +68,20 @@ class BlockCholesky {
   void solve(span<double> vector) noexcept {
     CFP_ASSERT(vector.size() == to(size_) * block_size);
     for (int i = 0; i < size_; ++i) segment(permuted_, position_[to(i)]) = ConstSegment(vector.data() + to(i) * block_size);
-    for (int k = 0; k < size_; ++k) {
-      Segment x = segment(permuted_, k);
-      x = diagonal_inverse(k).triangularView<Eigen::Lower>() * Vector6<double>(x);
-      for (std::size_t e = column_begin_[to(k)] + 1; e < column_begin_[to(k) + 1]; ++e) {
-        segment(permuted_, row_[e]).noalias() -= block(e).lazyProduct(x);
-      }
-    }
-    for (int k = size_ - 1; k >= 0; --k) {
-      Segment x = segment(permuted_, k);
-      for (std::size_t e = column_begin_[to(k)] + 1; e < column_begin_[to(k) + 1]; ++e) {
-        x.noalias() -= block(e).transpose().lazyProduct(segment(permuted_, row_[e]));
-      }
-      x = diagonal_inverse(k).transpose().triangularView<Eigen::Upper>() * Vector6<double>(x);
+    if (dense_) {
+      Eigen::Map<Eigen::VectorXd> x(permuted_.data(), dense_values_.rows());
+      dense_values_.triangularView<Eigen::Lower>().solveInPlace(x);
+      dense_values_.transpose().triangularView<Eigen::Upper>().solveInPlace(x);
+    } else {
+      solve_sparse();
     }
     for (int i = 0; i < size_; ++i) Segment(vector.data() + to(i) * block_size) = segment(permuted_, position_[to(i)]);
   }
 
   /// Blocks of the factor, for reports.
   [[nodiscard]] std::size_t factor_blocks() const noexcept { return row_.size(); }
+  /// Whether the factor is kept as a dense matrix.
+  [[nodiscard]] bool is_dense() const noexcept { return dense_; }
 
  private:
   using Block = Eigen::Map<Matrix6<double>>;
@@ -90,6 +90,7 @@ class BlockCholesky {
   using ConstSegment = Eigen::Map<const Vector6<double>>;
   struct Input {
     std::size_t entry;
+    int row, column;  // in the elimination order
     bool transposed;
   };
 
@@ -159,11 +160,40 @@ class BlockCholesky {
       const std::size_t column = to((std::min)(a, b));
       const auto begin = row_.begin() + static_cast<std::ptrdiff_t>(column_begin_[column]);
       const auto end = row_.begin() + static_cast<std::ptrdiff_t>(column_begin_[column + 1]);
-      input_[i] = {static_cast<std::size_t>(std::lower_bound(begin, end, (std::max)(a, b)) - row_.begin()), a < b};
+      input_[i] = {static_cast<std::size_t>(std::lower_bound(begin, end, (std::max)(a, b)) - row_.begin()), (std::max)(a, b), (std::min)(a, b), a < b};
     }
-    values_.resize(row_.size() * block_doubles);
     inverse_.resize(to(size_) * block_doubles);
     permuted_.resize(to(size_) * block_size);
+  }
+
+  [[nodiscard]] bool factorize_dense(span<const double> blocks) noexcept {
+    dense_values_.setZero();
+    for (std::size_t i = 0; i < input_.size(); ++i) {
+      const ConstBlock source(blocks.data() + i * block_doubles);
+      const int row = block_size * input_[i].row, column = block_size * input_[i].column;
+      if (input_[i].transposed) dense_values_.block<6, 6>(row, column) = source.transpose();
+      else dense_values_.block<6, 6>(row, column) = source;
+    }
+    const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(dense_values_);
+    return llt.info() == Eigen::Success && dense_values_.diagonal().minCoeff() > 0;
+  }
+
+  // Both triangular systems, on permuted_.
+  void solve_sparse() noexcept {
+    for (int k = 0; k < size_; ++k) {
+      Segment x = segment(permuted_, k);
+      x = diagonal_inverse(k).triangularView<Eigen::Lower>() * Vector6<double>(x);
+      for (std::size_t e = column_begin_[to(k)] + 1; e < column_begin_[to(k) + 1]; ++e) {
+        segment(permuted_, row_[e]).noalias() -= block(e).lazyProduct(x);
+      }
+    }
+    for (int k = size_ - 1; k >= 0; --k) {
+      Segment x = segment(permuted_, k);
+      for (std::size_t e = column_begin_[to(k)] + 1; e < column_begin_[to(k) + 1]; ++e) {
+        x.noalias() -= block(e).transpose().lazyProduct(segment(permuted_, row_[e]));
+      }
+      x = diagonal_inverse(k).transpose().triangularView<Eigen::Upper>() * Vector6<double>(x);
+    }
   }
 
   // Column k of L from the updated column k of A, then its contribution to the columns to the right.
@@ -194,6 +224,8 @@ class BlockCholesky {
   std::vector<std::size_t> column_begin_;  // entries of column k of L: the diagonal one first, rows ascending
   std::vector<int> row_;
   std::vector<double> values_, inverse_, permuted_;
+  bool dense_ = false;
+  Eigen::MatrixXd dense_values_;
   std::vector<Input> input_;
   std::vector<std::size_t> input_begin_, cursor_;
   std::vector<int> input_row_, first_child_, next_sibling_, marker_;
