@@ -71,7 +71,7 @@ inline Skeleton skeleton_at(const Script& script, double time) {
     const double lower = upper + elbow + raised * (0.9 + 0.5 * std::sin(1.3 * wave) - elbow);
     const auto tilt = [&](double angle, double open) -> Vector3d { return (in_plane(angle) + open * outward * across).normalized(); };
     const auto i = [side](Joint left) { return static_cast<std::size_t>(left) + static_cast<std::size_t>(side); };
-    s.at[i(shoulder_left)] = s.at[chest] + 0.185 * size * outward * across;
+    s.at[i(shoulder_left)] = s.at[chest] + 0.175 * size * outward * across;
     s.at[i(elbow_left)] = s.at[i(shoulder_left)] + 0.29 * size * tilt(upper, 0.16 + 0.2 * raised);
     s.at[i(wrist_left)] = s.at[i(elbow_left)] + 0.25 * size * tilt(lower, -0.1 - 0.3 * sit * (1 - raised));
     s.at[i(finger_left)] = s.at[i(wrist_left)] + 0.09 * size * tilt(lower + 0.15, -0.1);
@@ -92,7 +92,7 @@ struct Part {
 };
 
 inline constexpr std::array<Part, 19> parts{{
-    {pelvis, chest, 0.155, 1.12, 0.72, Part::shirt, 0.55},
+    {pelvis, chest, 0.14, 1.12, 0.74, Part::shirt, 0.55},
     {shoulder_left, shoulder_right, 0.075, 1, 1, Part::shirt, 0},
     {hip_left, hip_right, 0.115, 1, 1, Part::trousers, 0},
     {chest, neck, 0.06, 1, 1, Part::skin, 0},
@@ -109,8 +109,8 @@ inline constexpr std::array<Part, 19> parts{{
     {elbow_right, wrist_right, 0.04, 1, 1, Part::skin, 0},
     {wrist_left, finger_left, 0.036, 1, 0.7, Part::skin, 0},
     {wrist_right, finger_right, 0.036, 1, 0.7, Part::skin, 0},
-    {pelvis, pelvis, 0.14, 1.2, 0.85, Part::trousers, 0},
-    {chest, chest, 0.12, 1.25, 0.8, Part::shirt, 0},
+    {pelvis, pelvis, 0.125, 1.2, 0.88, Part::trousers, 0},
+    {chest, chest, 0.11, 1.25, 0.82, Part::shirt, 0},
 }};
 
 /// The capsule's frame: z along the bone, x along `right` as far as that allows.

@@ -172,7 +172,7 @@ class Renderer {
     const Color color = scene_->textures[static_cast<std::size_t>(s.texture)].sample(uv.x(), uv.y(), footprint_m / tile_size(s));
     // Two lamps and the light that comes from everywhere.
     static const Vector3d lamp_a = Vector3d(-0.4, -0.5, 0.75).normalized(), lamp_b = Vector3d(0.7, 0.3, 0.5).normalized();
-    const double light = 0.5 + 0.42 * std::max(0.0, n.dot(lamp_a)) + 0.25 * std::max(0.0, n.dot(lamp_b));
+    const double light = 0.62 + 0.5 * std::max(0.0, n.dot(lamp_a)) + 0.25 * std::max(0.0, n.dot(lamp_b));
     return static_cast<float>(light) * color;
   }
 

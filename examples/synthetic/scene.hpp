@@ -18,7 +18,8 @@ struct Scene {
 
 constexpr double seat_height = 0.46;
 constexpr double chair_x[2] = {-0.95, 0.95};
-constexpr double chair_y = -0.62;
+constexpr double chair_y = -0.95;
+constexpr double chair_heading[2] = {0.9, 3.14159265358979 - 0.9};  ///< where one looks on it, from +x
 
 class SceneBuilder {
  public:
@@ -37,7 +38,7 @@ class SceneBuilder {
     scene_.trousers[1] = add(collage(random_, 512, {110, 70, 45}, 180, 0.12));
     scene_.shoes = add(plain(random_, 128, {45, 45, 50}, 8));
     const int wood = add(collage(random_, 1024, {120, 170, 205}, 90, 0.06));
-    for (int side = 0; side < 2; ++side) chair(chair_x[side], chair_y, side == 0 ? 0.6 : -0.6, wood);
+    for (int side = 0; side < 2; ++side) chair(chair_x[side], chair_y, chair_heading[side] - 1.5707963, wood);
     if (furnished) furnish(wood);
     return std::move(scene_);
   }
@@ -107,10 +108,10 @@ class SceneBuilder {
           i % 2 == 0 ? books : brown, 0.5, random_.uniform(-0.6, 0.6));
     }
     box(0, 0.56, 0, {3.5, 0.05, 1.22}, brown, 1.6);                // the partition behind the desk
-    box(-2.3, 0.3, 0, {0.6, 0.9, 1.05}, books, 1.1, 0.2);          // low shelves and tables at the sides
-    box(2.25, 0.1, 0, {0.55, 0.8, 0.85}, wood, 0.9, -0.2);
-    box(2.25, 0.1, 0.85, {0.3, 0.25, 0.35}, books, 0.6, 0.4);
-    box(-2.2, -1.3, 0, {0.5, 0.5, 0.6}, brown, 0.8, 0.3);
+    box(-2.75, 0.3, 0, {0.6, 0.9, 1.05}, books, 1.1, 0.2);          // low shelves and tables at the sides
+    box(2.75, 0.1, 0, {0.55, 0.8, 0.85}, wood, 0.9, -0.2);
+    box(2.75, 0.1, 0.85, {0.3, 0.25, 0.35}, books, 0.6, 0.4);
+    box(-2.6, -1.3, 0, {0.5, 0.5, 0.6}, brown, 0.8, 0.3);
     box(-1.5, 2.3, 0, {1.3, 0.5, 1.95}, books, 1.3);               // cabinets at middle distance
     box(1.3, 2.6, 0, {1.1, 0.5, 2.1}, grey, 1.4);
     box(0.05, 3.2, 0, {0.9, 0.4, 1.6}, wood, 1.1);

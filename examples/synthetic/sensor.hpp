@@ -69,13 +69,13 @@ inline cv::Mat sense_depth(const Frame& frame, const std::vector<Surface>& surfa
         if (depth[x] < 13) image.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(std::lround(static_cast<double>(depth[x]) * options.depth_units_per_metre));
         continue;
       }
+      double z = static_cast<double>(depth[x]);
       const int from = std::clamp(x + ragged(x, y), 0, width - 1);
-      double z = static_cast<double>(ids[from] < 0 ? depth[x] : depth[from]);
-      const double jump = std::abs(z - static_cast<double>(depth[x]));
+      const double other = ids[from] < 0 ? z : static_cast<double>(depth[from]);
       const double chance = static_cast<double>(bits >> 40U) * 0x1.0p-24;
-      if (jump > 0.1) {  // a silhouette
+      if (std::abs(other - z) > 0.1) {  // a silhouette: no depth, the neighbour's, or one between
         if (chance < 0.45) continue;
-        if (chance < 0.6) z = static_cast<double>(depth[x]) + (z - static_cast<double>(depth[x])) * (chance - 0.45) / 0.15;
+        z = chance < 0.6 ? z + (other - z) * (chance - 0.45) / 0.15 : other;
       }
       const Surface& s = surfaces[static_cast<std::size_t>(ids[x] / 8)];
       const double slant = static_cast<double>(frame.slant.at<float>(y, x));

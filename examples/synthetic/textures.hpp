@@ -53,8 +53,12 @@ class Texture {
   std::vector<cv::Mat> levels_;
 };
 
+/// A muted colour: rooms are grey and brown with a few bright things.
 inline cv::Scalar random_color(cfp::Random& random, double low = 20, double high = 240) {
-  return {random.uniform(low, high), random.uniform(low, high), random.uniform(low, high)};
+  const double tone = random.uniform(low, high), chroma = random.uniform() < 0.12 ? 90 : 22;
+  const auto channel = [&] { return std::clamp(tone + random.uniform(-chroma, chroma), 0.0, 255.0); };
+  const double blue = channel(), green = channel(), red = channel();
+  return {blue, green, red};
 }
 
 /// Grain of several sizes: real surfaces are not flat, and a flat one gives corners to nobody.

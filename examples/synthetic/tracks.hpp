@@ -105,7 +105,7 @@ class Director {
 
 /// Two people on their chairs at the desk: gestures, looks, leaning, and much stillness.
 inline Script sitting_script(cfp::Random& random, int person, double seconds) {
-  const double inward = person == 0 ? 0.9 : cfp::pi<double> - 0.9;
+  const double inward = chair_heading[person];
   const double feet = 0.42;  // in front of the chair's middle
   Director d(chair_x[person] + feet * std::cos(inward), chair_y + feet * std::sin(inward), inward, 1, person == 0 ? 1.80 : 1.74);
   d.wait(person == 0 ? 0.3 : 1.2);
@@ -127,12 +127,12 @@ inline Script sitting_script(cfp::Random& random, int person, double seconds) {
 /// They stand up, walk past each other before and behind the desk, stop to talk with a hand, and sit down again.
 inline Script walking_script(cfp::Random& random, int person, double seconds, bool furnished) {
   const double side = person == 0 ? -1 : 1;
-  const double lane = person == 0 ? -1.55 : -1.2;  // y; chairs reach to about -0.9, the camera to -2.4
-  const double inward = person == 0 ? 0.9 : cfp::pi<double> - 0.9;
+  const double lane = person == 0 ? -1.75 : -1.45;  // y; chairs reach to -1.2, the camera to -2.45
+  const double inward = chair_heading[person];
   const double seat_x = chair_x[person] + 0.42 * std::cos(inward), seat_y = chair_y + 0.42 * std::sin(inward);
   const double speed = random.uniform(0.75, 1.05);
   const bool starts_seated = furnished && person == 0;
-  Director d(starts_seated ? seat_x : side * 1.2, starts_seated ? seat_y : lane, starts_seated ? inward : cfp::pi<double>, starts_seated ? 1 : 0,
+  Director d(starts_seated ? seat_x : side * (furnished ? 1.0 : 0.5), starts_seated ? seat_y : lane, starts_seated ? inward : cfp::pi<double>, starts_seated ? 1 : 0,
              person == 0 ? 1.80 : 1.74);
   if (starts_seated) {
     d.wait(0.6);
@@ -153,10 +153,10 @@ inline Script walking_script(cfp::Random& random, int person, double seconds, bo
     } else if (choice < 0.9 || !furnished) {
       // Around the desk, behind the partition, and back on the other side.
       const double s = left ? -1 : 1;
-      d.walk(s * 1.85, lane + 0.1, speed);
-      d.walk(s * 1.85, 1.15 + 0.2 * person, speed);
-      d.walk(-s * 1.8, 1.15 + 0.2 * person, speed);
-      d.walk(-s * 1.85, lane, speed);
+      d.walk(s * 1.95, lane + 0.1, speed);
+      d.walk(s * 1.95, 1.15 + 0.2 * person, speed);
+      d.walk(-s * 1.95, 1.15 + 0.2 * person, speed);
+      d.walk(-s * 1.95, lane, speed);
       left = s > 0;
     } else {
       d.walk(side * 1.5, lane, speed);
