@@ -94,7 +94,7 @@ struct Part {
 inline constexpr std::array<Part, 19> parts{{
     {pelvis, chest, 0.14, 1.12, 0.74, Part::shirt, 0.55},
     {shoulder_left, shoulder_right, 0.075, 1, 1, Part::shirt, 0},
-    {hip_left, hip_right, 0.115, 1, 1, Part::trousers, 0},
+    {hip_left, hip_right, 0.098, 1, 1, Part::trousers, 0},
     {chest, neck, 0.06, 1, 1, Part::skin, 0},
     {neck, crown, 0.088, 0.92, 1.1, Part::face, 0.45},
     {hip_left, knee_left, 0.082, 1, 1, Part::trousers, 0},
