@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -103,6 +104,9 @@ class Renderer {
       if (s.shape != Shape::room) bound(s, T_cam_world, p);
       prepared_.push_back(p);
     }
+    by_depth_.resize(prepared_.size());
+    std::iota(by_depth_.begin(), by_depth_.end(), 0);
+    std::stable_sort(by_depth_.begin(), by_depth_.end(), [&](int a, int b) { return at(a).nearest < at(b).nearest; });
   }
 
   /// From the corners of the box around the surface, when all lie before the camera.
@@ -124,14 +128,13 @@ class Renderer {
     if (nearest > 0.01) p = {p.A_cam, p.origin, nearest, x1 - 1, y1 - 1, x2 + 1, y2 + 1};
   }
 
-  /// Candidates of a tile, nearest first, so that a pixel can stop early.
+  /// Candidates of a tile; nearest first, so that a pixel can stop early.
   void collect(int tile_x, int tile_y) {
     candidates_.clear();
-    for (std::size_t i = 0; i < prepared_.size(); ++i) {
-      const Prepared& p = prepared_[i];
-      if (p.x2 >= tile_x && p.x1 <= tile_x + tile && p.y2 >= tile_y && p.y1 <= tile_y + tile) candidates_.push_back(static_cast<int>(i));
+    for (const int i : by_depth_) {
+      const Prepared& p = at(i);
+      if (p.x2 >= tile_x && p.x1 <= tile_x + tile && p.y2 >= tile_y && p.y1 <= tile_y + tile) candidates_.push_back(i);
     }
-    std::stable_sort(candidates_.begin(), candidates_.end(), [&](int a, int b) { return at(a).nearest < at(b).nearest; });
   }
   [[nodiscard]] const Prepared& at(int i) const { return prepared_[static_cast<std::size_t>(i)]; }
   [[nodiscard]] const Surface& surface(int i) const { return (*surfaces_)[static_cast<std::size_t>(i)]; }
@@ -180,7 +183,7 @@ class Renderer {
     const Vector3d direction = ray(x, y);
     const double limit = behind(x, y);
     const Sample sample = trace(direction, limit);
-    Color color = backdrop_color(x, y);
+    Color color;
     double slant = 1;
     Label label = label_static;
     if (sample.surface >= 0) {
@@ -192,6 +195,8 @@ class Renderer {
         const Vector3d before = s.inverse_before * local + s.moved;
         label = (now - before).norm() > options.moving_m_per_s * options.frame_s ? label_moving : label_person_still;
       }
+    } else {
+      color = backdrop_color(x, y);
     }
     frame.color.at<cv::Vec3f>(y, x) = {color[0], color[1], color[2]};
     frame.depth.at<float>(y, x) = static_cast<float>(sample.hit.depth);
@@ -269,7 +274,8 @@ class Renderer {
   Matrix3d rotation_;
   Vector3d translation_;
   std::vector<Prepared> prepared_;
-  std::vector<int> candidates_;
+  std::vector<int> by_depth_;    ///< nearest first
+  std::vector<int> candidates_;  ///< of the tile, nearest first
 };
 
 }  // namespace synthetic

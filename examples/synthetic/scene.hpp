@@ -77,7 +77,8 @@ class SceneBuilder {
   }
 
   void furnish(int wood) {
-    const int wall = add(collage(random_, 1024, {200, 205, 210}, 420, 0.22));
+    // Tiles as large as the largest face they lie on: a pattern that comes again would be a trap for matching.
+    const int wall = add(collage(random_, 2048, {200, 205, 210}, 1500, 0.12));
     const int brown = add(collage(random_, 1024, {110, 150, 180}, 320, 0.2));
     const int grey = add(collage(random_, 1024, {140, 135, 130}, 380, 0.16));
     const int screen = add(collage(random_, 512, {35, 30, 30}, 160, 0.3));
@@ -88,10 +89,10 @@ class SceneBuilder {
     room.half = Vector3d(4.2, 5.2, 1.6);
     room.centre = Vector3d(0, 0.4, 1.6);
     room.texture = wall;
-    room.tile_m = 3;
+    room.tile_m = 6.5;
     scene_.surfaces.push_back(room);
-    box(0, 0.4, -0.02, {8.4, 10.4, 0.025}, grey, 2);
-    for (int beam = 0; beam < 4; ++beam) box(0, 0.3 + 1.4 * beam, 2.75, {8.3, 0.18, 0.3}, brown, 1.5);
+    box(0, 0.4, -0.02, {8.4, 10.4, 0.025}, grey, 3.5);
+    for (int beam = 0; beam < 4; ++beam) box(0, 0.3 + 1.4 * beam, 2.75, {8.3, 0.18, 0.3}, brown, 4);
 
     // The desk: two plates on legs, with screens, books and small things.
     for (const double side : {-1.0, 1.0}) {
@@ -107,7 +108,7 @@ class SceneBuilder {
       box(random_.uniform(-1.5, 1.5), random_.uniform(-0.3, 0.3), 0.74, {random_.uniform(0.06, 0.25), random_.uniform(0.06, 0.2), random_.uniform(0.02, 0.25)},
           i % 2 == 0 ? books : brown, 0.5, random_.uniform(-0.6, 0.6));
     }
-    box(0, 0.56, 0, {3.5, 0.05, 1.22}, brown, 1.6);                // the partition behind the desk
+    box(0, 0.56, 0, {3.5, 0.05, 1.22}, brown, 3.5);                // the partition behind the desk
     box(-2.75, 0.3, 0, {0.6, 0.9, 1.05}, books, 1.1, 0.2);          // low shelves and tables at the sides
     box(2.75, 0.1, 0, {0.55, 0.8, 0.85}, wood, 0.9, -0.2);
     box(2.75, 0.1, 0.85, {0.3, 0.25, 0.35}, books, 0.6, 0.4);

@@ -65,7 +65,7 @@ inline cv::Scalar random_color(cfp::Random& random, double low = 20, double high
 inline void add_grain(cfp::Random& random, cv::Mat& image, double strength) {
   for (int cell = 1; cell <= 16; cell *= 4) {
     cv::Mat noise(image.rows / cell, image.cols / cell, CV_32F);
-    for (auto it = noise.begin<float>(); it != noise.end<float>(); ++it) *it = static_cast<float>(strength * random.normal());
+    for (auto it = noise.begin<float>(); it != noise.end<float>(); ++it) *it = static_cast<float>(3.46 * strength * (random.uniform() - 0.5));
     cv::resize(noise, noise, image.size(), 0, 0, cv::INTER_LINEAR);
     cv::Mat channels[3] = {noise, noise, noise}, grain, sum;
     cv::merge(channels, 3, grain);
