@@ -53,7 +53,8 @@ inline std::vector<cfp::StampedPose<double>> read_tum_trajectory(const std::file
   std::vector<cfp::StampedPose<double>> poses;
   for_each_line(file, [&](int line, const std::vector<std::string>& words) {
     static constexpr const char* meaning[] = {"timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"};
-    if (words.size() != 8) bad_line(file, line, "expected 'timestamp tx ty tz qx qy qz qw', found " + std::to_string(words.size()) + " words");
+    if (words.size() != 8)
+      bad_line(file, line, "expected 'timestamp tx ty tz qx qy qz qw', found " + std::to_string(words.size()) + " words");
     double v[8];
     for (std::size_t i = 0; i < 8; ++i) v[i] = parse_number(file, line, words[i], meaning[i]);
     cfp::StampedPose<double> pose;

@@ -37,12 +37,16 @@ class CameraMotion {
     // Every motion starts at rest from the same view.
     const double start = std::min(1.0, time / 1.5), gain = start * start * (3 - 2 * start);
     cfp::SE3<double> T = look_at(base, target);
-    const auto wave = [&](double period, int k) { return gain * (std::sin(2 * cfp::pi<double> * time / period + phases_[k]) - (1 - gain) * std::sin(phases_[k])); };
+    const auto wave = [&](double period, int k) {
+      return gain * (std::sin(2 * cfp::pi<double> * time / period + phases_[k]) - (1 - gain) * std::sin(phases_[k]));
+    };
     switch (motion_) {
-      case Motion::fixed: break;
+      case Motion::fixed:
+        break;
       case Motion::xyz:
         // One axis after the other, as the operators did, with a little of the others.
-        T.translation += axis(time, 0) * 0.28 * wave(3.6, 0) * Eigen::Vector3d::UnitX() + axis(time, 1) * 0.25 * wave(3.9, 1) * Eigen::Vector3d::UnitY() +
+        T.translation += axis(time, 0) * 0.28 * wave(3.6, 0) * Eigen::Vector3d::UnitX() +
+                         axis(time, 1) * 0.25 * wave(3.9, 1) * Eigen::Vector3d::UnitY() +
                          axis(time, 2) * 0.22 * wave(3.4, 2) * Eigen::Vector3d::UnitZ();
         break;
       case Motion::halfsphere: {
@@ -55,7 +59,8 @@ class CameraMotion {
         break;
       }
       case Motion::rpy: {
-        const Eigen::Vector3d w(axis(time, 0) * 0.30 * wave(3.6, 0), axis(time, 1) * 0.48 * wave(4.2, 1), axis(time, 2) * 0.42 * wave(3.8, 2));
+        const Eigen::Vector3d w(axis(time, 0) * 0.30 * wave(3.6, 0), axis(time, 1) * 0.48 * wave(4.2, 1),
+                                axis(time, 2) * 0.42 * wave(3.8, 2));
         T.rotation = T.rotation * cfp::so3_exp<double>(w);
         break;
       }

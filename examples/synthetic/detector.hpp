@@ -41,8 +41,9 @@ class Detector {
     };
     for (std::size_t who = 0; who < people.size(); ++who) {
       const Sighting& s = people[who];
-      const double difficulty = options_.miss_rate + (s.at_border ? options_.miss_at_border : 0) + options_.miss_when_hidden * (1 - s.visible) +
-                                options_.miss_per_rad_s * rotation_rad_s + (blurred ? options_.miss_when_blurred : 0);
+      const double difficulty = options_.miss_rate + (s.at_border ? options_.miss_at_border : 0) +
+                                options_.miss_when_hidden * (1 - s.visible) + options_.miss_per_rad_s * rotation_rad_s +
+                                (blurred ? options_.miss_when_blurred : 0);
       // Draw always, so that one person's sighting does not change the other's luck.
       const bool begins = random_.uniform() < difficulty;
       const int burst = 1 + static_cast<int>(random_.index(static_cast<std::uint32_t>(options_.longest_burst)));

@@ -1,9 +1,13 @@
 // cfp_synthetic: renders the eight sequences of the TUM fr3 protocol, with truth for everything.
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <iostream>
 #include <memory>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <opencv2/core.hpp>
@@ -29,7 +33,8 @@ void write_with_progress(const synthetic::Sequence& sequence, const std::filesys
   double rate = 0;
   synthetic::write_sequence(sequence, folder, threads, [&](int done) {
     rate = done / std::chrono::duration<double>(Clock::now() - start).count();
-    if (done % 10 == 0 || done == frames) std::fprintf(stderr, "\r%s: %d / %d frames, %.1f per second ", folder.string().c_str(), done, frames, rate);
+    if (done % 10 == 0 || done == frames)
+      std::fprintf(stderr, "\r%s: %d / %d frames, %.1f per second ", folder.string().c_str(), done, frames, rate);
   });
   std::fprintf(stderr, "\n");
 }
@@ -52,9 +57,12 @@ int main(int argc, char* argv[]) {
   app.add_option("--frames", options.frames, "length at 30 Hz")->check(CLI::Range(1, 1000000))->capture_default_str();
   app.add_option("--seed", options.seed, "of everything random")->capture_default_str();
   app.add_option("--width", width, "of the images, 4:3")->check(CLI::Range(64, 4096))->capture_default_str();
-  app.add_option("--blur", options.blur_samples, "sub-exposures of the motion blur; 1 = none")->check(CLI::Range(1, 64))->capture_default_str();
+  app.add_option("--blur", options.blur_samples, "sub-exposures of the motion blur; 1 = none")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
   app.add_option("--threads", threads, "rendering threads")->check(CLI::Range(1, 256))->capture_default_str();
-  app.add_option("--background", background, "a recording in TUM format with poses; the people are put into it")->check(CLI::ExistingDirectory);
+  app.add_option("--background", background, "a recording in TUM format with poses; the people are put into it")
+      ->check(CLI::ExistingDirectory);
   app.add_option("--camera-height", camera_height, "of the first background camera above the floor, m")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
 

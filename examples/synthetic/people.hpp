@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "surfaces.hpp"
@@ -10,10 +11,14 @@
 
 namespace synthetic {
 
+// clang-format off
 enum Joint {
-  pelvis, chest, neck, crown, hip_left, hip_right, knee_left, knee_right, ankle_left, ankle_right, toe_left, toe_right, shoulder_left, shoulder_right,
-  elbow_left, elbow_right, wrist_left, wrist_right, finger_left, finger_right, joints
+  pelvis, chest, neck, crown,
+  hip_left, hip_right, knee_left, knee_right, ankle_left, ankle_right, toe_left, toe_right,
+  shoulder_left, shoulder_right, elbow_left, elbow_right, wrist_left, wrist_right, finger_left, finger_right,
+  joints
 };
+// clang-format on
 
 /// Joints in the world and the directions that fix the parts' twist.
 struct Skeleton {
@@ -91,6 +96,7 @@ struct Part {
   double trim = 0;  ///< shortens the axis at both ends, in radii, so that the round ends do not stick out
 };
 
+// clang-format off
 inline constexpr std::array<Part, 19> parts{{
     {pelvis, chest, 0.14, 1.12, 0.74, Part::shirt, 0.55},
     {shoulder_left, shoulder_right, 0.075, 1, 1, Part::shirt, 0},
@@ -112,6 +118,7 @@ inline constexpr std::array<Part, 19> parts{{
     {pelvis, pelvis, 0.125, 1.2, 0.88, Part::trousers, 0},
     {chest, chest, 0.11, 1.25, 0.82, Part::shirt, 0},
 }};
+// clang-format on
 
 /// The capsule's frame: z along the bone, x along `right` as far as that allows.
 inline void place(const Part& part, const Skeleton& skeleton, double size, Surface& surface) {
@@ -132,9 +139,18 @@ inline void place(const Part& part, const Skeleton& skeleton, double size, Surfa
 }
 
 /// The surfaces of a person at a time, with where each part was `before_s` earlier.
-inline void append_person(const Scene& scene, const Script& script, int person, double time, double before_s, std::vector<Surface>& surfaces) {
+inline void append_person(const Scene& scene, const Script& script, int person, double time, double before_s,
+                          std::vector<Surface>& surfaces) {
   const Skeleton now = skeleton_at(script, time), before = skeleton_at(script, time - before_s);
   const double size = script.height / 1.78;
+  const struct {
+    int texture;
+    double tile_m;
+  } wardrobe[] = {{scene.shirts[person], 0.5},
+                  {scene.trousers[person], 0.5},
+                  {scene.skins[person], 0.25},
+                  {scene.heads[person], 0},
+                  {scene.shoes, 0.2}};
   for (const Part& part : parts) {
     Surface s, earlier;
     place(part, now, size, s);
@@ -143,13 +159,8 @@ inline void append_person(const Scene& scene, const Script& script, int person, 
     s.moved = earlier.centre;
     s.person = person;
     s.shift = Vector3d(0.13 * part.from, 0, 0.31 * part.to);
-    switch (part.wear) {
-      case Part::shirt: s.texture = scene.shirts[person]; s.tile_m = 0.5; break;
-      case Part::trousers: s.texture = scene.trousers[person]; s.tile_m = 0.5; break;
-      case Part::skin: s.texture = scene.skins[person]; s.tile_m = 0.25; break;
-      case Part::shoe: s.texture = scene.shoes; s.tile_m = 0.2; break;
-      case Part::face: s.texture = scene.heads[person]; s.tile_m = 0; break;
-    }
+    s.texture = wardrobe[part.wear].texture;
+    s.tile_m = wardrobe[part.wear].tile_m;
     surfaces.push_back(s);
   }
 }

@@ -26,8 +26,8 @@ struct ImageCamera : cfp::PinholeCamera<double> {
 /// What can be seen of a person. Box in pixels, right and lower edges exclusive; improper when nothing can be seen.
 struct Sighting {
   cfp::Box<double> box{1e9, 1e9, -1e9, -1e9};
-  int pixels = 0;         ///< visible
-  double visible = 0;     ///< visible / inside the image if nothing stood before it
+  int pixels = 0;      ///< visible
+  double visible = 0;  ///< visible / inside the image if nothing stood before it
   bool at_border = false;
 };
 
@@ -47,8 +47,8 @@ struct Backdrop {
 };
 
 struct RenderOptions {
-  double frame_s = 1.0 / 30;       ///< time over which label_moving judges
-  double moving_m_per_s = 0.05;    ///< a surface point faster than this is moving
+  double frame_s = 1.0 / 30;     ///< time over which label_moving judges
+  double moving_m_per_s = 0.05;  ///< a surface point faster than this is moving
 };
 
 class Renderer {
@@ -83,10 +83,10 @@ class Renderer {
   static constexpr int tile = 16;
 
   struct Prepared {
-    Matrix3d A_cam;        ///< local direction = A_cam * ray
-    Vector3d origin;       ///< the camera, locally
-    double nearest;        ///< no hit has a smaller depth
-    double x1, y1, x2, y2; ///< image rectangle that holds it
+    Matrix3d A_cam;         ///< local direction = A_cam * ray
+    Vector3d origin;        ///< the camera, locally
+    double nearest;         ///< no hit has a smaller depth
+    double x1, y1, x2, y2;  ///< image rectangle that holds it
   };
   struct Sample {
     Hit hit;
@@ -99,8 +99,8 @@ class Renderer {
     translation_ = T_world_cam.translation;
     prepared_.clear();
     for (const Surface& s : *surfaces_) {
-      Prepared p{s.A * T_world_cam.rotation, s.A * (T_world_cam.translation - s.centre), 0, 0, 0, static_cast<double>(camera_.width),
-                 static_cast<double>(camera_.height)};
+      Prepared p{s.A * T_world_cam.rotation,         s.A * (T_world_cam.translation - s.centre), 0, 0, 0,
+                 static_cast<double>(camera_.width), static_cast<double>(camera_.height)};
       if (s.shape != Shape::room) bound(s, T_cam_world, p);
       prepared_.push_back(p);
     }
@@ -213,8 +213,8 @@ class Renderer {
         for (int y = std::max(tile_y, 1); y < std::min(tile_y + tile, camera_.height - 1); ++y) {
           for (int x = std::max(tile_x, 1); x < std::min(tile_x + tile, camera_.width - 1); ++x) {
             const short here = frame.surface.at<short>(y, x);
-            if (here == frame.surface.at<short>(y, x + 1) && here == frame.surface.at<short>(y + 1, x) && here == frame.surface.at<short>(y, x - 1) &&
-                here == frame.surface.at<short>(y - 1, x)) {
+            if (here == frame.surface.at<short>(y, x + 1) && here == frame.surface.at<short>(y + 1, x) &&
+                here == frame.surface.at<short>(y, x - 1) && here == frame.surface.at<short>(y - 1, x)) {
               continue;
             }
             if (!collected) collect(tile_x, tile_y);

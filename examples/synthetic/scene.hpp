@@ -105,18 +105,19 @@ class SceneBuilder {
       box(0.62 * side, -0.12, 0.74, {0.42, 0.15, 0.02}, books, 0.7, 0.1);
     }
     for (int i = 0; i < 9; ++i) {
-      box(random_.uniform(-1.5, 1.5), random_.uniform(-0.3, 0.3), 0.74, {random_.uniform(0.06, 0.25), random_.uniform(0.06, 0.2), random_.uniform(0.02, 0.25)},
-          i % 2 == 0 ? books : brown, 0.5, random_.uniform(-0.6, 0.6));
+      box(random_.uniform(-1.5, 1.5), random_.uniform(-0.3, 0.3), 0.74,
+          {random_.uniform(0.06, 0.25), random_.uniform(0.06, 0.2), random_.uniform(0.02, 0.25)}, i % 2 == 0 ? books : brown, 0.5,
+          random_.uniform(-0.6, 0.6));
     }
-    box(0, 0.56, 0, {3.5, 0.05, 1.22}, brown, 3.5);                // the partition behind the desk
-    box(-2.75, 0.3, 0, {0.6, 0.9, 1.05}, books, 1.1, 0.2);          // low shelves and tables at the sides
+    box(0, 0.56, 0, {3.5, 0.05, 1.22}, brown, 3.5);         // the partition behind the desk
+    box(-2.75, 0.3, 0, {0.6, 0.9, 1.05}, books, 1.1, 0.2);  // low shelves and tables at the sides
     box(2.75, 0.1, 0, {0.55, 0.8, 0.85}, wood, 0.9, -0.2);
     box(2.75, 0.1, 0.85, {0.3, 0.25, 0.35}, books, 0.6, 0.4);
     box(-2.6, -1.3, 0, {0.5, 0.5, 0.6}, brown, 0.8, 0.3);
-    box(-1.5, 2.3, 0, {1.3, 0.5, 1.95}, books, 1.3);               // cabinets at middle distance
+    box(-1.5, 2.3, 0, {1.3, 0.5, 1.95}, books, 1.3);  // cabinets at middle distance
     box(1.3, 2.6, 0, {1.1, 0.5, 2.1}, grey, 1.4);
     box(0.05, 3.2, 0, {0.9, 0.4, 1.6}, wood, 1.1);
-    box(3.2, 1.8, 0, {0.35, 0.35, 3.1}, brown, 1.2);               // pillars
+    box(3.2, 1.8, 0, {0.35, 0.35, 3.1}, brown, 1.2);  // pillars
     box(-3.3, 1.2, 0, {0.35, 0.35, 3.1}, grey, 1.2);
   }
 

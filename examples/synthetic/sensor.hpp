@@ -12,13 +12,13 @@ namespace synthetic {
 
 struct SensorOptions {
   double depth_units_per_metre = 5000;
-  double focal_baseline = 43.5;     ///< px m, focal length times baseline: 580 px and 7.5 cm
-  double disparity_step_px = 0.125; ///< quantisation: z² / focal_baseline * step, 2.6 cm at 3 m
+  double focal_baseline = 43.5;      ///< px m, focal length times baseline: 580 px and 7.5 cm
+  double disparity_step_px = 0.125;  ///< quantisation: z² / focal_baseline * step, 2.6 cm at 3 m
   double min_depth_m = 0.5;
-  double range_m = 6.5;             ///< nothing beyond
-  double fading_m = 5;              ///< from here to range_m ever more pixels fail
-  double image_noise = 2.2;         ///< standard deviation, grey levels
-  double exposure_swing = 0.08;     ///< slow relative change of the exposure
+  double range_m = 6.5;          ///< nothing beyond
+  double fading_m = 5;           ///< from here to range_m ever more pixels fail
+  double image_noise = 2.2;      ///< standard deviation, grey levels
+  double exposure_swing = 0.08;  ///< slow relative change of the exposure
 };
 
 /// Normal numbers from a table: a frame needs a million.
@@ -37,11 +37,11 @@ class NormalTable {
 /// Standard deviation of the depth, m (Nguyen, Izadi, Lovell: "Modeling Kinect sensor noise", 3DIMPVT 2012, axial part).
 inline double depth_sigma(double z) { return 0.0012 + 0.0019 * (z - 0.4) * (z - 0.4); }
 
-/// 16-bit depth image; 0 = no depth. Fails beyond the range, on black glossy and grazing surfaces, in the projector's shadow to the left of near
-/// things and, raggedly, along silhouettes, where a few pixels fly between near and far. Where frame.surface is −1 (a real recording),
+/// 16-bit depth image; 0 = no depth. Fails beyond the range, on black glossy and grazing surfaces, in the projector's shadow to the left of
+/// near things and, raggedly, along silhouettes, where a few pixels fly between near and far. Where frame.surface is −1 (a real recording),
 /// depth goes through as it is, but for the new shadows.
-inline cv::Mat sense_depth(const Frame& frame, const std::vector<Surface>& surfaces, const SensorOptions& options, const NormalTable& normal,
-                           cfp::Random random) {
+inline cv::Mat sense_depth(const Frame& frame, const std::vector<Surface>& surfaces, const SensorOptions& options,
+                           const NormalTable& normal, cfp::Random random) {
   const int width = frame.depth.cols, height = frame.depth.rows;
   cv::Mat image = cv::Mat::zeros(height, width, CV_16U);
   const auto ragged = [&](int x, int y) {  // the same for 3x3 pixels, as correlation windows make edges
@@ -66,7 +66,9 @@ inline cv::Mat sense_depth(const Frame& frame, const std::vector<Surface>& surfa
       const std::uint64_t bits = random();
       if (shadow[static_cast<std::size_t>(x)] != 0) continue;
       if (ids[x] < 0) {
-        if (depth[x] < 13) image.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(std::lround(static_cast<double>(depth[x]) * options.depth_units_per_metre));
+        if (depth[x] < 13)
+          image.at<std::uint16_t>(y, x) =
+              static_cast<std::uint16_t>(std::lround(static_cast<double>(depth[x]) * options.depth_units_per_metre));
         continue;
       }
       double z = static_cast<double>(depth[x]);
@@ -87,7 +89,8 @@ inline cv::Mat sense_depth(const Frame& frame, const std::vector<Surface>& surfa
       if (static_cast<double>(spot >> 40U) * 0x1.0p-24 < failure) continue;
       z += depth_sigma(z) * static_cast<double>(normal(bits));
       const double disparity = std::round(options.focal_baseline / z / options.disparity_step_px) * options.disparity_step_px;
-      image.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(std::clamp(options.focal_baseline / disparity * options.depth_units_per_metre, 0.0, 65535.0));
+      image.at<std::uint16_t>(y, x) =
+          static_cast<std::uint16_t>(std::clamp(options.focal_baseline / disparity * options.depth_units_per_metre, 0.0, 65535.0));
     }
   }
   return image;
@@ -108,7 +111,8 @@ inline cv::Mat sense_color(const Frame& frame, const SensorOptions& options, dou
     for (int x = 0; x < image.cols; ++x) {
       std::uint64_t bits = random();
       for (int c = 0; c < 3; ++c, bits >>= 16U) {
-        const double value = ids[x] < 0 ? static_cast<double>(in[x][c]) : static_cast<double>(in[x][c]) * gain + options.image_noise * static_cast<double>(normal(bits));
+        const double value = ids[x] < 0 ? static_cast<double>(in[x][c])
+                                        : static_cast<double>(in[x][c]) * gain + options.image_noise * static_cast<double>(normal(bits));
         out[x][c] = cv::saturate_cast<unsigned char>(value);
       }
     }

@@ -1,16 +1,12 @@
 // One sequence: who does what before which camera; renders any frame of it, and writes the folder.
 #pragma once
 
-#include <atomic>
-#include <exception>
+#include <algorithm>
+#include <array>
 #include <filesystem>
-#include <fstream>
-#include <functional>
 #include <memory>
-#include <mutex>
 #include <stdexcept>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <opencv2/imgcodecs.hpp>
@@ -32,8 +28,8 @@ struct SequenceOptions {
   int frames = 300;
   double rate_hz = 30;
   std::uint64_t seed = 1;
-  int blur_samples = 1;          ///< sub-exposures; 1: no motion blur
-  double exposure_s = 0.012;     ///< over which they are spread
+  int blur_samples = 1;       ///< sub-exposures; 1: no motion blur
+  double exposure_s = 0.012;  ///< over which they are spread
   ImageCamera camera = default_camera(640);
   RenderOptions render;
   SensorOptions sensor;
@@ -84,7 +80,8 @@ class Sequence {
     const double seconds = recording_ != nullptr ? time_of(options_.frames) + 1 : options_.frames / options_.rate_hz + 1;
     for (int person = 0; person < 2; ++person) {
       cfp::Random random(options_.seed, person == 0 ? "first person" : "second person");
-      scripts_[person] = options_.scenario == Scenario::sitting ? sitting_script(random, person, seconds) : walking_script(random, person, seconds, furnished);
+      scripts_[person] = options_.scenario == Scenario::sitting ? sitting_script(random, person, seconds)
+                                                                : walking_script(random, person, seconds, furnished);
     }
     if (!furnished && options_.scenario == Scenario::walking) scene_.surfaces.clear();  // nobody sits: no chairs
   }
@@ -162,9 +159,9 @@ class Sequence {
   Script scripts_[2];
 };
 
-/// Reads rgb.txt, depth.txt, groundtruth.txt (or pseudo_groundtruth.txt) and camera.txt. Frames without depth or pose within 20 ms are left out.
-/// The stage is put before the first camera: `camera_height_m` above the floor, looking the way it looks on average, upright along
-/// the mean −y axis of the cameras (nobody films upside down).
+/// Reads rgb.txt, depth.txt, groundtruth.txt (or pseudo_groundtruth.txt) and camera.txt. Frames without depth or pose within 20 ms are left
+/// out. The stage is put before the first camera: `camera_height_m` above the floor, looking the way it looks on average, upright along the
+/// mean −y axis of the cameras (nobody films upside down).
 inline Recording read_recording(const std::filesystem::path& folder, double camera_height_m) {
   Recording recording;
   const cfp_example::TumCamera camera = cfp_example::read_tum_camera(folder / "camera.txt");
@@ -192,8 +189,8 @@ inline Recording read_recording(const std::filesystem::path& folder, double came
   for (std::size_t i = 0, j = 0; i < with_depth.size(); ++i) {
     while (j < with_pose.size() && colors[with_pose[j].first].time_s < colors[with_depth[i].first].time_s) ++j;
     if (j == with_pose.size() || with_pose[j].first != with_depth[i].first) continue;
-    recording.views.push_back({colors[with_depth[i].first].time_s, folder / colors[with_depth[i].first].file, folder / depths[with_depth[i].second].file,
-                               poses[with_pose[j].second].T_world_cam});
+    recording.views.push_back({colors[with_depth[i].first].time_s, folder / colors[with_depth[i].first].file,
+                               folder / depths[with_depth[i].second].file, poses[with_pose[j].second].T_world_cam});
   }
   if (recording.views.empty()) throw std::runtime_error(folder.string() + ": no frame with colour, depth and pose");
   Eigen::Vector3d up = Eigen::Vector3d::Zero(), forward = Eigen::Vector3d::Zero();
@@ -207,7 +204,8 @@ inline Recording read_recording(const std::filesystem::path& folder, double came
   T_stage_world.rotation.row(0) = forward.cross(up).transpose();
   T_stage_world.rotation.row(1) = forward.transpose();
   T_stage_world.rotation.row(2) = up.transpose();
-  T_stage_world.translation = Eigen::Vector3d(0, -2.95, camera_height_m) - T_stage_world.rotation * recording.views[0].T_stage_cam.translation;
+  T_stage_world.translation =
+      Eigen::Vector3d(0, -2.95, camera_height_m) - T_stage_world.rotation * recording.views[0].T_stage_cam.translation;
   for (auto& view : recording.views) view.T_stage_cam = T_stage_world * view.T_stage_cam;
   return recording;
 }

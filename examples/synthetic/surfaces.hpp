@@ -2,6 +2,7 @@
 // intersected in its own frame, where it is axis-aligned.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -25,11 +26,11 @@ struct Surface {
   Vector3d centre = Vector3d::Zero();
   Vector3d half = Vector3d::Ones();  ///< box, room: half extents; capsule along z: (radius, radius, half length of its axis)
   int texture = 0;
-  double tile_m = 1;                 ///< edge of one texture tile; capsules with tile_m = 0 are wrapped once (heads)
-  Vector3d shift = Vector3d::Zero(); ///< of the texture, m, so that equal textures do not look equal
-  int person = -1;                   ///< index, −1 for the room
-  bool absorbs_infrared = false;     ///< black glossy things have no depth
-  Vector3d moved = Vector3d::Zero();           ///< people: A and centre a frame earlier, as world_before = inverse_before local + moved
+  double tile_m = 1;                  ///< edge of one texture tile; capsules with tile_m = 0 are wrapped once (heads)
+  Vector3d shift = Vector3d::Zero();  ///< of the texture, m, so that equal textures do not look equal
+  int person = -1;                    ///< index, −1 for the room
+  bool absorbs_infrared = false;      ///< black glossy things have no depth
+  Vector3d moved = Vector3d::Zero();  ///< people: A and centre a frame earlier, as world_before = inverse_before local + moved
   Matrix3d inverse_before = Matrix3d::Zero();
 };
 
@@ -78,9 +79,12 @@ inline Hit hit_capsule(const Vector3d& o, const Vector3d& d, const Vector3d& hal
 
 inline Hit hit(const Surface& surface, const Vector3d& local_origin, const Vector3d& local_direction) {
   switch (surface.shape) {
-    case Shape::box: return hit_box(local_origin, local_direction, surface.half, false);
-    case Shape::room: return hit_box(local_origin, local_direction, surface.half, true);
-    case Shape::capsule: return hit_capsule(local_origin, local_direction, surface.half);
+    case Shape::box:
+      return hit_box(local_origin, local_direction, surface.half, false);
+    case Shape::room:
+      return hit_box(local_origin, local_direction, surface.half, true);
+    case Shape::capsule:
+      return hit_capsule(local_origin, local_direction, surface.half);
   }
   return {};
 }
@@ -108,9 +112,12 @@ inline Eigen::Vector2d texture_coordinates(const Surface& surface, const Vector3
   const Vector3d p = (local + surface.shift) / surface.tile_m;
   // Vertical faces stand upright: v falls with height.
   switch (face / 2) {
-    case 0: return {p.y() + 0.37 * face, -p.z()};
-    case 1: return {p.x() + 0.37 * face, -p.z()};
-    default: return {p.x() + 0.37 * face, p.y()};
+    case 0:
+      return {p.y() + 0.37 * face, -p.z()};
+    case 1:
+      return {p.x() + 0.37 * face, -p.z()};
+    default:
+      return {p.x() + 0.37 * face, p.y()};
   }
 }
 

@@ -65,7 +65,8 @@ inline cv::Scalar random_color(cfp::Random& random, double low = 20, double high
 inline void add_grain(cfp::Random& random, cv::Mat& image, double strength) {
   for (int cell = 1; cell <= 16; cell *= 4) {
     cv::Mat noise(image.rows / cell, image.cols / cell, CV_32F);
-    for (auto it = noise.begin<float>(); it != noise.end<float>(); ++it) *it = static_cast<float>(3.46 * strength * (random.uniform() - 0.5));
+    for (auto it = noise.begin<float>(); it != noise.end<float>(); ++it)
+      *it = static_cast<float>(3.46 * strength * (random.uniform() - 0.5));
     cv::resize(noise, noise, image.size(), 0, 0, cv::INTER_LINEAR);
     cv::Mat channels[3] = {noise, noise, noise}, grain, sum;
     cv::merge(channels, 3, grain);
@@ -81,7 +82,8 @@ inline cv::Mat collage(cfp::Random& random, int size, const cv::Scalar& ground, 
   cv::Mat image(size, size, CV_8UC3, ground);
   for (int i = 0; i < shapes; ++i) {
     const double scale = size * largest * std::pow(0.05, static_cast<double>(i) / shapes);
-    const cv::Point at(static_cast<int>(random.index(static_cast<std::uint32_t>(size))), static_cast<int>(random.index(static_cast<std::uint32_t>(size))));
+    const cv::Point at(static_cast<int>(random.index(static_cast<std::uint32_t>(size))),
+                       static_cast<int>(random.index(static_cast<std::uint32_t>(size))));
     const cv::Size extent(static_cast<int>(scale * random.uniform(0.3, 1)) + 2, static_cast<int>(scale * random.uniform(0.3, 1)) + 2);
     const cv::Scalar color = random_color(random);
     const double kind = random.uniform();
@@ -91,11 +93,13 @@ inline cv::Mat collage(cfp::Random& random, int size, const cv::Scalar& ground, 
     } else if (kind < 0.6) {
       cv::circle(image, at, extent.width / 2 + 1, color, random.uniform() < 0.6 ? cv::FILLED : std::max(1, extent.width / 12), cv::LINE_AA);
     } else if (kind < 0.72) {
-      cv::line(image, at, at + cv::Point(extent.width, random.uniform() < 0.5 ? extent.height : -extent.height), color, std::max(1, size / 256), cv::LINE_AA);
+      cv::line(image, at, at + cv::Point(extent.width, random.uniform() < 0.5 ? extent.height : -extent.height), color,
+               std::max(1, size / 256), cv::LINE_AA);
     } else {
       std::string word;
       for (int c = 0; c < 7; ++c) word += static_cast<char>('A' + random.index(26));
-      cv::putText(image, word, at, cv::FONT_HERSHEY_DUPLEX, std::max(0.3, scale / 110), color, std::max(1, static_cast<int>(scale / 60)), cv::LINE_AA);
+      cv::putText(image, word, at, cv::FONT_HERSHEY_DUPLEX, std::max(0.3, scale / 110), color, std::max(1, static_cast<int>(scale / 60)),
+                  cv::LINE_AA);
     }
   }
   add_grain(random, image, 4);
@@ -123,8 +127,10 @@ inline cv::Mat blots(cfp::Random& random, int size, const cv::Scalar& ground) {
   cv::Mat image(size, size, CV_8UC3, ground);
   for (int i = 0; i < 700; ++i) {
     const cv::Scalar tone = ground * random.uniform(0.35, 1.7);
-    const cv::Point at(static_cast<int>(random.index(static_cast<std::uint32_t>(size))), static_cast<int>(random.index(static_cast<std::uint32_t>(size))));
-    const cv::Size axes(3 + static_cast<int>(random.index(static_cast<std::uint32_t>(size / 24))), 3 + static_cast<int>(random.index(static_cast<std::uint32_t>(size / 40))));
+    const cv::Point at(static_cast<int>(random.index(static_cast<std::uint32_t>(size))),
+                       static_cast<int>(random.index(static_cast<std::uint32_t>(size))));
+    const cv::Size axes(3 + static_cast<int>(random.index(static_cast<std::uint32_t>(size / 24))),
+                        3 + static_cast<int>(random.index(static_cast<std::uint32_t>(size / 40))));
     cv::ellipse(image, at, axes, random.uniform(0, 180), 0, 360, tone, cv::FILLED);
   }
   add_grain(random, image, 5);
@@ -154,7 +160,8 @@ inline cv::Mat head(cfp::Random& random, int size, const cv::Scalar& skin, const
   cv::line(image, at(0.2, 0.34), at(0.3, 0.34), {70, 60, 140}, size / 40);
   for (int i = 0; i < 500; ++i) {
     const cv::Point p = at(random.uniform(), random.uniform(0.3, 1));
-    if (cv::norm(cv::Scalar(image.at<cv::Vec3b>(p)) - hair) < 40) cv::line(image, p, p + cv::Point(2, size / 24), hair * random.uniform(0.6, 1.8), 2);
+    if (cv::norm(cv::Scalar(image.at<cv::Vec3b>(p)) - hair) < 40)
+      cv::line(image, p, p + cv::Point(2, size / 24), hair * random.uniform(0.6, 1.8), 2);
   }
   return image;
 }

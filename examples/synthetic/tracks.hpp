@@ -132,8 +132,8 @@ inline Script walking_script(cfp::Random& random, int person, double seconds, bo
   const double seat_x = chair_x[person] + 0.42 * std::cos(inward), seat_y = chair_y + 0.42 * std::sin(inward);
   const double speed = random.uniform(0.75, 1.05);
   const bool starts_seated = furnished && person == 0;
-  Director d(starts_seated ? seat_x : side * (furnished ? 1.0 : 0.5), starts_seated ? seat_y : lane, starts_seated ? inward : cfp::pi<double>, starts_seated ? 1 : 0,
-             person == 0 ? 1.80 : 1.74);
+  Director d(starts_seated ? seat_x : side * (furnished ? 1.0 : 0.5), starts_seated ? seat_y : lane,
+             starts_seated ? inward : cfp::pi<double>, starts_seated ? 1 : 0, person == 0 ? 1.80 : 1.74);
   if (starts_seated) {
     d.wait(0.6);
     d.sit(0);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstdio>
 #include <exception>
@@ -27,9 +28,10 @@ std::string text(const char* format, Values... values) {
   return buffer;
 }
 
-/// Writes the sequence into a folder, which is made when missing. progress(frames done) is called from the rendering threads, one at a time.
-/// The files do not depend on the number of threads.
-inline void write_sequence(const Sequence& sequence, const std::filesystem::path& folder, int threads, const std::function<void(int)>& progress) {
+/// Writes the sequence into a folder, which is made when missing. progress(frames done) is called from the rendering threads, one at a
+/// time. The files do not depend on the number of threads.
+inline void write_sequence(const Sequence& sequence, const std::filesystem::path& folder, int threads,
+                           const std::function<void(int)>& progress) {
   const SequenceOptions& options = sequence.options();
   for (const char* sub : {"rgb", "depth", "labels"}) std::filesystem::create_directories(folder / sub);
   std::vector<std::array<Sighting, 2>> people(static_cast<std::size_t>(options.frames));
@@ -47,7 +49,8 @@ inline void write_sequence(const Sequence& sequence, const std::filesystem::path
         const std::string name = text("%.6f.png", sequence.stamp_of(k));
         // Noise does not compress: the fastest level costs a few per cent of space and half the time.
         const std::vector<int> fast{cv::IMWRITE_PNG_COMPRESSION, 1};
-        if (!cv::imwrite((folder / "rgb" / name).string(), frame.color, fast) || !cv::imwrite((folder / "depth" / name).string(), frame.depth, fast) ||
+        if (!cv::imwrite((folder / "rgb" / name).string(), frame.color, fast) ||
+            !cv::imwrite((folder / "depth" / name).string(), frame.depth, fast) ||
             !cv::imwrite((folder / "labels" / name).string(), frame.label, fast)) {
           throw std::runtime_error("cannot write images into " + folder.string());
         }
@@ -88,7 +91,9 @@ inline void write_sequence(const Sequence& sequence, const std::filesystem::path
     for (std::size_t who = 0; who < seen.size(); ++who) {
       const Sighting& s = seen[who];
       if (s.pixels > 0) {
-        boxes << stamp << text(" %d %.0f %.0f %.0f %.0f %.3f %d\n", static_cast<int>(who) + 1, s.box.x1, s.box.y1, s.box.x2, s.box.y2, s.visible, s.pixels);
+        boxes << stamp
+              << text(" %d %.0f %.0f %.0f %.0f %.3f %d\n", static_cast<int>(who) + 1, s.box.x1, s.box.y1, s.box.x2, s.box.y2, s.visible,
+                      s.pixels);
       }
     }
     for (const Detection& d : detector.detect(seen, sequence.rotation_rate(k), options.blur_samples > 1, c.width, c.height)) {

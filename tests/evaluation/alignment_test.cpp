@@ -78,7 +78,8 @@ TEST_CASE("No small change of the aligned motion lowers the cost, noise and refl
 }
 
 TEST_CASE("Points that do not fix the rotation give a proper minimiser and the status degenerate", "[evaluation]") {
-  const Points<double> one{{1, 2, 3}}, two{{0, 0, 0}, {1, 0, 0}}, line{{0, 0, 0}, {1, 1, 1}, {3, 3, 3}}, same{{1, 1, 1}, {1, 1, 1}, {1, 1, 1}};
+  const Points<double> one{{1, 2, 3}}, two{{0, 0, 0}, {1, 0, 0}}, line{{0, 0, 0}, {1, 1, 1}, {3, 3, 3}},
+      same{{1, 1, 1}, {1, 1, 1}, {1, 1, 1}};
   for (const auto& points : {one, two, line, same}) {
     Points<double> to;
     for (const auto& p : points) to.emplace_back(-p.y() + 5, p.x(), p.z());

@@ -129,7 +129,8 @@ TEMPLATE_TEST_CASE("Hostile probabilities and weights are skipped, and everythin
   const auto r = cfp::evaluate_calibration(s.p(), s.y(), s.w(), workspace);
   CHECK(r.skipped == 7);
   CHECK(r.used == 4);
-  for (const double x : {r.auc, r.brier, r.expected_calibration_error, r.largest_calibration_error, r.static_fraction}) CHECK((x >= 0 && x <= 1));
+  for (const double x : {r.auc, r.brier, r.expected_calibration_error, r.largest_calibration_error, r.static_fraction})
+    CHECK((x >= 0 && x <= 1));
   CHECK((r.log_loss >= 0 && r.log_loss < 34.6));
   for (const auto& bin : r.table) CHECK((cfp::is_finite(bin.weight) && bin.static_fraction >= 0 && bin.static_fraction <= 1));
 

@@ -39,7 +39,8 @@ void check(const std::map<std::string, double>& expected, const std::string& pre
 }
 
 /// evaluate_rpe.py for exact stamps k / 4 and equal lengths, written with 4x4 matrices as the script does.
-std::vector<std::pair<double, double>> relative_errors_by_matrices(const Trajectory<double>& truth, const Trajectory<double>& estimate, std::size_t step) {
+std::vector<std::pair<double, double>> relative_errors_by_matrices(const Trajectory<double>& truth, const Trajectory<double>& estimate,
+                                                                   std::size_t step) {
   std::vector<std::pair<double, double>> errors;
   const auto matrix = [](const cfp::SE3<double>& T) {
     Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
@@ -173,9 +174,11 @@ TEST_CASE("Shuffled trajectories with duplicates and broken poses give the clean
 
 TEST_CASE("Coverage tells of lost frames, gaps and late starts", "[evaluation]") {
   Trajectory<double> truth, estimate;
-  for (int k = 0; k <= 100; ++k) truth.push_back({0.1 * k, {cfp::Matrix3<double>::Identity(), {std::sin(0.1 * k), std::cos(0.2 * k), 0.1 * k}}});
+  for (int k = 0; k <= 100; ++k)
+    truth.push_back({0.1 * k, {cfp::Matrix3<double>::Identity(), {std::sin(0.1 * k), std::cos(0.2 * k), 0.1 * k}}});
   for (int k = 20; k <= 60; ++k) {
-    if (k <= 30 || k >= 50) estimate.push_back({truth[static_cast<std::size_t>(k)].time_s + 0.004, truth[static_cast<std::size_t>(k)].T_world_cam});
+    if (k <= 30 || k >= 50)
+      estimate.push_back({truth[static_cast<std::size_t>(k)].time_s + 0.004, truth[static_cast<std::size_t>(k)].T_world_cam});
   }
   cfp::TrajectoryErrorWorkspace workspace;
   cfp::AbsoluteErrorOptions options;
@@ -199,7 +202,8 @@ TEMPLATE_TEST_CASE("Hostile trajectories and options give finite results and a s
   cfp::TrajectoryErrorWorkspace workspace;
   for (const auto& a : {none, one, far, broken}) {
     for (const auto& b : {none, one, far, broken}) {
-      for (const auto mode : {cfp::AlignmentMode::none, cfp::AlignmentMode::first_pose, cfp::AlignmentMode::rigid, cfp::AlignmentMode::similarity}) {
+      for (const auto mode :
+           {cfp::AlignmentMode::none, cfp::AlignmentMode::first_pose, cfp::AlignmentMode::rigid, cfp::AlignmentMode::similarity}) {
         cfp::AbsoluteErrorOptions options;
         options.alignment = mode;
         const auto ate = cfp::absolute_trajectory_error(view(a), view(b), options, workspace);

@@ -20,8 +20,8 @@ Trajectory<double> at(const std::vector<double>& stamps) {
 }
 
 /// associate.py word for word: every pair below max_difference, sorted, taken greedily.
-std::vector<std::pair<double, double>> associate_by_brute_force(const std::vector<double>& first, const std::vector<double>& second, double offset,
-                                                                double max_difference) {
+std::vector<std::pair<double, double>> associate_by_brute_force(const std::vector<double>& first, const std::vector<double>& second,
+                                                                double offset, double max_difference) {
   std::vector<std::tuple<double, double, double>> potential;
   for (const double a : first) {
     for (const double b : second) {

@@ -177,7 +177,8 @@ TEST_CASE("Sensed depth has the stated noise, steps and holes", "[synthetic]") {
     for (int x = 1; x + 1 < out.depth.cols; ++x) {
       const double z = static_cast<double>(out.truth.depth.at<float>(y, x));
       const double measured = out.depth.at<std::uint16_t>(y, x) / options.depth_units_per_metre;
-      const bool edge = std::abs(z - static_cast<double>(out.truth.depth.at<float>(y, x - 1))) > 0.3 || std::abs(z - static_cast<double>(out.truth.depth.at<float>(y, x + 1))) > 0.3;
+      const bool edge = std::abs(z - static_cast<double>(out.truth.depth.at<float>(y, x - 1))) > 0.3 ||
+                        std::abs(z - static_cast<double>(out.truth.depth.at<float>(y, x + 1))) > 0.3;
       if (z > options.range_m) {
         ++beyond;
         holes_beyond += measured == 0 ? 1 : 0;
@@ -299,7 +300,8 @@ TEST_CASE("A recording with a missing or wrong file is refused with its name", "
   CHECK_THROWS_WITH(rendered(Sequence(options, recording), 1), Catch::Matchers::Contains("size differs"));
   std::filesystem::remove(recording->views[1].color);
   CHECK_THROWS_WITH(rendered(Sequence(options, recording), 1), Catch::Matchers::Contains(recording->views[1].color.filename().string()));
-  CHECK_THROWS_WITH(write_sequence(Sequence(options, recording), folder.path / "out", 2, [](int) {}), Catch::Matchers::Contains("cannot read"));
+  CHECK_THROWS_WITH(write_sequence(Sequence(options, recording), folder.path / "out", 2, [](int) {}),
+                    Catch::Matchers::Contains("cannot read"));
   std::filesystem::remove(folder.path / "camera.txt");
   CHECK_THROWS_WITH(read_recording(folder.path, 1.35), Catch::Matchers::Contains("camera.txt"));
 }

@@ -26,7 +26,9 @@ TEST_CASE("AUC follows the order of the scores only", "[properties]") {
       opposite.push_back(y[i] == 0 ? 1 : 0);
     }
     cfp::CalibrationWorkspace workspace;
-    const auto auc = [&](const std::vector<double>& s, const std::vector<char>& l) { return cfp::area_under_curve<double>(s, l, {}, workspace).auc; };
+    const auto auc = [&](const std::vector<double>& s, const std::vector<char>& l) {
+      return cfp::area_under_curve<double>(s, l, {}, workspace).auc;
+    };
     RC_ASSERT(std::abs(auc(scores, y) - auc(grown, y)) < 1e-12);
     RC_ASSERT(std::abs(auc(scores, y) + auc(fallen, y) - 1) < 1e-12);
     RC_ASSERT(std::abs(auc(scores, y) + auc(scores, opposite) - 1) < 1e-12);

@@ -42,9 +42,7 @@ struct Similarity {
   Matrix3<double> rotation = Matrix3<double>::Identity();
   Vector3<double> translation = Vector3<double>::Zero();
 
-  [[nodiscard]] Vector3<double> operator*(const Vector3<double>& point) const noexcept {
-    return scale * (rotation * point) + translation;
-  }
+  [[nodiscard]] Vector3<double> operator*(const Vector3<double>& point) const noexcept { return scale * (rotation * point) + translation; }
 };
 
 struct AlignmentResult {

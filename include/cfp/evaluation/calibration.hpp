@@ -29,10 +29,10 @@ struct CalibrationWorkspace {
 /// Probability that a randomly chosen static sample scores higher than a moving one, ties counting one half (Mann–Whitney):
 /// sum over (static i, moving j) of w_i w_j ([s_i > s_j] + [s_i = s_j] / 2) / (W_static W_moving). Value in [0, 1].
 struct AucResult {
-  double auc = 0.5;           ///< 0.5 when a class is empty
-  double static_weight = 0;   ///< W_static, a count without weights
-  double moving_weight = 0;   ///< W_moving
-  std::size_t skipped = 0;    ///< samples with a NaN or infinite score, or a weight that is negative or not finite
+  double auc = 0.5;                         ///< 0.5 when a class is empty
+  double static_weight = 0;                 ///< W_static, a count without weights
+  double moving_weight = 0;                 ///< W_moving
+  std::size_t skipped = 0;                  ///< samples with a NaN or infinite score, or a weight that is negative or not finite
   Status status = Status::not_enough_data;  ///< degenerate: only one of the classes has weight
 };
 
@@ -95,15 +95,15 @@ struct ReliabilityBin {
 
 template <std::size_t Bins>
 struct CalibrationResult {
-  double auc = 0.5;           ///< see area_under_curve
-  double brier = 0;           ///< sum w (p − y)² / sum w, y = 1 for static, in [0, 1]
-  double log_loss = 0;        ///< −sum w (y ln p + (1 − y) ln(1 − p)) / sum w, nats; p kept in [1e-15, 1 − 1e-15], so at most 34.54
+  double auc = 0.5;     ///< see area_under_curve
+  double brier = 0;     ///< sum w (p − y)² / sum w, y = 1 for static, in [0, 1]
+  double log_loss = 0;  ///< −sum w (y ln p + (1 − y) ln(1 − p)) / sum w, nats; p kept in [1e-15, 1 − 1e-15], so at most 34.54
   double expected_calibration_error = 0;  ///< sum over bins of (weight / total) |static_fraction − mean_probability|, in [0, 1]
   double largest_calibration_error = 0;   ///< the largest |static_fraction − mean_probability| of a bin that is not empty
   double static_fraction = 0;             ///< of the total weight
   std::array<ReliabilityBin, Bins> table{};
-  std::size_t used = 0;       ///< samples of positive weight
-  std::size_t skipped = 0;    ///< probability not in [0, 1] or NaN; weight negative or not finite
+  std::size_t used = 0;                     ///< samples of positive weight
+  std::size_t skipped = 0;                  ///< probability not in [0, 1] or NaN; weight negative or not finite
   Status status = Status::not_enough_data;  ///< degenerate: only one of the classes, auc is 0.5 and the rest valid
 };
 

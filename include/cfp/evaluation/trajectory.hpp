@@ -134,7 +134,8 @@ void associate(span<const StampedPose<Scalar>> first, span<const StampedPose<Sca
     if (after != none) events[after].previous = before;
     consider(before, after);
   }
-  std::sort(matches.begin(), matches.end(), [&](const TimeMatch& a, const TimeMatch& b) { return first[a.first].time_s < first[b.first].time_s; });
+  std::sort(matches.begin(), matches.end(),
+            [&](const TimeMatch& a, const TimeMatch& b) { return first[a.first].time_s < first[b.first].time_s; });
 }
 
 }  // namespace cfp

@@ -50,11 +50,11 @@ enum class DeltaUnit : std::uint8_t {
 [[nodiscard]] constexpr const char* to_string(DeltaUnit unit) noexcept { return unit == DeltaUnit::seconds ? "s" : "frames"; }
 
 struct RelativeErrorOptions {
-  double delta = 1;                      ///< length of the interval, > 0
-  DeltaUnit unit = DeltaUnit::seconds;   ///< of delta
-  double offset_s = 0;                   ///< added to the stamps of the estimate
-  double scale = 1;                      ///< multiplies the translations of the estimate, > 0
-  std::size_t expected_poses = 0;        ///< as in AbsoluteErrorOptions
+  double delta = 1;                     ///< length of the interval, > 0
+  DeltaUnit unit = DeltaUnit::seconds;  ///< of delta
+  double offset_s = 0;                  ///< added to the stamps of the estimate
+  double scale = 1;                     ///< multiplies the translations of the estimate, > 0
+  std::size_t expected_poses = 0;       ///< as in AbsoluteErrorOptions
 };
 
 [[nodiscard]] inline const char* invalid_field(const RelativeErrorOptions& options) noexcept {
@@ -69,7 +69,7 @@ struct RelativeErrorResult {
   ErrorStatistics rotation_deg;
   double delta = 1;
   DeltaUnit unit = DeltaUnit::seconds;
-  TrajectoryCoverage coverage;    ///< matched: poses that begin or end a pair
+  TrajectoryCoverage coverage;  ///< matched: poses that begin or end a pair
   Status status = Status::not_enough_data;
 };
 
@@ -130,11 +130,13 @@ template <typename Scalar>
   result.status = Status::ok;
   Similarity& S = result.S_truth_estimate;
   if (options.alignment == AlignmentMode::first_pose) {
-    S.rotation = detail::double_pose(truth[matches[0].first]).rotation * detail::double_pose(estimate[matches[0].second]).rotation.transpose();
+    S.rotation =
+        detail::double_pose(truth[matches[0].first]).rotation * detail::double_pose(estimate[matches[0].second]).rotation.transpose();
     S.translation = workspace.truth_points[0] - S.rotation * workspace.estimate_points[0];
   } else if (options.alignment != AlignmentMode::none) {
-    const AlignmentResult aligned = align_points(PointSpan<double, 3>(workspace.estimate_points), PointSpan<double, 3>(workspace.truth_points),
-                                                 options.alignment == AlignmentMode::similarity);
+    const AlignmentResult aligned =
+        align_points(PointSpan<double, 3>(workspace.estimate_points), PointSpan<double, 3>(workspace.truth_points),
+                     options.alignment == AlignmentMode::similarity);
     S = aligned.S_to_from;
     result.status = aligned.status;
   }
@@ -178,6 +180,7 @@ template <typename Scalar>
   const std::size_t n = truth_order.empty() ? 0 : order.size();
   const auto truth_stamp = [&](std::size_t i) { return truth[truth_order[i]].time_s; };
   const auto stamp = [&](std::size_t i) { return estimate[order[i]].time_s; };
+  const auto index = [](std::size_t i) { return static_cast<double>(i); };
   matches.clear();
   for (std::size_t i = 0; i < n; ++i) {
     matches.push_back({truth_order[detail::closest_index(truth_order.size(), stamp(i) + options.offset_s, truth_stamp)], order[i]});
@@ -188,9 +191,8 @@ template <typename Scalar>
   };
   workspace.used.assign(n, 0);
   for (std::size_t i = 0; i < n; ++i) {
-    const std::size_t j = options.unit == DeltaUnit::seconds
-                              ? detail::closest_index(n, stamp(i) + options.delta, stamp)
-                              : detail::closest_index(n, static_cast<double>(i) + options.delta, [](std::size_t k) { return static_cast<double>(k); });
+    const std::size_t j = options.unit == DeltaUnit::seconds ? detail::closest_index(n, stamp(i) + options.delta, stamp)
+                                                             : detail::closest_index(n, static_cast<double>(i) + options.delta, index);
     if (j + 1 == n || !has_truth(i) || !has_truth(j)) continue;
     SE3<double> P = detail::double_pose(estimate[order[j]]).inverse() * detail::double_pose(estimate[order[i]]);
     const SE3<double> Q = detail::double_pose(truth[matches[j].first]).inverse() * detail::double_pose(truth[matches[i].first]);
