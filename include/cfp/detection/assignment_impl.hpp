@@ -11,7 +11,7 @@
 #include <Eigen/Core>
 
 #include "cfp/detection/assignment.hpp"
-#include "cfp/detection/assignment_solver.hpp"
+#include "cfp/detection/assignment_solver_impl.hpp"
 
 namespace cfp {
 namespace detail {

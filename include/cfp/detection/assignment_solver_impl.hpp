@@ -1,4 +1,4 @@
-/// @file assignment_solver.hpp
+/// @file assignment_solver_impl.hpp
 /// The search behind assignment.hpp (include that one): greedy start, row bids, shortest augmenting paths.
 #pragma once
 
