@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "../tests/support/two_view_scene.hpp"
+#include "support/two_view_scene.hpp"
 #include "cfp/geometry/fundamental_ransac.hpp"
 
 #ifdef CFP_HAVE_OPENCV

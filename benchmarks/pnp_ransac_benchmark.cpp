@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "../tests/support/absolute_pose_scene.hpp"
+#include "support/absolute_pose_scene.hpp"
 #include "cfp/optimization/pnp_ransac.hpp"
 
 #ifdef CFP_HAVE_OPENCV

@@ -13,11 +13,11 @@
 #include <vector>
 
 #include "../examples/ba_files.hpp"
-#include "../tests/support/ba_scene.hpp"
+#include "support/ba_scene.hpp"
 #include "cfp/optimization/two_threads.hpp"
 #include "cfp/optimization/weighted_ba.hpp"
 #ifdef CFP_HAVE_CERES
-#include "../tests/support/ba_ceres.hpp"
+#include "support/ba_ceres.hpp"
 #endif
 
 namespace {

@@ -12,9 +12,9 @@
 #include <vector>
 
 #ifdef CFP_HAVE_CERES
-#include "../tests/support/pose_ceres.hpp"
+#include "support/pose_ceres.hpp"
 #endif
-#include "../tests/support/pose_scene.hpp"
+#include "support/pose_scene.hpp"
 #ifdef CFP_HAVE_OPENCV
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
