@@ -1,8 +1,10 @@
 #include "cfp/optimization/weighted_ba.hpp"
 
+#include "../../examples/ba_files.hpp"
 #include "support/ba_ceres.hpp"
 #include "support/ba_scene.hpp"
 #include "support/catch.hpp"
+#include "support/data.hpp"
 
 TEST_CASE("Cost and poses equal Ceres' on random problems with weights, losses, mono and RGB-D", "[optimization][weighted_ba][ceres]") {
   int compared = 0;
@@ -38,4 +40,17 @@ TEST_CASE("Cost and poses equal Ceres' on random problems with weights, losses, 
     }
   }
   CHECK(compared >= 190);
+}
+
+TEST_CASE("On a real recording the cost is not above Ceres'", "[optimization][weighted_ba][ceres]") {
+  CFP_REQUIRE_DATA(file, "ba/dubrovnik-3-7-18-pre.txt");
+  ba_files::Problem ours = ba_files::read(file.string()), theirs = ours;
+  cfp::WeightedBaOptions options;
+  options.loss = cfp::LossType::trivial;
+  options.levenberg_marquardt.max_iterations = 50;
+  cfp::WeightedBaWorkspace workspace;
+  ceres::Solver::Options solver;
+  solver.linear_solver_type = ceres::DENSE_SCHUR;
+  const cfp::WeightedBaResult result = adjust_bundle(ours.view(), options, workspace);
+  CHECK(result.final_cost <= cfp_test::solve_with_ceres(theirs.view(), options, solver).cost * (1 + 1e-6));
 }

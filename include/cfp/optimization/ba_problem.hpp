@@ -24,7 +24,7 @@ struct BaObservations {
   span<const int> point;            ///< index into BaProblem::points
   PointSpan<Scalar, 2> pixels;      ///< (u, v)
   span<const Scalar> u_right = {};  ///< px, u - fx b / z of a stereo or RGB-D observation; not > 0 or NaN: a pixel only. Empty: all mono
-  span<const Scalar> sigmas = {}; ///< px, ORB-SLAM2: the scale factor of the octave. Empty: all 1
+  span<const Scalar> sigmas = {};   ///< px, ORB-SLAM2: the scale factor of the octave. Empty: all 1
   span<const Scalar> weights = {};  ///< w >= 0, for example the static probability. Empty: all 1
 };
 

@@ -62,7 +62,7 @@ class Damping {
   [[nodiscard]] double value() const noexcept { return value_; }
   /// Whether the last step was refused; then a small promise means a short step, not an optimum.
   [[nodiscard]] bool last_step_rejected() const noexcept { return growth_ > 2; }
-  /// False once the damping has been at its limit and the step was refused there, too.
+  /// True once the damping was at its limit and the step was refused there, too.
   [[nodiscard]] bool exhausted() const noexcept { return exhausted_; }
 
   /// Judges a step by gain = (cost before - cost after) / (predicted decrease); NaN is refused. Accepted (gain above 1e-3):
