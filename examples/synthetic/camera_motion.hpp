@@ -45,32 +45,32 @@ class CameraMotion {
         break;
       case Motion::xyz:
         // One axis after the other, as the operators did, with a little of the others.
-        T.translation += axis(time, 0) * 0.28 * wave(3.6, 0) * Eigen::Vector3d::UnitX() +
-                         axis(time, 1) * 0.25 * wave(3.9, 1) * Eigen::Vector3d::UnitY() +
-                         axis(time, 2) * 0.22 * wave(3.4, 2) * Eigen::Vector3d::UnitZ();
+        T.translation +=
+            Eigen::Vector3d(axis(time, 0) * 0.28 * wave(5.2, 0), axis(time, 1) * 0.25 * wave(5.6, 1), axis(time, 2) * 0.22 * wave(5.0, 2));
+        T.rotation = T.rotation * cfp::so3_exp<double>(Eigen::Vector3d(0.02 * wave(3.4, 3), 0.025 * wave(4.1, 4), 0.015 * wave(3, 2)));
         break;
       case Motion::halfsphere: {
-        const double azimuth = 1.35 * wave(9, 0), elevation = 0.55 + 0.6 * wave(6.5, 1);
-        const double r = 0.5 * gain;
+        const double azimuth = 1.35 * wave(13, 0), elevation = 0.55 + 0.6 * wave(9, 1), r = 0.5 * gain;
         T = look_at(base + Eigen::Vector3d(r * std::cos(elevation) * std::sin(azimuth), r * (0.5 - std::cos(elevation) * std::cos(azimuth)),
                                            r * (std::sin(elevation) - 0.4)),
                     target);
-        T.rotation = T.rotation * cfp::so3_exp<double>(Eigen::Vector3d(0.05 * wave(3, 2), 0.07 * wave(2.6, 3), 0.06 * wave(4, 4)));
+        T.rotation = T.rotation * cfp::so3_exp<double>(Eigen::Vector3d(0.09 * wave(3.4, 2), 0.15 * wave(3.9, 3), 0.10 * wave(4.6, 4)));
         break;
       }
       case Motion::rpy: {
-        const Eigen::Vector3d w(axis(time, 0) * 0.30 * wave(3.6, 0), axis(time, 1) * 0.48 * wave(4.2, 1),
-                                axis(time, 2) * 0.42 * wave(3.8, 2));
+        const Eigen::Vector3d w(axis(time, 0) * 0.30 * wave(4.4, 0), axis(time, 1) * 0.48 * wave(5.2, 1),
+                                axis(time, 2) * 0.42 * wave(4.7, 2));
         T.rotation = T.rotation * cfp::so3_exp<double>(w);
+        T.translation += Eigen::Vector3d(0.035 * wave(4.9, 3), 0.025 * wave(5.7, 4), 0.03 * wave(4.3, 2));
         break;
       }
     }
     // A hand holds the camera: slow sway and fast tremor.
-    const double k = motion_ == Motion::fixed ? 1 : 1.6;
+    const double k = motion_ == Motion::fixed ? 1 : 1.4;
     Eigen::Vector3d t, w;
     for (int a = 0; a < 3; ++a) {
-      t[a] = k * (0.004 * wave(3.1 + a, 5 + a) + 0.0008 * wave(0.21 + 0.03 * a, 8 + a));
-      w[a] = k * (0.004 * wave(2.7 + a, 11 + a) + 0.0009 * wave(0.19 + 0.02 * a, 14 + a));
+      t[a] = k * (0.004 * wave(3.1 + a, 5 + a) + 0.0003 * wave(0.21 + 0.03 * a, 8 + a));
+      w[a] = k * (0.004 * wave(2.7 + a, 11 + a) + 0.0006 * wave(0.19 + 0.02 * a, 14 + a));
     }
     return T * cfp::SE3<double>{cfp::so3_exp<double>(w), t};
   }

@@ -1,6 +1,6 @@
 // The room: x to the right, y away from the camera, z up, metres; the floor is z = 0 and the desk stands around the origin. Near
-// structure (desk, chairs, side table) lies 2 to 3 m from the camera, the partition at 3.5 m, cabinets at 5 m, the walls beyond the
-// depth range.
+// structure (desk, chairs, side tables) lies 2 to 3.5 m from the camera, cabinets at 5 to 6 m, the back wall at 6.9 m, where depth
+// fails in half of the pixels.
 #pragma once
 
 #include <vector>
@@ -32,12 +32,12 @@ class SceneBuilder {
       scene_.skins[person] = add(plain(random_, 256, skin, 4));
       scene_.heads[person] = add(head(random_, 256, skin, person == 0 ? cv::Scalar(25, 30, 40) : cv::Scalar(70, 120, 150)));
     }
-    scene_.shirts[0] = add(collage(random_, 512, {70, 60, 50}, 260, 0.25));
+    scene_.shirts[0] = add(collage(random_, 512, {70, 60, 50}, 260, 0.25, 1));
     scene_.shirts[1] = add(plaid(random_, 512, {190, 180, 160}));
     scene_.trousers[0] = add(blots(random_, 512, {70, 105, 110}));
-    scene_.trousers[1] = add(collage(random_, 512, {110, 70, 45}, 180, 0.12));
+    scene_.trousers[1] = add(collage(random_, 512, {110, 70, 45}, 180, 0.12, 1));
     scene_.shoes = add(plain(random_, 128, {45, 45, 50}, 8));
-    const int wood = add(collage(random_, 1024, {120, 170, 205}, 90, 0.06));
+    const int wood = add(collage(random_, 1024, {120, 170, 205}, 60, 0.06, 0.6));
     for (int side = 0; side < 2; ++side) chair(chair_x[side], chair_y, chair_heading[side] - 1.5707963, wood);
     if (furnished) furnish(wood);
     return std::move(scene_);
@@ -78,21 +78,21 @@ class SceneBuilder {
 
   void furnish(int wood) {
     // Tiles as large as the largest face they lie on: a pattern that comes again would be a trap for matching.
-    const int wall = add(collage(random_, 2048, {200, 205, 210}, 1500, 0.12));
-    const int brown = add(collage(random_, 1024, {110, 150, 180}, 320, 0.2));
-    const int grey = add(collage(random_, 1024, {140, 135, 130}, 380, 0.16));
-    const int screen = add(collage(random_, 512, {35, 30, 30}, 160, 0.3));
-    const int books = add(collage(random_, 1024, {90, 90, 110}, 700, 0.12));
+    const int wall = add(collage(random_, 2048, {200, 205, 210}, 700, 0.14, 0.7));
+    const int brown = add(collage(random_, 1024, {110, 150, 180}, 150, 0.2, 0.6));
+    const int grey = add(collage(random_, 1024, {140, 135, 130}, 170, 0.16, 0.6));
+    const int screen = add(collage(random_, 512, {35, 30, 30}, 100, 0.3, 0.8));
+    const int books = add(collage(random_, 1024, {90, 90, 110}, 350, 0.14, 0.8));
 
     Surface room;
     room.shape = Shape::room;
-    room.half = Vector3d(4.2, 5.2, 1.6);
-    room.centre = Vector3d(0, 0.4, 1.6);
+    room.half = Vector3d(4.2, 4.3, 1.6);
+    room.centre = Vector3d(0, -0.4, 1.6);
     room.texture = wall;
     room.tile_m = 6.5;
     scene_.surfaces.push_back(room);
-    box(0, 0.4, -0.02, {8.4, 10.4, 0.025}, grey, 3.5);
-    for (int beam = 0; beam < 4; ++beam) box(0, 0.3 + 1.4 * beam, 2.75, {8.3, 0.18, 0.3}, brown, 4);
+    box(0, -0.4, -0.02, {8.4, 8.6, 0.025}, grey, 3.5);
+    for (int beam = 0; beam < 4; ++beam) box(0, 0.1 + 1.1 * beam, 2.75, {8.3, 0.18, 0.3}, brown, 4);
 
     // The desk: two plates on legs, with screens, books and small things.
     for (const double side : {-1.0, 1.0}) {

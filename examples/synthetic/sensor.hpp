@@ -15,8 +15,8 @@ struct SensorOptions {
   double focal_baseline = 43.5;      ///< px m, focal length times baseline: 580 px and 7.5 cm
   double disparity_step_px = 0.125;  ///< quantisation: z² / focal_baseline * step, 2.6 cm at 3 m
   double min_depth_m = 0.5;
-  double range_m = 6.5;          ///< nothing beyond
-  double fading_m = 5;           ///< from here to range_m ever more pixels fail
+  double range_m = 8;            ///< nothing beyond
+  double fading_m = 5.5;         ///< from here to range_m ever more pixels fail
   double image_noise = 2.2;      ///< standard deviation, grey levels
   double exposure_swing = 0.08;  ///< slow relative change of the exposure
 };

@@ -77,19 +77,20 @@ inline void add_grain(cfp::Random& random, cv::Mat& image, double strength) {
 }
 
 /// Rectangles, discs, lines and letters of many sizes on a ground colour: posters, papers, labels, clutter. Shapes get smaller as they
-/// go, so every distance finds corners. size in texels, a power of two.
-inline cv::Mat collage(cfp::Random& random, int size, const cv::Scalar& ground, int shapes, double largest) {
+/// go, so every distance finds corners. size in texels, a power of two; contrast in (0, 1] draws the colours towards the ground's.
+inline cv::Mat collage(cfp::Random& random, int size, const cv::Scalar& ground, int shapes, double largest, double contrast) {
   cv::Mat image(size, size, CV_8UC3, ground);
+  const auto any_color = [&]() -> cv::Scalar { return ground + contrast * (random_color(random) - ground); };
   for (int i = 0; i < shapes; ++i) {
     const double scale = size * largest * std::pow(0.05, static_cast<double>(i) / shapes);
     const cv::Point at(static_cast<int>(random.index(static_cast<std::uint32_t>(size))),
                        static_cast<int>(random.index(static_cast<std::uint32_t>(size))));
     const cv::Size extent(static_cast<int>(scale * random.uniform(0.3, 1)) + 2, static_cast<int>(scale * random.uniform(0.3, 1)) + 2);
-    const cv::Scalar color = random_color(random);
+    const cv::Scalar color = any_color();
     const double kind = random.uniform();
     if (kind < 0.45) {
       cv::rectangle(image, cv::Rect(at, extent), color, cv::FILLED);
-      cv::rectangle(image, cv::Rect(at, extent), random_color(random), std::max(1, extent.width / 20));
+      cv::rectangle(image, cv::Rect(at, extent), any_color(), std::max(1, extent.width / 20));
     } else if (kind < 0.6) {
       cv::circle(image, at, extent.width / 2 + 1, color, random.uniform() < 0.6 ? cv::FILLED : std::max(1, extent.width / 12), cv::LINE_AA);
     } else if (kind < 0.72) {

@@ -111,14 +111,14 @@ inline Script sitting_script(cfp::Random& random, int person, double seconds) {
   d.wait(person == 0 ? 0.3 : 1.2);
   while (d.now() < seconds) {
     const double choice = random.uniform();
-    if (choice < 0.5) {
+    if (choice < 0.6) {
       d.gesture(static_cast<int>(random.index(2)), random.uniform(0.8, 3));
-    } else if (choice < 0.7) {
+    } else if (choice < 0.75) {
       d.look(random.uniform(-0.9, 0.9));
-    } else if (choice < 0.82) {
+    } else if (choice < 0.9) {
       d.lean(random.uniform(0, 0.45));
     } else {
-      d.wait(random.uniform(0.5, 2));
+      d.wait(random.uniform(0.4, 1.2));
     }
   }
   return d.finish();
@@ -127,7 +127,7 @@ inline Script sitting_script(cfp::Random& random, int person, double seconds) {
 /// They stand up, walk past each other before and behind the desk, stop to talk with a hand, and sit down again.
 inline Script walking_script(cfp::Random& random, int person, double seconds, bool furnished) {
   const double side = person == 0 ? -1 : 1;
-  const double lane = person == 0 ? -1.75 : -1.45;  // y; chairs reach to -1.2, the camera to -2.45
+  const double lane = person == 0 ? -1.82 : -1.5;  // y; chairs reach to -1.2, the camera to -2.45
   const double inward = chair_heading[person];
   const double seat_x = chair_x[person] + 0.42 * std::cos(inward), seat_y = chair_y + 0.42 * std::sin(inward);
   const double speed = random.uniform(0.75, 1.05);
@@ -143,14 +143,14 @@ inline Script walking_script(cfp::Random& random, int person, double seconds, bo
   bool left = person != 0;
   while (d.now() < seconds) {
     const double choice = random.uniform();
-    const double x = left ? -random.uniform(0.3, 1.6) : random.uniform(0.3, 1.6);
+    const double x = (left ? -1 : 1) * random.uniform(0.25, 1.1);
     if (choice < 0.62) {
       d.walk(x, lane + random.uniform(-0.1, 0.1), speed * random.uniform(0.8, 1.2));
       left = !left;
-    } else if (choice < 0.78) {
+    } else if (choice < 0.8) {
       d.turn(random.uniform(1.1, 2.0));
       d.gesture(static_cast<int>(random.index(2)), random.uniform(0.4, 1.2));
-    } else if (choice < 0.9 || !furnished) {
+    } else if (choice < 0.88 || !furnished) {
       // Around the desk, behind the partition, and back on the other side.
       const double s = left ? -1 : 1;
       d.walk(s * 1.95, lane + 0.1, speed);

@@ -168,7 +168,10 @@ TEST_CASE("Static pixels reprojected with the true poses meet the same depth", "
 }
 
 TEST_CASE("Sensed depth has the stated noise, steps and holes", "[synthetic]") {
-  const Sequence sequence(small(Scenario::walking, Motion::fixed));
+  auto near = small(Scenario::walking, Motion::fixed);
+  near.sensor.fading_m = 4;
+  near.sensor.range_m = 5;
+  const Sequence sequence(near);
   const auto& options = sequence.options().sensor;
   const auto out = rendered(sequence, 120);
   double square = 0;
@@ -197,6 +200,7 @@ TEST_CASE("Sensed depth has the stated noise, steps and holes", "[synthetic]") {
   }
   CHECK(n > 5000);
   CHECK_THAT(square / n, WithinAbs(1, 0.25));
+  CHECK(beyond > 1000);
   CHECK(holes_beyond > 0.97 * beyond);
   CHECK(holes_at_edges > 0.3 * edges);
 }
