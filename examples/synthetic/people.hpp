@@ -158,7 +158,7 @@ inline void append_person(const Scene& scene, const Script& script, int person, 
     s.inverse_before = earlier.A.inverse();
     s.moved = earlier.centre;
     s.person = person;
-    s.shift = Vector3d(0.13 * part.from, 0, 0.31 * part.to);
+    s.shift = Vector3d(0.13 * static_cast<int>(part.from), 0, 0.31 * static_cast<int>(part.to));
     s.texture = wardrobe[part.wear].texture;
     s.tile_m = wardrobe[part.wear].tile_m;
     surfaces.push_back(s);
