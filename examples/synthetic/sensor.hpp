@@ -66,9 +66,8 @@ inline cv::Mat sense_depth(const Frame& frame, const std::vector<Surface>& surfa
       const std::uint64_t bits = random();
       if (shadow[static_cast<std::size_t>(x)] != 0) continue;
       if (ids[x] < 0) {
-        if (depth[x] < 13)
-          image.at<std::uint16_t>(y, x) =
-              static_cast<std::uint16_t>(std::lround(static_cast<double>(depth[x]) * options.depth_units_per_metre));
+        const double units = static_cast<double>(depth[x]) * options.depth_units_per_metre;
+        if (units < 65535.5) image.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(std::lround(units));
         continue;
       }
       double z = static_cast<double>(depth[x]);
