@@ -54,7 +54,8 @@ struct Recording {
   struct View {
     double time_s;
     std::filesystem::path color, depth;
-    cfp::SE3<double> T_stage_cam;  ///< the stage is the frame of scene.hpp
+    cfp::SE3<double> T_world_cam;  ///< as recorded
+    cfp::SE3<double> T_stage_cam;  ///< in the frame of scene.hpp, where the people are
   };
   std::vector<View> views;
   ImageCamera camera;
@@ -94,8 +95,13 @@ class Sequence {
     return recording_->views[std::min(static_cast<std::size_t>(frame), last)].time_s - recording_->views[0].time_s;
   }
   [[nodiscard]] double stamp_of(int frame) const { return (recording_ == nullptr ? 1000.0 : recording_->views[0].time_s) + time_of(frame); }
-  [[nodiscard]] cfp::SE3<double> T_world_cam(int frame) const {
+  /// The camera in the frame of scene.hpp.
+  [[nodiscard]] cfp::SE3<double> T_stage_cam(int frame) const {
     return recording_ == nullptr ? motion_(time_of(frame)) : recording_->views[static_cast<std::size_t>(frame)].T_stage_cam;
+  }
+  /// The camera as groundtruth.txt has it: a recording keeps its own world.
+  [[nodiscard]] cfp::SE3<double> T_world_cam(int frame) const {
+    return recording_ == nullptr ? motion_(time_of(frame)) : recording_->views[static_cast<std::size_t>(frame)].T_world_cam;
   }
   [[nodiscard]] double rotation_rate(int frame) const {
     const int other = frame == 0 ? std::min(1, options_.frames - 1) : frame - 1;
@@ -115,7 +121,7 @@ class Sequence {
     Backdrop backdrop;
     if (recording_ != nullptr) backdrop = load(recording_->views[static_cast<std::size_t>(frame)]);
     const std::vector<Surface> surfaces = surfaces_at(time);
-    renderer.render(scene_, surfaces, options_.camera, T_world_cam(frame), backdrop, options_.render, out.truth);
+    renderer.render(scene_, surfaces, options_.camera, T_stage_cam(frame), backdrop, options_.render, out.truth);
     if (options_.blur_samples > 1 && recording_ == nullptr) blur(time, renderer, out.truth);
     double people = 0;
     for (const Sighting& s : out.truth.people) people += s.pixels;
@@ -189,14 +195,17 @@ inline Recording read_recording(const std::filesystem::path& folder, double came
   for (std::size_t i = 0, j = 0; i < with_depth.size(); ++i) {
     while (j < with_pose.size() && colors[with_pose[j].first].time_s < colors[with_depth[i].first].time_s) ++j;
     if (j == with_pose.size() || with_pose[j].first != with_depth[i].first) continue;
-    recording.views.push_back({colors[with_depth[i].first].time_s, folder / colors[with_depth[i].first].file,
-                               folder / depths[with_depth[i].second].file, poses[with_pose[j].second].T_world_cam});
+    recording.views.push_back({colors[with_depth[i].first].time_s,
+                               folder / colors[with_depth[i].first].file,
+                               folder / depths[with_depth[i].second].file,
+                               poses[with_pose[j].second].T_world_cam,
+                               {}});
   }
   if (recording.views.empty()) throw std::runtime_error(folder.string() + ": no frame with colour, depth and pose");
   Eigen::Vector3d up = Eigen::Vector3d::Zero(), forward = Eigen::Vector3d::Zero();
   for (const auto& view : recording.views) {
-    up -= view.T_stage_cam.rotation.col(1);
-    forward += view.T_stage_cam.rotation.col(2);
+    up -= view.T_world_cam.rotation.col(1);
+    forward += view.T_world_cam.rotation.col(2);
   }
   up.normalize();
   forward = (forward - forward.dot(up) * up).normalized();
@@ -205,8 +214,8 @@ inline Recording read_recording(const std::filesystem::path& folder, double came
   T_stage_world.rotation.row(1) = forward.transpose();
   T_stage_world.rotation.row(2) = up.transpose();
   T_stage_world.translation =
-      Eigen::Vector3d(0, -2.95, camera_height_m) - T_stage_world.rotation * recording.views[0].T_stage_cam.translation;
-  for (auto& view : recording.views) view.T_stage_cam = T_stage_world * view.T_stage_cam;
+      Eigen::Vector3d(0, -2.95, camera_height_m) - T_stage_world.rotation * recording.views[0].T_world_cam.translation;
+  for (auto& view : recording.views) view.T_stage_cam = T_stage_world * view.T_world_cam;
   return recording;
 }
 

@@ -45,7 +45,7 @@ double signed_distance(const Surface& s, const Vector3d& world) {
 
 Vector3d world_point(const Sequence& sequence, int frame, double x, double y, double depth) {
   const ImageCamera& c = sequence.options().camera;
-  return sequence.T_world_cam(frame) * Vector3d(depth * (x - c.cx) / c.fx, depth * (y - c.cy) / c.fy, depth);
+  return sequence.T_stage_cam(frame) * Vector3d(depth * (x - c.cx) / c.fx, depth * (y - c.cy) / c.fy, depth);
 }
 
 struct TemporaryFolder {
@@ -295,6 +295,15 @@ TEST_CASE("People put into a recording leave the rest of it alone and are hidden
     }
     CHECK(people > 300);
     CHECK(kept > 5000);
+  }
+  write_sequence(composed, folder.path / "composed", 1, [](int) {});
+  const auto before = cfp_example::read_tum_trajectory(folder.path / "groundtruth.txt");
+  const auto after = cfp_example::read_tum_trajectory(folder.path / "composed/groundtruth.txt");
+  REQUIRE(after.size() == before.size());
+  for (std::size_t k = 0; k < after.size(); ++k) {
+    CHECK_THAT(after[k].time_s, WithinAbs(before[k].time_s, 1e-6));
+    CHECK((after[k].T_world_cam.translation - before[k].T_world_cam.translation).norm() < 1e-8);
+    CHECK((after[k].T_world_cam.rotation - before[k].T_world_cam.rotation).norm() < 1e-8);
   }
 }
 
