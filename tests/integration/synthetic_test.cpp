@@ -138,6 +138,25 @@ TEST_CASE("Labels, boxes and visible parts agree with the surfaces", "[synthetic
   CHECK(seen == std::set<int>{0, 1, 2});
 }
 
+TEST_CASE("Cameras move at the mean speeds of TUM's fr3_walking recordings", "[synthetic]") {
+  // The benchmark's own figures: m/s, deg/s.
+  const double tum[4][2] = {{0.012, 1.388}, {0.208, 5.490}, {0.221, 18.267}, {0.091, 20.903}};
+  for (std::size_t m = 0; m < 4; ++m) {
+    CAPTURE(motion_names[m]);
+    const CameraMotion motion(static_cast<Motion>(m), 1);
+    double length = 0, angle = 0;
+    cfp::SE3<double> last = motion(0);
+    for (int k = 1; k <= 900; ++k) {
+      const cfp::SE3<double> T = motion(k / 30.0);
+      length += (T.translation - last.translation).norm();
+      angle += cfp::so3_log<double>(last.rotation.transpose() * T.rotation).norm() * 180 / cfp::pi<double>;
+      last = T;
+    }
+    CHECK_THAT(length / 30 / tum[m][0], WithinAbs(1, 0.25));
+    CHECK_THAT(angle / 30 / tum[m][1], WithinAbs(1, 0.25));
+  }
+}
+
 TEST_CASE("Static pixels reprojected with the true poses meet the same depth", "[synthetic]") {
   for (const auto motion : {Motion::xyz, Motion::halfsphere, Motion::rpy}) {
     const Sequence sequence(small(Scenario::walking, motion));
