@@ -6,7 +6,7 @@
 
 #include "cfp/evaluation/trajectory_error.hpp"
 
-namespace cfp_example {
+namespace cfp_examples {
 
 inline std::string describe(const char* name, const char* unit, const cfp::ErrorStatistics& s) {
   char text[256];
@@ -38,4 +38,4 @@ inline std::string describe(const cfp::RelativeErrorResult& r) {
          describe("translation", "m", r.translation_m) + describe("rotation", "deg", r.rotation_deg) + describe(r.coverage);
 }
 
-}  // namespace cfp_example
+}  // namespace cfp_examples

@@ -15,7 +15,7 @@
 
 #include "cfp/evaluation/trajectory.hpp"
 
-namespace cfp_example {
+namespace cfp_examples {
 
 [[noreturn]] inline void bad_line(const std::filesystem::path& file, int line, const std::string& what) {
   throw std::runtime_error(file.string() + ":" + std::to_string(line) + ": " + what);
@@ -118,4 +118,4 @@ inline TumCamera read_tum_camera(const std::filesystem::path& file) {
   return camera;
 }
 
-}  // namespace cfp_example
+}  // namespace cfp_examples

@@ -170,7 +170,7 @@ class Sequence {
 /// mean −y axis of the cameras (nobody films upside down).
 inline Recording read_recording(const std::filesystem::path& folder, double camera_height_m) {
   Recording recording;
-  const cfp_example::TumCamera camera = cfp_example::read_tum_camera(folder / "camera.txt");
+  const cfp_examples::TumCamera camera = cfp_examples::read_tum_camera(folder / "camera.txt");
   recording.camera.fx = camera.fx;
   recording.camera.fy = camera.fy;
   recording.camera.cx = camera.cx;
@@ -179,10 +179,10 @@ inline Recording read_recording(const std::filesystem::path& folder, double came
   recording.camera.height = camera.height;
   recording.depth_units_per_metre = camera.depth_units_per_metre;
   const bool pseudo = !std::filesystem::exists(folder / "groundtruth.txt");
-  const auto poses = cfp_example::read_tum_trajectory(folder / (pseudo ? "pseudo_groundtruth.txt" : "groundtruth.txt"));
-  const auto colors = cfp_example::read_tum_list(folder / "rgb.txt"), depths = cfp_example::read_tum_list(folder / "depth.txt");
+  const auto poses = cfp_examples::read_tum_trajectory(folder / (pseudo ? "pseudo_groundtruth.txt" : "groundtruth.txt"));
+  const auto colors = cfp_examples::read_tum_list(folder / "rgb.txt"), depths = cfp_examples::read_tum_list(folder / "depth.txt");
   // Lists and trajectory are all stamped; the association of the evaluation does for both.
-  const auto stamped = [](const std::vector<cfp_example::TumImage>& images) {
+  const auto stamped = [](const std::vector<cfp_examples::TumImage>& images) {
     std::vector<cfp::StampedPose<double>> stamps;
     for (const auto& image : images) stamps.push_back({image.time_s, {}});
     return stamps;

@@ -86,7 +86,7 @@ inline void write_sequence(const Sequence& sequence, const std::filesystem::path
     rgb << stamp << " rgb/" << stamp << ".png\n";
     depth << stamp << " depth/" << stamp << ".png\n";
     labels << stamp << " labels/" << stamp << ".png\n";
-    truth << cfp_example::tum_line({sequence.stamp_of(k), sequence.T_world_cam(k)}) << '\n';
+    truth << cfp_examples::tum_line({sequence.stamp_of(k), sequence.T_world_cam(k)}) << '\n';
     const auto& seen = people[static_cast<std::size_t>(k)];
     for (std::size_t who = 0; who < seen.size(); ++who) {
       const Sighting& s = seen[who];

@@ -20,10 +20,10 @@ using cfp_test::view;
 /// The `name value unit` lines of the scripts' stored output, ATE's and RPE's keys apart by their names.
 std::map<std::string, double> expected_values(const std::filesystem::path& file) {
   std::map<std::string, double> values;
-  cfp_example::for_each_line(file, [&](int line, const std::vector<std::string>& words) {
+  cfp_examples::for_each_line(file, [&](int line, const std::vector<std::string>& words) {
     std::string key = words.at(0);
     if (key == "compared_pose_pairs") key += values.count(key) == 0 ? "" : ".rpe";
-    values[key] = cfp_example::parse_number(file, line, words.at(1), "expected");
+    values[key] = cfp_examples::parse_number(file, line, words.at(1), "expected");
   });
   return values;
 }
@@ -68,8 +68,8 @@ Trajectory<double> on_quarters(Trajectory<double> poses) {
 
 TEST_CASE("ATE and RPE equal the TUM scripts' output on fr3_walking_xyz", "[evaluation]") {
   CFP_REQUIRE_DATA(folder, "trajectories");
-  const auto truth = cfp_example::read_tum_trajectory(folder / "fr3_walking_xyz_groundtruth.txt");
-  const auto estimate = cfp_example::read_tum_trajectory(folder / "fr3_walking_xyz_estimate.txt");
+  const auto truth = cfp_examples::read_tum_trajectory(folder / "fr3_walking_xyz_groundtruth.txt");
+  const auto estimate = cfp_examples::read_tum_trajectory(folder / "fr3_walking_xyz_estimate.txt");
   const auto expected = expected_values(folder / "expected_fr3_walking_xyz.txt");
   cfp::TrajectoryErrorWorkspace workspace;
 

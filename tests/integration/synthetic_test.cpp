@@ -269,10 +269,10 @@ TEST_CASE("A written folder is the same from one thread and from three, and read
   CHECK(calls == 7);
   CHECK(files_of(folder.path / "one") == files_of(folder.path / "three"));
 
-  const auto camera = cfp_example::read_tum_camera(folder.path / "one/camera.txt");
+  const auto camera = cfp_examples::read_tum_camera(folder.path / "one/camera.txt");
   CHECK(camera.width == 160);
-  const auto images = cfp_example::read_tum_list(folder.path / "one/rgb.txt");
-  const auto truth = cfp_example::read_tum_trajectory(folder.path / "one/groundtruth.txt");
+  const auto images = cfp_examples::read_tum_list(folder.path / "one/rgb.txt");
+  const auto truth = cfp_examples::read_tum_trajectory(folder.path / "one/groundtruth.txt");
   REQUIRE(images.size() == 7);
   REQUIRE(truth.size() == 7);
   for (int k = 0; k < 7; ++k) {
@@ -316,8 +316,8 @@ TEST_CASE("People put into a recording leave the rest of it alone and are hidden
     CHECK(kept > 5000);
   }
   write_sequence(composed, folder.path / "composed", 1, [](int) {});
-  const auto before = cfp_example::read_tum_trajectory(folder.path / "groundtruth.txt");
-  const auto after = cfp_example::read_tum_trajectory(folder.path / "composed/groundtruth.txt");
+  const auto before = cfp_examples::read_tum_trajectory(folder.path / "groundtruth.txt");
+  const auto after = cfp_examples::read_tum_trajectory(folder.path / "composed/groundtruth.txt");
   REQUIRE(after.size() == before.size());
   for (std::size_t k = 0; k < after.size(); ++k) {
     CHECK_THAT(after[k].time_s, WithinAbs(before[k].time_s, 1e-6));
