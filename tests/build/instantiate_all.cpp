@@ -193,8 +193,32 @@ static void instantiate_evaluation() noexcept {
 
 // ---- pipeline ----
 
+// ---- pipeline ----
+template struct cfp::ObjectBox<float>;
+template struct cfp::ObjectBox<double>;
+template struct cfp::FlowModel<float>;
+template struct cfp::FlowModel<double>;
+template struct cfp::FirstStageWorkspace<float>;
+template struct cfp::FirstStageWorkspace<double>;
+template struct cfp::SecondStageWorkspace<float>;
+template struct cfp::SecondStageWorkspace<double>;
+template class cfp::StaticProbabilityPipeline<float>;
+template class cfp::StaticProbabilityPipeline<double>;
+template <typename Scalar>
+static void instantiate_pipeline() noexcept {
+  use(&cfp::estimate_flow_model<Scalar>);
+  use(&cfp::flow_distances<Scalar>);
+  use(&cfp::frame_health<Scalar>);
+  use(&cfp::apply_fallback<Scalar>);
+  use(&cfp::first_stage<Scalar, cfp::PinholeCamera<Scalar>>);
+  use(&cfp::first_stage<Scalar, cfp::RadialTangentialCamera<Scalar>>);
+  use(&cfp::second_stage<Scalar, cfp::PinholeCamera<Scalar>>);
+  use(&cfp::second_stage<Scalar, cfp::RadialTangentialCamera<Scalar>>);
+}
+
 template <typename Scalar>
 static void instantiate() noexcept {
+  instantiate_pipeline<Scalar>();
   instantiate_evaluation<Scalar>();
   instantiate_optimization<Scalar>();
   instantiate_probability<Scalar>();

@@ -39,7 +39,7 @@
   CFP_LAYOUT(cfp::ClassBox<float>, class_id)                             \
   CFP_LAYOUT(cfp::ClassBox<double>, class_id)                            \
   CFP_LAYOUT(cfp::BoxAssociationWorkspace, assignment)                   \
-  CFP_LAYOUT(cfp::BoxMotionOptions, max_size_px)                         \
+  CFP_LAYOUT(cfp::BoxMotionOptions, initial_size_rate) \
   CFP_LAYOUT(cfp::RateFilter<float>, var_rate)                           \
   CFP_LAYOUT(cfp::RateFilter<double>, var_rate)                          \
   CFP_LAYOUT(cfp::BoxFilter<float>, log_height)                          \

@@ -86,6 +86,7 @@ void object_probabilities(const FirstStageInput<Scalar>& in, const Camera& camer
 
   work.flow_distances.resize(n);
   work.scratch.resize(n);
+  work.box_distances.reserve(n);
   flow_distances(model, previous, current, span<Scalar>(work.flow_distances));
   for (std::size_t b = 0; b < in.boxes.size(); ++b) {
     work.box_distances.clear();
@@ -135,6 +136,9 @@ FirstStageResult first_stage(const FirstStageInput<Scalar>& in, const Camera& ca
     out.label[i] = valid ? KeypointLabel::outside : KeypointLabel::invalid;
     out.ruling_box[i] = no_box;
   }
+  work.members.reserve(n);
+  work.is_foreground.reserve(n);
+  work.depths.reserve(n);
   for (std::size_t b = 0; b < in.boxes.size(); ++b) {
     work.members.clear();
     for (std::size_t i = 0; i < n; ++i) {

@@ -82,6 +82,8 @@ FlowModel<Scalar> estimate_flow_model(const PointSpan<Scalar, 2>& previous, cons
   CFP_ASSERT(previous.size() == current.size() && pixels.size() == current.size());
   work.outside_previous.clear();
   work.outside_current.clear();
+  work.outside_previous.reserve(pixels.size());
+  work.outside_current.reserve(pixels.size());
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     if (detail::inside_any(boxes, pixels(i, 0), pixels(i, 1))) continue;
     work.outside_previous.push_back({previous(i, 0), previous(i, 1)});

@@ -8,6 +8,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
+#include <limits>
 #include <vector>
 
 #include "cfp/core/span.hpp"
@@ -97,10 +99,11 @@ template <typename Scalar>
 ConstraintModel<Scalar> fit_outside(const SecondStageInput<Scalar>& in, const std::vector<Scalar>& distances, const ConstraintOptions& options,
                                     SecondStageWorkspace<Scalar>& work) {
   work.samples.clear();
+  work.samples.reserve(distances.size());
   for (std::size_t i = 0; i < distances.size(); ++i) {
     if (in.label[i] == KeypointLabel::outside) work.samples.push_back(distances[i]);
   }
-  work.scratch.resize(work.samples.size());
+  work.scratch.resize(distances.size());
   return fit_constraint(span<const Scalar>(work.samples), span<Scalar>(work.scratch), options);
 }
 
@@ -108,6 +111,7 @@ ConstraintModel<Scalar> fit_outside(const SecondStageInput<Scalar>& in, const st
 template <typename Scalar>
 [[nodiscard]] double median_depth(SecondStageWorkspace<Scalar>& work) {
   work.scratch.clear();
+  work.scratch.reserve(work.depths.size());
   std::copy_if(work.depths.begin(), work.depths.end(), std::back_inserter(work.scratch), [](Scalar z) { return is_valid_depth(z); });
   if (work.scratch.empty()) return 0;
   return static_cast<double>(order_statistic(span<Scalar>(work.scratch), quantile_rank(0.5, work.scratch.size()) - 1));
