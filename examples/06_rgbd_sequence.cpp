@@ -236,8 +236,8 @@ void run(const std::filesystem::path& folder, const std::filesystem::path& out, 
 
 int main(int argc, char** argv) {
   if (argc < 3) {
-    std::printf("CFP_SKIPPED: usage: %s TUM_FOLDER OUT_FOLDER [cfp|cfp-minus|no-mdc|no-dbscan|no-ksp|only-boxes|plain]\n", argv[0]);
-    return argc == 1 ? 0 : 2;
+    std::fprintf(stderr, "usage: %s TUM_FOLDER OUT_FOLDER [cfp|cfp-minus|no-mdc|no-dbscan|no-ksp|only-boxes|plain]\n", argv[0]);
+    return 2;
   }
   try {
     run(argv[1], argv[2], variant_of(argc > 3 ? argv[3] : "cfp"));

@@ -2,11 +2,12 @@
 // fine stage's own K = K^T K^F: static ones under unit reprojection noise, moving ones displaced by a few pixels. Prints how
 // many static points each rule deletes within 1 s and 3 s (30 Hz), how many frames a moving point survives, and how near M
 // is to the truth. Supports
-// MapPointOptions::policy and ::rate. Usage: cfp_map_point_study [points]
+// MapPointOptions::policy and ::rate. Usage: cfp_map_point_study [points | --smoke]
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <initializer_list>
 #include <vector>
 
@@ -88,9 +89,10 @@ void row(const char* name, const cfp::MapPointOptions& options, int points, cons
 }  // namespace
 
 int main(int argc, char** argv) {
-  const int points = argc > 1 ? std::atoi(argv[1]) : 4000;
+  const bool smoke = argc > 1 && std::strcmp(argv[1], "--smoke") == 0;
+  const int points = smoke ? 50 : argc > 1 ? std::atoi(argv[1]) : 4000;
   if (points < 1) {
-    std::fprintf(stderr, "usage: cfp_map_point_study [points >= 1]\n");
+    std::fprintf(stderr, "usage: cfp_map_point_study [points >= 1 | --smoke]\n");
     return 2;
   }
   cfp::Random random(1, "map point study frames");

@@ -1,9 +1,10 @@
 // How many optical-flow pairs does an object's static probability need? Simulated objects: static ones with epipolar noise,
 // and moving ones of which only a share of the pairs moves (an arm, a leg). Prints, for M pairs, how often either passes
-// O_Th = 0.9. Supports ObjectProbabilityOptions::min_pairs. Usage: cfp_object_score_study [trials]
+// O_Th = 0.9. Supports ObjectProbabilityOptions::min_pairs. Usage: cfp_object_score_study [trials | --smoke]
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <vector>
 
 #include "cfp/core/random.hpp"
@@ -31,9 +32,10 @@ double pass_share(std::size_t pairs, double sigma_px, double moving_share, int t
 }  // namespace
 
 int main(int argc, char** argv) {
-  const int trials = argc > 1 ? std::atoi(argv[1]) : 20000;
+  const bool smoke = argc > 1 && std::strcmp(argv[1], "--smoke") == 0;
+  const int trials = smoke ? 200 : argc > 1 ? std::atoi(argv[1]) : 20000;
   if (trials < 1) {
-    std::fprintf(stderr, "usage: cfp_object_score_study [trials >= 1]\n");
+    std::fprintf(stderr, "usage: cfp_object_score_study [trials >= 1 | --smoke]\n");
     return 2;
   }
   std::printf("Share of objects with O > 0.9, %d trials each, seed 1\n", trials);

@@ -184,7 +184,7 @@ struct FundamentalSearch {
 
   // Whether F explains clearly more of the pairs off the plane than lines in random directions through H p would: those catch a
   // pair at distance d with probability 2/pi asin(sqrt(2) T / d), T the Sampson threshold (noise of both images). Two pairs
-  // fix the epipole; five standard deviations make up for the best epipole having been searched.
+  // fix the epipole; six standard deviations make up for the best epipole having been searched.
   [[nodiscard]] bool has_pairs_off_plane(const Matrix3<double>& H, const Matrix3<double>& F) const noexcept {
     double expected = 2, variance = 1, found = 0;
     for (std::size_t i = 0; i < pairs.size; ++i) {
@@ -195,7 +195,7 @@ struct FundamentalSearch {
       variance += chance * (1 - chance);
       found += scaled_sampson_sq(pairs, F, i) <= noise_limit ? 1 : 0;
     }
-    return found >= expected + 5 * std::sqrt(variance);
+    return found >= expected + 6 * std::sqrt(variance);
   }
 
   // Whether the pairs are spread more along their epipolar lines than across them: d_H^2 / 2 is the sum of both squares, and under
