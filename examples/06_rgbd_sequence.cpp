@@ -67,7 +67,7 @@ void track(const View& previous, const View& current, std::vector<cv::Point2f>& 
 class PoseSolver {
  public:
   PoseSolver(const cfp::PinholeCamera<float>& camera, const View& previous, const View& current, const std::vector<std::int32_t>& matches)
-      : camera_{camera.fx, camera.fy, camera.cx, camera.cy}, current_(current) {
+      : camera_{camera.fx, camera.fy, camera.cx, camera.cy} {
     for (std::size_t i = 0; i < matches.size(); ++i) {
       if (matches[i] == cfp::no_match) continue;
       const auto j = static_cast<std::size_t>(matches[i]);
@@ -100,7 +100,6 @@ class PoseSolver {
 
  private:
   cfp::PinholeCamera<double> camera_;
-  const View& current_;
   std::vector<std::array<float, 3>> points_;
   std::vector<std::array<float, 2>> pixels_;
   std::vector<float> depths_, sigmas_;

@@ -138,6 +138,13 @@ template <typename T, int Lanes>
   return BasicPacket<T, Lanes>::wrap(Eigen::internal::pmadd(a.bits, b.bits, c.bits));
 }
 
+/// Conjunction of two conditions, of packets or of scalars.
+template <typename T, int Lanes>
+[[nodiscard]] PacketMask<T, Lanes> both(const PacketMask<T, Lanes>& a, const PacketMask<T, Lanes>& b) noexcept {
+  return a & b;
+}
+[[nodiscard]] constexpr bool both(bool a, bool b) noexcept { return a && b; }
+
 /// Per lane: a where the condition holds, else b. Both are evaluated; the one not taken may hold NaN or infinity.
 template <typename T>
 [[nodiscard]] constexpr T select(bool condition, const T& a, const T& b) noexcept {

@@ -25,12 +25,16 @@ struct is_strided_eigen : std::false_type {};
 template <typename C>
 struct is_strided_eigen<C, std::void_t<typename C::PlainObject>> : std::bool_constant<!std::is_same_v<typename C::PlainObject, C>> {};
 
-template <typename C, typename T, typename = void>
-struct is_contiguous_of : std::false_type {};
+// By overload, not by partial specialisation: there Clang reports data() of std::vector<bool>, which is protected, as an error.
+struct no_data {};
+template <typename C, typename = decltype(std::declval<C&>().size())>
+auto data_of(int) -> decltype(std::declval<C&>().data());
+template <typename C>
+no_data* data_of(...);
+template <typename C>
+using data_element = std::remove_pointer_t<std::conditional_t<std::is_pointer_v<decltype(data_of<C>(0))>, decltype(data_of<C>(0)), no_data*>>;
 template <typename C, typename T>
-struct is_contiguous_of<C, T, std::void_t<decltype(std::declval<C&>().data()), decltype(std::declval<C&>().size())>>
-    : std::bool_constant<std::is_convertible_v<std::remove_pointer_t<decltype(std::declval<C&>().data())> (*)[], T (*)[]> &&
-                         !is_strided_eigen<std::remove_const_t<C>>::value> {};
+struct is_contiguous_of : std::bool_constant<std::is_convertible_v<data_element<C> (*)[], T (*)[]> && !is_strided_eigen<std::remove_const_t<C>>::value> {};
 
 template <typename T>
 struct is_span : std::false_type {};

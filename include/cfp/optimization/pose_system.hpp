@@ -66,7 +66,7 @@ void add_pinhole(const PoseColumns<scalar_of<P>>& columns, std::size_t begin, st
       const P px = multiply_add(r00, X, multiply_add(r01, Y, multiply_add(r02, Z, t0)));
       const P py = multiply_add(r10, X, multiply_add(r11, Y, multiply_add(r12, Z, t1)));
       const P pz = multiply_add(r20, X, multiply_add(r21, Y, multiply_add(r22, Z, t2)));
-      const auto front = (pz > near) & (abs(px) <= wide * pz) & (abs(py) <= wide * pz);
+      const auto front = both(pz > near, both(abs(px) <= wide * pz, abs(py) <= wide * pz));
       const P q = select(front, reciprocal(pz), zero);
       const P x = px * q, y = py * q;
       const P ru = x - load<P>(columns.u + begin), rv = y - load<P>(columns.v + begin);
