@@ -12,9 +12,9 @@ namespace cfp_test {
 
 /// Rounding of a pixel distance, in pixels.
 template <typename Scalar>
-constexpr Scalar pixel_tolerance = Scalar(1e-9);
+inline constexpr Scalar pixel_tolerance = Scalar(1e-9);
 template <>
-constexpr float pixel_tolerance<float> = 2e-3F;
+inline constexpr float pixel_tolerance<float> = 2e-3F;
 
 template <typename Scalar>
 struct TwoViews {
