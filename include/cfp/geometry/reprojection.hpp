@@ -2,8 +2,8 @@
 /// Reprojection distance, the projection constraint of paper section IV-D: a keypoint of the previous frame is
 /// back-projected with its depth, moved by T_cur_prev, projected, and compared with its match in the current frame.
 ///
-/// The distance is in pixels, >= 0 and finite, or `no_distance` (-1): no valid depth, behind the camera (or outside what
-/// the camera model can project), or a pixel that is not finite.
+/// The distance is in pixels, >= 0 and finite, or `no_distance` (-1): no valid depth (or one beyond 1e-6 of the largest number),
+/// behind the camera (or outside what the camera model can project), or a pixel that is not finite.
 #pragma once
 
 #include <cmath>
@@ -21,6 +21,14 @@
 
 namespace cfp {
 
+namespace detail {
+/// Largest depth that is back-projected: beyond it a moved point may overflow, which would project to a wrong but finite pixel.
+template <typename Scalar>
+[[nodiscard]] constexpr Scalar max_reprojected_depth() noexcept {
+  return Scalar(1e-6) * (std::numeric_limits<Scalar>::max)();
+}
+}  // namespace detail
+
 /// d_T = || pixel_cur - project(T_cur_prev * depth_prev * ray(pixel_prev)) ||, depth along z in metres.
 template <typename Camera, typename Scalar>
 [[nodiscard]] Scalar reprojection_distance(const Camera& camera, const SE3<Scalar>& T_cur_prev, const Vector2<Scalar>& pixel_prev,
@@ -28,7 +36,8 @@ template <typename Camera, typename Scalar>
   using std::sqrt;
   Vector3<Scalar> ray = Vector3<Scalar>::Zero();
   Vector2<Scalar> projected = Vector2<Scalar>::Zero();
-  if (!is_valid_depth(depth_prev) || !camera.unproject(pixel_prev, ray)) return Scalar(no_distance<double>);
+  if (!(depth_prev > Scalar(0) && depth_prev <= Scalar(detail::max_reprojected_depth<Scalar>()))) return Scalar(no_distance<double>);
+  if (!camera.unproject(pixel_prev, ray)) return Scalar(no_distance<double>);
   const Vector3<Scalar> point = ray * depth_prev;
   if (!camera.project(T_cur_prev * point, projected)) return Scalar(no_distance<double>);
   const Vector2<Scalar> difference = projected - pixel_cur;
@@ -74,7 +83,7 @@ void reprojection_distances(const PinholeCamera<Scalar>& camera, const SE3<detai
       Scalar d = distance[i] <= largest ? distance[i] : no_distance<Scalar>;
       d = z[i] > Tolerance<Scalar>::min_depth ? d : no_distance<Scalar>;
       d = depth[i] > Scalar(0) ? d : no_distance<Scalar>;
-      distance[i] = depth[i] <= largest ? d : no_distance<Scalar>;
+      distance[i] = depth[i] <= detail::max_reprojected_depth<Scalar>() ? d : no_distance<Scalar>;
     }
     detail::store_chunk(distance, first, count, out);
   });
