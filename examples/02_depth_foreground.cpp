@@ -12,9 +12,10 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <exception>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,8 @@
 
 #include "cfp/clustering/depth_foreground.hpp"
 #include "cfp/geometry/box.hpp"
+#include "support/detections_file.hpp"
+#include "support/tum.hpp"
 
 namespace {
 
@@ -65,57 +68,36 @@ cv::Mat annotate(const cv::Mat& rgb, const cv::Mat& depth, double units_per_metr
   return picture;
 }
 
-struct Stamped {
-  double time;
-  std::string rest;
-};
-
-std::vector<Stamped> read_stamped(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  std::vector<Stamped> lines;
-  for (std::string line; std::getline(in, line);) {
-    std::istringstream words(line);
-    Stamped stamped{};
-    if (line.empty() || line[0] == '#' || !(words >> stamped.time >> std::ws)) continue;
-    std::getline(words, stamped.rest);
-    lines.push_back(stamped);
-  }
-  return lines;
-}
-
 int run_sequence(const std::filesystem::path& folder, const std::filesystem::path& out, double units_per_metre) {
-  const std::vector<Stamped> images = read_stamped(folder / "rgb.txt"), depths = read_stamped(folder / "depth.txt"),
-                             detections = read_stamped(folder / "detections.txt");
-  if (images.empty() || depths.empty() || detections.empty()) {
-    std::fprintf(stderr, "%s: needs rgb.txt, depth.txt and detections.txt with at least one line each\n", folder.c_str());
-    return 1;
-  }
+  const auto images = cfp_examples::read_tum_list(folder / "rgb.txt"), depths = cfp_examples::read_tum_list(folder / "depth.txt");
+  std::ifstream stream(folder / "detections.txt");
+  const auto detected = cfp_examples::read_detections(stream, (folder / "detections.txt").string());
+  if (!detected.error.empty()) throw std::runtime_error(detected.error);
+  if (images.empty() || depths.empty()) throw std::runtime_error(folder.string() + ": rgb.txt and depth.txt need at least one line each");
   std::filesystem::create_directories(out);
   std::vector<cv::Mat> sheet;
   for (std::size_t i = 0; i < images.size(); ++i) {
-    const Stamped& image = images[i];
-    const auto nearest = std::min_element(depths.begin(), depths.end(), [&](const Stamped& a, const Stamped& b) {
-      return std::abs(a.time - image.time) < std::abs(b.time - image.time);
+    const cfp_examples::TumImage& image = images[i];
+    const auto nearest = std::min_element(depths.begin(), depths.end(), [&](const auto& a, const auto& b) {
+      return std::abs(a.time_s - image.time_s) < std::abs(b.time_s - image.time_s);
     });
-    const cv::Mat rgb = cv::imread((folder / image.rest).string()),
-                  depth = cv::imread((folder / nearest->rest).string(), cv::IMREAD_UNCHANGED);
+    const cv::Mat rgb = cv::imread((folder / image.file).string()),
+                  depth = cv::imread((folder / nearest->file).string(), cv::IMREAD_UNCHANGED);
     if (rgb.empty() || depth.type() != CV_16U || depth.size() != rgb.size()) {
-      std::fprintf(stderr, "frame %s: no colour image, or no 16-bit depth image of its size\n", image.rest.c_str());
+      std::fprintf(stderr, "frame %s: no colour image, or no 16-bit depth image of its size\n", image.file.c_str());
       continue;
     }
     std::vector<Box> boxes;
-    for (const Stamped& detection : detections) {
-      std::istringstream words(detection.rest);
-      std::string name;
-      double score = 0;
-      Box box;
-      if (std::abs(detection.time - image.time) < 0.005 && words >> name >> score >> box.x1 >> box.y1 >> box.x2 >> box.y2 &&
-          name == "person")
-        boxes.push_back(box);
+    for (const auto& frame : detected.frames) {
+      if (std::abs(frame.timestamp - image.time_s) >= 0.005) continue;
+      for (const auto& d : frame.detections) {
+        if (detected.classes[static_cast<std::size_t>(d.class_id)] != "person") continue;
+        boxes.push_back({static_cast<float>(d.box.x1), static_cast<float>(d.box.y1), static_cast<float>(d.box.x2), static_cast<float>(d.box.y2)});
+      }
     }
-    std::printf("%s\n", image.rest.c_str());
+    std::printf("%s\n", image.file.c_str());
     const cv::Mat picture = annotate(rgb, depth, units_per_metre, boxes);
-    cv::imwrite((out / std::filesystem::path(image.rest).filename()).string(), picture);
+    cv::imwrite((out / std::filesystem::path(image.file).filename()).string(), picture);
     if (sheet.size() < 9 && i >= sheet.size() * images.size() / 9) sheet.push_back(picture);
   }
   std::vector<cv::Mat> rows;
@@ -135,7 +117,14 @@ int run_sequence(const std::filesystem::path& folder, const std::filesystem::pat
 
 int main(int argc, char* argv[]) {
   const std::string mode = argc > 1 ? argv[1] : "";
-  if (mode == "sequence" && argc >= 4) return run_sequence(argv[2], argv[3], argc > 4 ? std::atof(argv[4]) : 5000.0);
+  if (mode == "sequence" && argc >= 4) {
+    try {
+      return run_sequence(argv[2], argv[3], argc > 4 ? std::atof(argv[4]) : 5000.0);
+    } catch (const std::exception& error) {
+      std::fprintf(stderr, "%s\n", error.what());
+      return 1;
+    }
+  }
   if (mode == "image" && argc >= 10 && (argc - 6) % 4 == 0) {
     const cv::Mat rgb = cv::imread(argv[2]), depth = cv::imread(argv[3], cv::IMREAD_UNCHANGED);
     if (rgb.empty() || depth.type() != CV_16U || depth.size() != rgb.size()) {
