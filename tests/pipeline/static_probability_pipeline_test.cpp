@@ -150,6 +150,44 @@ TEST_CASE("Boxes of classes that cannot move are ignored", "[pipeline]") {
   CHECK(host.frame(make_dynamic_scene<double>({}, 36)).boxes.empty());
 }
 
+TEST_CASE("An observer is told every step in order, with what is known by then", "[pipeline]") {
+  using cfp::PipelineStep;
+  const DynamicScene<double> scene = make_dynamic_scene<double>({}, 38);
+  cfp::StaticProbabilityPipeline<double> pipeline;
+  cfp::FrameInput<double> frame;
+  frame.keypoints = scene.previous_keypoints;
+  frame.depths_m = scene.previous_depths;
+  std::vector<PipelineStep> steps;
+  std::vector<double> k_first;
+  const auto solve = [&](Stage, cfp::span<const double>) { return cfp::PoseEstimate{scene.T_cur_prev, 300, true}; };
+  const auto observe = [&](PipelineStep step, const cfp::FrameResult<double>& known) {
+    steps.push_back(step);
+    CHECK(known.static_probability.size() == frame.keypoints.size());
+    CHECK(known.objects.size() == known.boxes.size());
+    if (step == PipelineStep::first_keypoints) k_first.assign(known.static_probability.begin(), known.static_probability.end());
+  };
+  pipeline.process(frame, scene.camera, solve, observe);
+  CHECK(steps == std::vector<PipelineStep>{PipelineStep::boxes, PipelineStep::objects, PipelineStep::first_keypoints, PipelineStep::first_pose});
+
+  std::vector<cfp::Detection<double>> detections;
+  for (const auto& box : scene.boxes) detections.push_back({box, 0, 0.8});
+  frame.timestamp_s = 1.0 / 30;
+  frame.keypoints = scene.keypoints;
+  frame.depths_m = scene.depths;
+  frame.match = scene.match;
+  frame.detections = detections;
+  steps.clear();
+  const auto result = pipeline.process(frame, scene.camera, solve, observe);
+  CHECK(steps == std::vector<PipelineStep>{PipelineStep::boxes, PipelineStep::objects, PipelineStep::first_keypoints, PipelineStep::first_pose,
+                                           PipelineStep::second_keypoints, PipelineStep::second_pose});
+  std::size_t changed = 0;
+  for (std::size_t i = 0; i < k_first.size(); ++i) {
+    if (result.label[i] == KeypointLabel::outside) CHECK(k_first[i] == 1);
+    if (k_first[i] != result.static_probability[i]) ++changed;
+  }
+  CHECK(changed > 0);  // what the observer saw was the first stage's
+}
+
 TEST_CASE("A time stamp that does not grow is reported", "[pipeline]") {
   Host host;
   host.frame(make_dynamic_scene<double>({}, 37));

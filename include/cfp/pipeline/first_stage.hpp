@@ -64,8 +64,8 @@ namespace detail {
 
 /// O of every box from the flow pairs whose current point lies in it.
 template <typename Scalar, typename Camera>
-void object_probabilities(const FirstStageInput<Scalar>& in, const Camera& camera, span<ObjectProbability> objects, const FirstStageOptions& options,
-                          FirstStageWorkspace<Scalar>& work, FirstStageResult& result) {
+void estimate_objects(const FirstStageInput<Scalar>& in, const Camera& camera, span<ObjectProbability> objects, const FirstStageOptions& options,
+                      FirstStageWorkspace<Scalar>& work, FirstStageResult& result) {
   for (ObjectProbability& object : objects) object = {options.object.unknown_object_probability, 0, Status::not_enough_data};
   result.unknown_objects = objects.size();
   const std::size_t n = in.flow_current.size();
@@ -114,22 +114,27 @@ bool separate_foreground(const FirstStageInput<Scalar>& in, const ObjectBox<Scal
 
 }  // namespace detail
 
-/// K of every keypoint after the first stage. For each box: O from the flow pairs inside it (object_probability), foreground
-/// and background from the depths inside it (depth_foreground), then first_stage_probability. A keypoint in several boxes
-/// takes the smallest of their K, and that box rules it from then on (ties: foreground before background, then the lower
-/// index). Keypoints outside all boxes: K = 1. The sizes of the arrays must agree. Data of any kind gives K in [0, 1]; the
-/// result says what could not be used. O(keypoints x boxes); after warm-up allocates nothing.
+/// The first half of first_stage: O of every box, one element of `objects` each, from the flow pairs whose current point lies in
+/// it. The result says what the pairs were judged by. After warm-up allocates nothing.
 template <typename Scalar, typename Camera>
-FirstStageResult first_stage(const FirstStageInput<Scalar>& in, const Camera& camera, const FirstStageOutput<Scalar>& out,
-                             const FirstStageOptions& options, FirstStageWorkspace<Scalar>& work) {
+FirstStageResult first_stage_objects(const FirstStageInput<Scalar>& in, const Camera& camera, span<ObjectProbability> objects,
+                                     const FirstStageOptions& options, FirstStageWorkspace<Scalar>& work) {
+  CFP_ASSERT(in.flow_previous.size() == in.flow_current.size());
+  CFP_ASSERT(objects.size() == in.boxes.size());
+  FirstStageResult result;
+  detail::estimate_objects(in, camera, objects, options, work, result);
+  return result;
+}
+
+/// The second half of first_stage: K and label of every keypoint from the O in out.objects and the depths. Adds its counts to
+/// the result of the first half. After warm-up allocates nothing.
+template <typename Scalar>
+void first_stage_keypoints(const FirstStageInput<Scalar>& in, const FirstStageOutput<Scalar>& out, const FirstStageOptions& options,
+                           FirstStageWorkspace<Scalar>& work, FirstStageResult& result) {
   const std::size_t n = in.keypoints.size();
   CFP_ASSERT(in.depths_m.empty() || in.depths_m.size() == n);
-  CFP_ASSERT(in.flow_previous.size() == in.flow_current.size());
   CFP_ASSERT(out.static_probability.size() == n && out.label.size() == n && out.ruling_box.size() == n);
   CFP_ASSERT(out.objects.size() == in.boxes.size());
-  FirstStageResult result;
-  detail::object_probabilities(in, camera, out.objects, options, work, result);
-
   for (std::size_t i = 0; i < n; ++i) {
     const bool valid = is_finite(in.keypoints(i, 0)) && is_finite(in.keypoints(i, 1));
     out.static_probability[i] = valid ? Scalar(1) : Scalar(0);
@@ -167,6 +172,18 @@ FirstStageResult first_stage(const FirstStageInput<Scalar>& in, const Camera& ca
     result.background += label == KeypointLabel::background ? 1U : 0U;
     result.invalid += label == KeypointLabel::invalid ? 1U : 0U;
   }
+}
+
+/// K of every keypoint after the first stage. For each box: O from the flow pairs inside it (object_probability), foreground
+/// and background from the depths inside it (depth_foreground), then first_stage_probability. A keypoint in several boxes
+/// takes the smallest of their K, and that box rules it from then on (ties: foreground before background, then the lower
+/// index). Keypoints outside all boxes: K = 1. The sizes of the arrays must agree. Data of any kind gives K in [0, 1]; the
+/// result says what could not be used. O(keypoints x boxes); after warm-up allocates nothing.
+template <typename Scalar, typename Camera>
+FirstStageResult first_stage(const FirstStageInput<Scalar>& in, const Camera& camera, const FirstStageOutput<Scalar>& out,
+                             const FirstStageOptions& options, FirstStageWorkspace<Scalar>& work) {
+  FirstStageResult result = first_stage_objects(in, camera, out.objects, options, work);
+  first_stage_keypoints(in, out, options, work, result);
   return result;
 }
 

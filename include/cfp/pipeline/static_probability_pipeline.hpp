@@ -21,6 +21,22 @@ namespace cfp {
 
 enum class Stage : std::uint8_t { first, second };
 
+/// The parts of a frame, in their order. An observer is told at the end of each.
+enum class PipelineStep : std::uint8_t {
+  boxes,             ///< missed-detection compensation and association
+  objects,           ///< O from the optical flow
+  first_keypoints,   ///< depth clustering, K of the first stage
+  first_pose,        ///< the host's solver
+  second_keypoints,  ///< K of the second stage, M, weights; not for frames without a first pose or without matches
+  second_pose        ///< the host's solver
+};
+
+/// The observer that observes nothing.
+struct NoObserver {
+  template <typename Result>
+  void operator()(PipelineStep, const Result&) const noexcept {}
+};
+
 /// What the host's pose solver answers.
 struct PoseEstimate {
   SE3<double> T_cur_prev;    ///< maps points of camera k-1 into camera k
@@ -74,16 +90,28 @@ class StaticProbabilityPipeline {
   /// solve_pose(Stage, span<const Scalar> weight) -> PoseEstimate: the host's optimiser over its own observations, weight[i]
   /// being that of keypoint i (MODEL: outside the robust loss; 0: leave out). Called once for the first stage and, when that
   /// gave a pose and there are matches, once more for the second.
-  template <typename Camera, typename PoseSolver>
-  FrameResult<Scalar> process(const FrameInput<Scalar>& frame, const Camera& camera, PoseSolver&& solve_pose) {
+  /// observe(PipelineStep, const FrameResult<Scalar>&): called after every step with what is known by then; for clocks and
+  /// recordings, as this library has neither.
+  template <typename Camera, typename PoseSolver, typename Observer = NoObserver>
+  FrameResult<Scalar> process(const FrameInput<Scalar>& frame, const Camera& camera, PoseSolver&& solve_pose, Observer&& observe = Observer{}) {
     const std::size_t n = frame.keypoints.size();
     CFP_ASSERT(frame.match.empty() || frame.match.size() == n);
     CFP_ASSERT(frame.map_point_probability.empty() || frame.map_point_probability.size() == n);
     resize(n);
     FrameResult<Scalar> result;
     track_boxes(frame, result);
+    result.static_probability = k_;
+    result.weight = weight_;
+    result.label = label_;
+    result.ruling_box = ruling_box_;
+    result.boxes = boxes_;
+    result.objects = objects_;
+    observe(PipelineStep::boxes, result);
     const FirstStageInput<Scalar> first{frame.keypoints, frame.depths_m, objects_in_view_, frame.flow_previous, frame.flow_current, frame.fundamental};
-    result.first = first_stage(first, camera, {k_, label_, ruling_box_, objects_}, options_.first, first_work_);
+    result.first = first_stage_objects(first, camera, span<ObjectProbability>(objects_), options_.first, first_work_);
+    observe(PipelineStep::objects, result);
+    first_stage_keypoints(first, {k_, label_, ruling_box_, objects_}, options_.first, first_work_, result.first);
+    observe(PipelineStep::first_keypoints, result);
 
     span<Scalar> m = frame.map_point_probability;
     if (m.empty()) {
@@ -92,18 +120,15 @@ class StaticProbabilityPipeline {
     }
     for (std::size_t i = 0; i < n; ++i) weight_[i] = observation_weight(k_[i], m[i] >= Scalar(0) ? m[i] : Scalar(1), options_.second.map_point.weight);
     solve(Stage::first, m, solve_pose, result);
+    observe(PipelineStep::first_pose, result);
     if (result.pose.valid && has_previous_ && !frame.match.empty()) {
       const SecondStageInput<Scalar> second{frame.keypoints, label_, ruling_box_, objects_in_view_, objects_, previous_keypoints_, previous_depths_, frame.match, result.pose.T_cur_prev, result.pose.inliers};
       result.second = second_stage(second, camera, {k_, m, weight_}, options_.second, second_work_);
+      observe(PipelineStep::second_keypoints, result);
       solve(Stage::second, m, solve_pose, result);
+      observe(PipelineStep::second_pose, result);
     }
     remember(frame);
-    result.static_probability = k_;
-    result.weight = weight_;
-    result.label = label_;
-    result.ruling_box = ruling_box_;
-    result.boxes = boxes_;
-    result.objects = objects_;
     return result;
   }
 
@@ -117,10 +142,10 @@ class StaticProbabilityPipeline {
 
  private:
   void resize(std::size_t n) {
-    k_.resize(n);
-    label_.resize(n);
-    ruling_box_.resize(n);
-    weight_.resize(n);
+    k_.assign(n, Scalar(1));
+    label_.assign(n, KeypointLabel::outside);
+    ruling_box_.assign(n, no_box);
+    weight_.assign(n, Scalar(1));
   }
 
   /// The boxes of this frame, of the classes that can move.

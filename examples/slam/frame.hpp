@@ -1,0 +1,92 @@
+// One RGB-D frame as the loop sees it, and the search for its keypoints near a pixel.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "cfp/geometry/camera.hpp"
+#include "cfp/math/se3.hpp"
+
+namespace cfp_slam {
+
+using Descriptor = std::array<std::uint64_t, 4>;
+inline constexpr int no_point = -1;
+
+inline Descriptor descriptor_row(const cv::Mat& descriptors, std::size_t row) {
+  Descriptor d;
+  std::memcpy(d.data(), descriptors.ptr(static_cast<int>(row)), sizeof d);
+  return d;
+}
+
+// Keypoint i of frame k: pixel in the image, pixel without distortion, depth, map point.
+struct Frame {
+  double time_s = 0;
+  std::vector<cv::KeyPoint> keypoints;
+  std::vector<Descriptor> descriptors;
+  std::vector<std::array<float, 2>> pixels;  // undistorted
+  std::vector<float> depths_m;               // -1: none
+  std::vector<float> static_probability;     // K after the last stage
+  std::vector<float> map_point_probability;  // M of the point seen, whether it is in the map or known from the last frame only
+  std::vector<int> map_point;                // index into the map, or no_point
+  cfp::SE3<double> T_cam_world;
+  bool has_pose = false;
+
+  [[nodiscard]] std::size_t size() const { return keypoints.size(); }
+  // The point that keypoint i sees by its depth, in the camera's frame. Precondition: it has one.
+  [[nodiscard]] cfp::Vector3<double> back_project(std::size_t i, const cfp::PinholeCamera<float>& camera) const {
+    const double z = static_cast<double>(depths_m[i]);
+    return {z * static_cast<double>((pixels[i][0] - camera.cx) / camera.fx), z * static_cast<double>((pixels[i][1] - camera.cy) / camera.fy), z};
+  }
+};
+
+// The keypoints of a frame by image cell.
+class KeypointGrid {
+ public:
+  void build(const Frame& frame, int width, int height) {
+    columns_ = width / cell + 1;
+    rows_ = height / cell + 1;
+    start_.assign(static_cast<std::size_t>(columns_ * rows_) + 1, 0);
+    items_.resize(frame.size());
+    for (const auto& p : frame.pixels) ++start_[cell_of(p) + 1];
+    for (std::size_t c = 1; c < start_.size(); ++c) start_[c] += start_[c - 1];
+    fill_ = start_;
+    for (std::size_t i = 0; i < frame.size(); ++i) items_[fill_[cell_of(frame.pixels[i])]++] = static_cast<int>(i);
+    pixels_ = &frame.pixels;
+  }
+
+  // visit(index) for every keypoint within `radius` pixels along both axes.
+  template <typename Visit>
+  void near(float x, float y, float radius, const Visit& visit) const {
+    const int c0 = std::max(0, static_cast<int>((x - radius) / float(cell))), c1 = std::min(columns_ - 1, static_cast<int>((x + radius) / float(cell)));
+    const int r0 = std::max(0, static_cast<int>((y - radius) / float(cell))), r1 = std::min(rows_ - 1, static_cast<int>((y + radius) / float(cell)));
+    for (int r = r0; r <= r1; ++r) {
+      const std::size_t row = static_cast<std::size_t>(r * columns_);
+      for (std::size_t k = c0 <= c1 ? start_[row + static_cast<std::size_t>(c0)] : 0, end = c0 <= c1 ? start_[row + static_cast<std::size_t>(c1) + 1] : 0; k < end; ++k) {
+        const auto& p = (*pixels_)[static_cast<std::size_t>(items_[k])];
+        if (std::abs(p[0] - x) <= radius && std::abs(p[1] - y) <= radius) visit(static_cast<std::size_t>(items_[k]));
+      }
+    }
+  }
+
+ private:
+  static constexpr int cell = 20;
+  // Undistorted pixels may lie outside the image; they belong to the border's cells.
+  [[nodiscard]] std::size_t cell_of(const std::array<float, 2>& p) const {
+    const int c = std::clamp(static_cast<int>(p[0] / float(cell)), 0, columns_ - 1), r = std::clamp(static_cast<int>(p[1] / float(cell)), 0, rows_ - 1);
+    return static_cast<std::size_t>(r * columns_ + c);
+  }
+
+  int columns_ = 0, rows_ = 0;
+  std::vector<std::size_t> start_, fill_;
+  std::vector<int> items_;
+  const std::vector<std::array<float, 2>>* pixels_ = nullptr;
+};
+
+}  // namespace cfp_slam
