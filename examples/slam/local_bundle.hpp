@@ -1,0 +1,124 @@
+// Local bundle adjustment beside the tracking: the newest keyframe, its covisible neighbours and their points are copied out,
+// adjusted on another thread, and put back a fixed number of frames later. Since the frame of the hand-over does not depend
+// on how long the solver takes, the same images give the same poses however many threads there are.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <future>
+#include <unordered_map>
+#include <vector>
+
+#include "cfp/optimization/weighted_ba.hpp"
+#include "map.hpp"
+
+namespace cfp_slam {
+
+struct LocalBundleOptions {
+  std::size_t free_keyframes = 10;   // adjusted, the newest among them
+  std::size_t fixed_keyframes = 10;  // see the same points and hold the gauge
+  int max_iterations = 10;
+  double baseline_fx = 40;
+};
+
+class LocalBundle {
+ public:
+  // Copies the problem around keyframe `newest` out of the map.
+  LocalBundle(const Map& map, int newest, const cfp::PinholeCamera<float>& camera, const std::vector<float>& sigmas, const LocalBundleOptions& options)
+      : options_(options), camera_{camera.fx, camera.fy, camera.cx, camera.cy} {
+    choose_keyframes(map, newest);
+    for (std::size_t k = 0; k < keyframes_.size(); ++k) {
+      const Frame& frame = map.keyframe(keyframes_[k]).frame;
+      poses_.push_back(frame.T_cam_world);
+      for (std::size_t i = 0; i < frame.size(); ++i) {
+        const auto known = point_slot_.find(frame.map_point[i]);
+        if (known != point_slot_.end()) add_observation(map, frame, i, static_cast<int>(k), known->second, sigmas);
+      }
+    }
+  }
+
+  void solve() {
+    const auto start = std::chrono::steady_clock::now();
+    cfp::BaProblem<cfp::PinholeCamera<double>, float> problem;
+    problem.poses = poses_;
+    problem.points = positions_;
+    problem.cameras = {&camera_, 1};
+    problem.observations = {pose_index_, point_index_, pixels_, u_right_, sigma_, weight_};
+    problem.fixed_poses = fixed_;
+    problem.baseline_fx = options_.baseline_fx;
+    cfp::WeightedBaOptions options;
+    options.levenberg_marquardt.max_iterations = options_.max_iterations;
+    squared_errors_.resize(pose_index_.size());
+    cfp::WeightedBaWorkspace workspace;
+    result_ = cfp::adjust_bundle(problem, options, workspace, cfp::SingleThread{}, cfp::span<double>(squared_errors_));
+    milliseconds_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  }
+
+  // Writes poses and points back and forgets the observations that do not fit. What has gone from the map meanwhile stays away.
+  void apply(Map& map) const {
+    for (std::size_t k = 0; k < keyframes_.size(); ++k) {
+      if (fixed_[k] == 0) map.keyframe(keyframes_[k]).frame.T_cam_world = poses_[k];
+    }
+    for (std::size_t p = 0; p < points_.size(); ++p) {
+      if (map.is_alive(points_[p])) map.point(points_[p]).position = positions_[p];
+    }
+    for (std::size_t o = 0; o < squared_errors_.size(); ++o) {
+      const double limit = u_right_[o] > 0 ? 7.815 : 5.991;
+      const int point = points_[static_cast<std::size_t>(point_index_[o])];
+      if (map.is_alive(point) && !(squared_errors_[o] >= 0 && squared_errors_[o] <= limit)) map.erase_observation(point, keyframes_[static_cast<std::size_t>(pose_index_[o])]);
+    }
+  }
+
+  [[nodiscard]] double milliseconds() const { return milliseconds_; }
+  [[nodiscard]] const cfp::WeightedBaResult& result() const { return result_; }
+
+ private:
+  // Free: the newest keyframe and its neighbours, but never the first of all, which is the world's origin. Fixed: others that see their points.
+  void choose_keyframes(const Map& map, int newest) {
+    keyframes_ = {newest};
+    for (const int k : map.keyframe(newest).neighbours) {
+      if (keyframes_.size() < options_.free_keyframes && k != newest) keyframes_.push_back(k);
+    }
+    const std::size_t free = keyframes_.size();
+    for (std::size_t k = 0; k < free; ++k) {
+      for (const int point : map.keyframe(keyframes_[k]).frame.map_point) {
+        if (!map.is_alive(point) || !point_slot_.try_emplace(point, static_cast<int>(points_.size())).second) continue;
+        points_.push_back(point);
+        positions_.push_back(map.point(point).position);
+      }
+    }
+    for (const int k : map.covisible(points_, 10)) {
+      if (keyframes_.size() >= free + options_.fixed_keyframes) break;
+      if (std::find(keyframes_.begin(), keyframes_.end(), k) == keyframes_.end()) keyframes_.push_back(k);
+    }
+    fixed_.assign(keyframes_.size(), char(1));
+    for (std::size_t k = 0; k < free; ++k) fixed_[k] = keyframes_[k] == 0 ? char(1) : char(0);
+  }
+
+  void add_observation(const Map& map, const Frame& frame, std::size_t i, int pose, int point, const std::vector<float>& sigmas) {
+    pose_index_.push_back(pose);
+    point_index_.push_back(point);
+    pixels_.push_back(frame.pixels[i]);
+    const float z = frame.depths_m[i];
+    u_right_.push_back(z > 0 ? frame.pixels[i][0] - static_cast<float>(options_.baseline_fx) / z : -1.0F);
+    sigma_.push_back(sigmas[static_cast<std::size_t>(frame.keypoints[i].octave)]);
+    weight_.push_back(frame.static_probability[i] * map.point(frame.map_point[i]).static_probability);
+  }
+
+  LocalBundleOptions options_;
+  cfp::PinholeCamera<double> camera_;
+  std::vector<int> keyframes_, points_;  // indices into the map
+  std::vector<char> fixed_;
+  std::unordered_map<int, int> point_slot_;
+  std::vector<cfp::SE3<double>> poses_;
+  std::vector<cfp::Vector3<double>> positions_;
+  std::vector<int> pose_index_, point_index_;
+  std::vector<std::array<float, 2>> pixels_;
+  std::vector<float> u_right_, sigma_, weight_;
+  std::vector<double> squared_errors_;
+  cfp::WeightedBaResult result_;
+  double milliseconds_ = 0;
+};
+
+}  // namespace cfp_slam

@@ -1,0 +1,113 @@
+// Where known points appear in a frame: search around their projection for the keypoint with the nearest descriptor.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include "map.hpp"
+
+namespace cfp_slam {
+
+// ORB-SLAM2's limits on the Hamming distance of 256 bits.
+inline constexpr int far_descriptor = 100, near_descriptor = 50;
+
+// A point expected at a pixel.
+struct Expected {
+  float x = 0, y = 0;
+  int level = 0;  // of the pyramid
+  float radius = 0;
+  const Descriptor* descriptor = nullptr;
+  float angle = -1;  // of the keypoint it was seen as, degrees; < 0: unknown
+  int index = 0;     // the caller's name for it
+};
+
+struct Match {
+  std::size_t keypoint = 0;
+  int index = no_point;  // Expected::index
+  int distance = 0;
+  float turn = 0;  // degrees between the two keypoints' orientations; only between known ones
+};
+
+// The nearest keypoint of each expected point among those for which `free(keypoint)`. One to one: a keypoint goes to the point
+// with the smaller distance. `ratio` below 1 asks that the second nearest on the same level be farther by that factor.
+template <typename Free>
+void match_expected(const Frame& frame, const KeypointGrid& grid, const std::vector<Expected>& expected, int max_distance, float ratio, const Free& free,
+                    std::vector<Match>& matches) {
+  std::vector<int> taken(frame.size(), -1);  // index into matches
+  matches.clear();
+  for (const Expected& e : expected) {
+    int best = max_distance + 1, second = max_distance + 1, best_level = -1, second_level = -1;
+    std::size_t keypoint = 0;
+    grid.near(e.x, e.y, e.radius, [&](std::size_t i) {
+      const int level = frame.keypoints[i].octave;
+      if (level < e.level - 1 || level > e.level + 1 || !free(i)) return;
+      const int distance = hamming(*e.descriptor, frame.descriptors[i]);
+      if (distance < best) {
+        second = best;
+        second_level = best_level;
+        best = distance;
+        best_level = level;
+        keypoint = i;
+      } else if (distance < second) {
+        second = distance;
+        second_level = level;
+      }
+    });
+    if (best > max_distance) continue;
+    if (best_level == second_level && float(best) > ratio * float(second)) continue;
+    const float turn = e.angle < 0 ? 0.0F : std::fmod(e.angle - frame.keypoints[keypoint].angle + 720.0F, 360.0F);
+    const Match match{keypoint, e.index, best, turn};
+    if (taken[keypoint] < 0) {
+      taken[keypoint] = static_cast<int>(matches.size());
+      matches.push_back(match);
+    } else if (Match& other = matches[static_cast<std::size_t>(taken[keypoint])]; best < other.distance) {
+      other = match;
+    }
+  }
+}
+
+// Keeps the matches whose orientation turned as most did: the three fullest of thirty bins, as ORB-SLAM2 does.
+inline void keep_common_turn(std::vector<Match>& matches) {
+  constexpr std::size_t bins = 30;
+  std::array<int, bins> count{};
+  const auto bin = [](const Match& m) { return static_cast<std::size_t>(std::lround(m.turn * float(bins) / 360.0F)) % bins; };
+  for (const Match& m : matches) ++count[bin(m)];
+  std::array<int, bins> sorted = count;
+  std::sort(sorted.begin(), sorted.end(), std::greater<>());
+  const int least = std::max({sorted[2], sorted[0] / 10, 1});
+  matches.erase(std::remove_if(matches.begin(), matches.end(), [&](const Match& m) { return count[bin(m)] < least; }), matches.end());
+}
+
+// Mutual nearest descriptors with a ratio test, without any idea where the points may be: for relocalisation.
+inline void match_descriptors(const Frame& frame, const Map& map, const std::vector<int>& candidates, int max_distance, float ratio, std::vector<Match>& matches) {
+  struct Nearest {
+    int distance = std::numeric_limits<int>::max(), index = no_point;
+  };
+  std::vector<Nearest> of_point(candidates.size());
+  matches.clear();
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    int best = max_distance + 1, second = max_distance + 1;
+    std::size_t nearest = 0;
+    for (std::size_t c = 0; c < candidates.size(); ++c) {
+      const int distance = hamming(map.point(candidates[c]).descriptor, frame.descriptors[i]);
+      if (distance < of_point[c].distance) of_point[c] = {distance, static_cast<int>(i)};
+      if (distance < best) {
+        second = best;
+        best = distance;
+        nearest = c;
+      } else if (distance < second) {
+        second = distance;
+      }
+    }
+    if (best <= max_distance && float(best) <= ratio * float(second)) matches.push_back({i, static_cast<int>(nearest), best, 0});
+  }
+  matches.erase(std::remove_if(matches.begin(), matches.end(), [&](const Match& m) { return of_point[static_cast<std::size_t>(m.index)].index != static_cast<int>(m.keypoint); }),
+                matches.end());
+  for (Match& m : matches) m.index = candidates[static_cast<std::size_t>(m.index)];
+}
+
+}  // namespace cfp_slam

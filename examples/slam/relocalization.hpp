@@ -1,0 +1,79 @@
+// A pose for a frame that the motion model lost: descriptors against the map, then P3P RANSAC whose samples follow the static probabilities.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "cfp/core/span.hpp"
+#include "cfp/optimization/pnp_ransac.hpp"
+#include "matching.hpp"
+
+namespace cfp_slam {
+
+class Relocalization {
+ public:
+  explicit Relocalization(std::uint64_t seed) { options_.seed = seed; }
+
+  // On success the pose, and the frame's map points set to the consensus; false: frame untouched. weight: of the keypoints.
+  bool operator()(Frame& frame, const Map& map, const std::vector<int>& local_points, cfp::span<const float> weight, const cfp::PinholeCamera<float>& camera) {
+    if (try_points(frame, map, local_points, weight, camera)) return true;
+    // Then keyframe by keyframe, the newest first, a few in each lost frame, so that a lost frame costs no more than a bounded time.
+    for (int tries = 0; tries < 8 && !map.keyframes.empty(); ++tries) {
+      const std::size_t back = next_++ % map.keyframes.size();
+      candidates_.clear();
+      for (const int p : map.keyframes[map.keyframes.size() - 1 - back].frame.map_point) {
+        if (map.is_alive(p)) candidates_.push_back(p);
+      }
+      if (try_points(frame, map, candidates_, weight, camera)) {
+        next_ = 0;
+        return true;
+      }
+    }
+    return false;
+  }
+
+ private:
+  static constexpr std::size_t min_inliers = 15;
+
+  bool try_points(Frame& frame, const Map& map, const std::vector<int>& points, cfp::span<const float> weight, const cfp::PinholeCamera<float>& camera) {
+    match_descriptors(frame, map, points, near_descriptor, 0.8F, matches_);
+    if (matches_.size() < min_inliers) return false;
+    world_.clear();
+    pixels_.clear();
+    weights_.clear();
+    for (const Match& m : matches_) {
+      const MapPoint& point = map.point(m.index);
+      world_.push_back({static_cast<float>(point.position.x()), static_cast<float>(point.position.y()), static_cast<float>(point.position.z())});
+      pixels_.push_back(frame.pixels[m.keypoint]);
+      weights_.push_back(weight[m.keypoint] * point.static_probability);
+    }
+    inlier_.resize(matches_.size());
+    options_.min_inliers = min_inliers;
+    const auto found = cfp::pnp_ransac<cfp::PinholeCamera<float>, float>(camera, world_, pixels_, weights_, cfp::span<char>(inlier_), options_, workspace_);
+    if (!found.has_pose()) return false;
+    frame.T_cam_world = found.T_cam_world.cast<double>();
+    frame.has_pose = true;
+    std::fill(frame.map_point.begin(), frame.map_point.end(), no_point);
+    for (std::size_t m = 0; m < matches_.size(); ++m) {
+      if (inlier_[m] == 0) continue;
+      frame.map_point[matches_[m].keypoint] = matches_[m].index;
+      frame.map_point_probability[matches_[m].keypoint] = map.point(matches_[m].index).static_probability;
+    }
+    return true;
+  }
+
+  cfp::PnpRansacOptions options_;
+  cfp::PnpRansacWorkspace workspace_;
+  std::vector<Match> matches_;
+  std::vector<int> candidates_;
+  std::vector<std::array<float, 3>> world_;
+  std::vector<std::array<float, 2>> pixels_;
+  std::vector<float> weights_;
+  std::vector<char> inlier_;
+  std::size_t next_ = 0;
+};
+
+}  // namespace cfp_slam
