@@ -1,0 +1,177 @@
+// The report on the static probabilities: what they were, and where labels tell the truth, whether they were right.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "cfp/core/span.hpp"
+#include "cfp/evaluation/calibration.hpp"
+#include "html.hpp"
+#include "record.hpp"
+#include "series.hpp"
+#include "summary.hpp"
+#include "svg.hpp"
+
+namespace cfp_slam {
+
+inline constexpr std::size_t histogram_bins = std::tuple_size_v<decltype(FrameRecord::keypoint_histogram)>;
+
+inline std::array<double, histogram_bins> histogram_of(const RunRecord& run) {
+  std::array<double, histogram_bins> sum{};
+  for (const FrameRecord& frame : run.frames) {
+    for (std::size_t b = 0; b < histogram_bins; ++b) sum[b] += static_cast<double>(frame.keypoint_histogram[b]);
+  }
+  return sum;
+}
+
+// Share of the in-box keypoints per tenth of K, all variants in one plot.
+inline std::string histogram_plot(const std::vector<Series>& all) {
+  Range share;
+  share.add(0);
+  std::vector<std::array<double, histogram_bins>> shares;
+  for (const Series& s : all) {
+    auto h = histogram_of(*s.run);
+    double total = 0;
+    for (const double n : h) total += n;
+    for (double& n : h) {
+      n = total > 0 ? n / total : not_known;
+      share.add(n);
+    }
+    shares.push_back(h);
+  }
+  if (!(share.high > 0)) return {};
+  Range unit;
+  unit.add(0);
+  unit.add(1);
+  share.add(share.high * 1.05);
+  Plot plot("K of the keypoints inside boxes", linear_axis(unit, "K, 1 = static"), linear_axis(share, "share of the keypoints"));
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    std::vector<double> x, y;
+    for (std::size_t b = 0; b < histogram_bins; ++b) {
+      for (const std::size_t edge : {b, b + 1}) {
+        x.push_back(static_cast<double>(edge) / histogram_bins);
+        y.push_back(shares[k][b]);
+      }
+    }
+    plot.curve(x, y, all[k].css("curve"));
+  }
+  return figure("K of the keypoints inside boxes, whole sequence", plot.svg());
+}
+
+// One column per stretch of time, one cell per tenth of K, the darker the more keypoints.
+inline std::string histogram_over_time(const Series& series, double start_s, double end_s) {
+  constexpr std::size_t most_columns = 140;
+  const auto& frames = series.run->frames;
+  const std::size_t columns = (std::min)(most_columns, frames.size());
+  if (columns == 0 || !(end_s > start_s)) return {};
+  std::vector<std::array<double, histogram_bins>> cells(columns);
+  double total = 0;
+  for (const FrameRecord& frame : frames) {
+    const double place = (frame.time_s - start_s) / (end_s - start_s);
+    if (!(place >= 0 && place <= 1)) continue;
+    const std::size_t column = (std::min)(static_cast<std::size_t>(place * static_cast<double>(columns)), columns - 1);
+    for (std::size_t b = 0; b < histogram_bins; ++b) {
+      cells[column][b] += static_cast<double>(frame.keypoint_histogram[b]);
+      total += static_cast<double>(frame.keypoint_histogram[b]);
+    }
+  }
+  if (!(total > 0)) return {};
+  Range time, unit;
+  time.add(0);
+  time.add(end_s - start_s);
+  unit.add(0);
+  unit.add(1);
+  Plot plot("K over time, " + series.name, linear_axis(time, "time [s]"), linear_axis(unit, "K, 1 = static"), 480, 200);
+  const double step = (end_s - start_s) / static_cast<double>(columns);
+  for (std::size_t c = 0; c < columns; ++c) {
+    double sum = 0;
+    for (const double n : cells[c]) sum += n;
+    for (std::size_t b = 0; b < histogram_bins && sum > 0; ++b) {
+      // The square root keeps small shares visible.
+      const double opacity = std::sqrt(cells[c][b] / sum);
+      if (opacity < 0.03) continue;
+      plot.rectangle(step * static_cast<double>(c), static_cast<double>(b) / histogram_bins, step * static_cast<double>(c + 1),
+                     static_cast<double>(b + 1) / histogram_bins, series.css("bar"), opacity);
+    }
+  }
+  return figure("K inside boxes over time: " + series.name, plot.svg(), {}, "s" + number(series.style));
+}
+
+inline std::string objects_over_time(const Series& series, double start_s, double end_s) {
+  Range time, unit;
+  time.add(0);
+  time.add(end_s - start_s);
+  unit.add(0);
+  unit.add(1);
+  Plot plot("O of the boxes over time, " + series.name, linear_axis(time, "time [s]"), linear_axis(unit, "O, 1 = static"), 480, 200);
+  bool any = false;
+  for (const FrameRecord& frame : series.run->frames) {
+    for (const BoxRecord& box : frame.boxes) {
+      if (!box.object_known) continue;
+      any = true;
+      plot.dot(frame.time_s - start_s, box.object_probability, 2.2, series.css(box.compensated ? "ring" : "dot"));
+    }
+  }
+  if (!any) return {};
+  return figure("O of the boxes over time: " + series.name, plot.svg(), "Filled: detected boxes; rings: compensated ones. Boxes without an O are left out.",
+                "s" + number(series.style));
+}
+
+// Reliability: a number that means what it says lies on the diagonal.
+inline std::string reliability_plot(const Series& series) {
+  Range unit;
+  unit.add(0);
+  unit.add(1);
+  Plot plot("Reliability, " + series.name, linear_axis(unit, "static probability"), linear_axis(unit, "share that is static"), 480, 380);
+  plot.curve({0, 1}, {0, 1}, "guide");
+  std::string rows, key;
+  const auto samples = labelled(*series.run);
+  constexpr std::array<std::size_t, 4> styles{3, 1, 2, 4};
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const CalibrationSummary c = summarize(*samples[k]);
+    if (c.samples == 0) continue;
+    cfp::CalibrationWorkspace workspace;
+    const auto result = cfp::evaluate_calibration(cfp::span<const float>(samples[k]->probability), cfp::span<const char>(samples[k]->is_static),
+                                                  cfp::span<const float>(), workspace);
+    const std::string colour = "c" + number(styles[k]);
+    std::vector<double> x, y;
+    for (const cfp::ReliabilityBin& bin : result.table) {
+      if (bin.count == 0) continue;
+      x.push_back(bin.mean_probability);
+      y.push_back(bin.static_fraction);
+    }
+    plot.curve(x, y, "curve " + colour);
+    for (const cfp::ReliabilityBin& bin : result.table) {
+      if (bin.count == 0) continue;
+      const double share = static_cast<double>(bin.count) / static_cast<double>(result.used);
+      plot.dot(bin.mean_probability, bin.static_fraction, 2 + 6 * std::sqrt(share), "dot " + colour,
+               std::string(probability_names[k]) + ": " + number(bin.count) + " samples, mean " + number(bin.mean_probability, 3) + ", static " +
+                   number(bin.static_fraction, 3));
+    }
+    key += "<span><svg viewBox=\"0 0 26 10\"><path class=\"curve " + colour + "\" d=\"M1 5H25\"/></svg>" + probability_names[k] + "</span>";
+    rows += std::string("<tr><th scope=\"row\">") + probability_names[k] + "</th><td>" + number(c.auc, 4) + "</td><td>" + number(c.brier, 4) +
+            "</td><td>" + number(c.ece, 4) + "</td><td>" + number(100 * c.static_fraction, 1) + " %</td><td>" + number(c.samples) + "</td></tr>\n";
+  }
+  if (rows.empty()) return {};
+  return figure("Reliability: " + series.name,
+                "<div class=\"legend\">" + key + "</div>" + plot.svg() +
+                    "<div class=\"scroll\"><table><thead><tr><th></th><th>AUC</th><th>Brier</th><th>ECE</th><th>static</th><th>samples</th></tr>"
+                    "</thead><tbody>\n" + rows + "</tbody></table></div>",
+                "The area of a dot grows with the share of the samples in its tenth. AUC 1, Brier 0, ECE 0 are best.", "s" + number(series.style));
+}
+
+inline std::string probability_section(const std::vector<Series>& all) {
+  const double start = start_of(all), end = end_of(all);
+  std::string figures = histogram_plot(all);
+  for (const Series& s : all) figures += reliability_plot(s);
+  for (const Series& s : all) figures += histogram_over_time(s, start, end) + objects_over_time(s, start, end);
+  if (figures.empty()) return "<h3>Static probability</h3>\n<p class=\"note\">No boxes, so no probabilities.</p>\n";
+  return "<h3>Static probability</h3>\n<div class=\"grid\">\n" + figures + "</div>\n";
+}
+
+}  // namespace cfp_slam

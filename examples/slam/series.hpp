@@ -1,0 +1,151 @@
+// The runs of one sequence as the plots need them: names, colours, aligned positions and errors over time.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "cfp/core/span.hpp"
+#include "cfp/evaluation/trajectory_error.hpp"
+#include "html.hpp"
+#include "page.hpp"
+#include "record.hpp"
+#include "statistics.hpp"
+#include "summary.hpp"
+
+namespace cfp_slam {
+
+inline constexpr std::array<const char*, 7> variant_names{"plain", "cfp", "cfp-minus", "no-mdc", "no-dbscan", "no-ksp", "only-boxes"};
+
+struct Series {
+  const RunRecord* run = nullptr;
+  std::string name;
+  std::size_t style = 0;  // into series_styles
+
+  [[nodiscard]] std::string css(const char* what) const { return std::string(what) + " c" + number(style) + " s" + number(style); }
+};
+
+// A known variant has its own colour in every report; others, and further seeds of the same, take the next free one.
+inline std::vector<Series> series_of(const std::vector<const RunRecord*>& runs) {
+  std::vector<Series> out;
+  std::vector<char> used(series_styles.size(), 0);
+  for (const RunRecord* run : runs) {
+    const auto same = [run](const RunRecord* other) { return other->variant == run->variant; };
+    const bool alone = std::count_if(runs.begin(), runs.end(), same) == 1;
+    const auto known = std::find(variant_names.begin(), variant_names.end(), run->variant);
+    std::size_t style = static_cast<std::size_t>(known - variant_names.begin());
+    if (known == variant_names.end() || used[style] != 0) {
+      const auto free = std::find(used.rbegin(), used.rend(), 0);
+      style = free == used.rend() ? out.size() % used.size() : static_cast<std::size_t>(used.rend() - free) - 1;
+    }
+    used[style] = 1;
+    out.push_back({run, run->variant + (alone ? "" : ", seed " + std::to_string(run->seed)), style});
+  }
+  return out;
+}
+
+inline bool has_pose(const FrameRecord& frame) { return frame.outcome <= Outcome::relocalised; }
+
+// Numbers per time; entries that are not finite interrupt the curve.
+struct TimeSeries {
+  std::vector<double> time_s, value;
+};
+
+// Time of the earliest frame: the plots count from there.
+inline double start_of(const std::vector<Series>& all) {
+  double start = not_known;
+  for (const Series& s : all) {
+    for (const FrameRecord& frame : s.run->frames) {
+      if (std::isfinite(frame.time_s) && !(start <= frame.time_s)) start = frame.time_s;
+    }
+  }
+  return std::isfinite(start) ? start : 0;
+}
+
+inline double end_of(const std::vector<Series>& all) {
+  double end = start_of(all);
+  for (const Series& s : all) {
+    for (const FrameRecord& frame : s.run->frames) {
+      if (std::isfinite(frame.time_s)) end = (std::max)(end, frame.time_s);
+    }
+  }
+  return end;
+}
+
+// Camera positions in the frame of the truth, three coordinates each; interrupted where frames have no pose.
+struct Positions {
+  std::array<std::vector<double>, 3> coordinate;
+  void add(const cfp::Vector3<double>& p) {
+    for (std::size_t c = 0; c < 3; ++c) coordinate[c].push_back(p[static_cast<Eigen::Index>(c)]);
+  }
+  void interrupt() { add(cfp::Vector3<double>::Constant(not_known)); }
+};
+
+inline Positions positions_of(const RunRecord& run) {
+  const cfp::Similarity S = has_error(run.absolute) ? run.absolute.S_truth_estimate : cfp::Similarity{};
+  Positions out;
+  for (const FrameRecord& frame : run.frames) {
+    if (has_pose(frame)) {
+      out.add(S * frame.T_world_cam.translation);
+    } else {
+      out.interrupt();
+    }
+  }
+  return out;
+}
+
+// The truth while the camera recorded: motion capture often runs longer.
+inline Positions truth_positions(const std::vector<cfp::StampedPose<double>>& truth, double start_s, double end_s) {
+  Positions out;
+  std::vector<std::size_t> order;
+  cfp::time_order(cfp::span<const cfp::StampedPose<double>>(truth), order);
+  for (const std::size_t i : order) {
+    if (truth[i].time_s >= start_s - 0.05 && truth[i].time_s <= end_s + 0.05) out.add(truth[i].T_world_cam.translation);
+  }
+  return out;
+}
+
+// Translation error in metres with the alignment of the run's own result.
+inline TimeSeries error_over_time(const RunRecord& run, double start_s) {
+  TimeSeries out;
+  if (!has_error(run.absolute)) return out;
+  using View = cfp::span<const cfp::StampedPose<double>>;
+  const auto estimate = run.trajectory();
+  cfp::TrajectoryErrorWorkspace workspace;
+  cfp::AbsoluteErrorOptions options;
+  options.alignment = run.absolute.alignment;
+  if (!has_error(cfp::absolute_trajectory_error(View(run.truth), View(estimate), options, workspace))) return out;
+  std::vector<double> error(estimate.size(), not_known);
+  for (std::size_t k = 0; k < workspace.pose.size(); ++k) error[workspace.pose[k]] = workspace.translation_m[k];
+  std::size_t pose = 0;
+  for (const FrameRecord& frame : run.frames) {
+    const bool posed = has_pose(frame);
+    const double value = posed ? error[pose++] : not_known;
+    if (posed && !std::isfinite(value)) continue;  // no truth at that time: not a gap of the run
+    out.time_s.push_back(frame.time_s - start_s);
+    out.value.push_back(value);
+  }
+  return out;
+}
+
+// The legend; its boxes hide series in all plots of the section, in browsers that know :has().
+inline std::string legend_of(const std::vector<Series>& all, bool with_truth) {
+  std::string out = "<div class=\"legend\">";
+  if (with_truth) out += "<span><svg viewBox=\"0 0 26 10\"><path class=\"truth\" d=\"M1 5H25\"/></svg>truth</span>";
+  for (const Series& s : all) {
+    const std::string k = number(s.style);
+    out += "<label><input type=\"checkbox\" checked class=\"t" + k + "\"><svg viewBox=\"0 0 26 10\"><path class=\"curve c" + k +
+           "\" d=\"M1 5H25\"/></svg>" + escape(s.name) + "</label>";
+  }
+  return out + "</div>\n";
+}
+
+inline std::string figure(const std::string& title, const std::string& content, const std::string& caption = {}, const std::string& css = {}) {
+  return "<figure" + (css.empty() ? "" : " class=\"" + css + '"') + "><strong>" + escape(title) + "</strong>" + content +
+         (caption.empty() ? "" : "<figcaption>" + escape(caption) + "</figcaption>") + "</figure>\n";
+}
+
+}  // namespace cfp_slam

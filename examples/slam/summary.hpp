@@ -1,0 +1,126 @@
+// The figures of one run that the tables need: some hundred bytes, so that thousands of runs fit in memory and in a file that a
+// long experiment is resumed from.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "cfp/core/span.hpp"
+#include "cfp/evaluation/calibration.hpp"
+#include "record.hpp"
+#include "statistics.hpp"
+
+namespace cfp_slam {
+
+// Probabilities against labels. not_known: no labelled samples, or for auc those of one class only.
+struct CalibrationSummary {
+  std::size_t samples = 0;
+  double static_fraction = not_known, auc = not_known, brier = not_known, ece = not_known;
+};
+
+// Errors are not_known when the run has no truth or no result.
+struct RunSummary {
+  std::string sequence, variant, detector, alignment;
+  std::uint64_t seed = 0;
+  std::size_t frames = 0, tracked = 0, relocalised = 0, lost = 0, skipped = 0, fallbacks = 0, keyframes = 0, map_points = 0;
+  double ate_rmse_m = not_known, ate_sd_m = not_known, ate_mean_m = not_known, ate_median_m = not_known, ate_max_m = not_known;
+  double rpe_rmse_m = not_known, rpe_sd_m = not_known, rpe_rmse_deg = not_known, rpe_sd_deg = not_known, rpe_delta_s = not_known;
+  std::size_t matched = 0, expected = 0;
+  double time_fraction = not_known, largest_gap_s = not_known;
+  // Over the frames in which the module ran.
+  std::array<double, module_count> median_ms{}, p95_ms{}, mean_ms{};
+  CalibrationSummary first_stage, second_stage, map_point, object;
+};
+
+inline constexpr std::array<const char*, 4> probability_names{"K, first stage", "K, second stage", "M of the map point", "O of the box"};
+inline std::array<const LabelledSamples*, 4> labelled(const RunRecord& run) {
+  return {&run.first_stage, &run.second_stage, &run.map_point, &run.object};
+}
+
+inline CalibrationSummary summarize(const LabelledSamples& samples) {
+  CalibrationSummary out;
+  if (samples.probability.size() != samples.is_static.size()) return out;
+  cfp::CalibrationWorkspace workspace;
+  const auto result = cfp::evaluate_calibration(cfp::span<const float>(samples.probability), cfp::span<const char>(samples.is_static),
+                                                cfp::span<const float>(), workspace);
+  out.samples = result.used;
+  if (result.used == 0) return out;
+  out.static_fraction = result.static_fraction;
+  out.brier = result.brier;
+  out.ece = result.expected_calibration_error;
+  if (result.status == cfp::Status::ok) out.auc = result.auc;
+  return out;
+}
+
+// Milliseconds of the frames in which a module ran, in order. A module that does not run takes no time: zeros are left out, so
+// that the figure is what it costs when it is needed.
+inline std::vector<double> milliseconds_of(const RunRecord& run, Module module) {
+  std::vector<double> values;
+  for (const FrameRecord& frame : run.frames) {
+    const double ms = frame.milliseconds[static_cast<std::size_t>(module)];
+    if (ms > 0 && std::isfinite(ms)) values.push_back(ms);
+  }
+  return values;
+}
+
+// Whether the errors of a run mean something: degenerate says only that the alignment's rotation is not unique.
+inline bool has_error(const cfp::AbsoluteErrorResult& r) {
+  return r.translation_m.count > 0 && (r.status == cfp::Status::ok || r.status == cfp::Status::degenerate);
+}
+inline bool has_error(const cfp::RelativeErrorResult& r) { return r.translation_m.count > 0 && r.status == cfp::Status::ok; }
+
+inline RunSummary summarize(const RunRecord& run) {
+  RunSummary s;
+  s.sequence = run.sequence;
+  s.variant = run.variant;
+  s.detector = run.detector;
+  s.seed = run.seed;
+  s.frames = run.frames.size();
+  for (const FrameRecord& frame : run.frames) {
+    ++(frame.outcome == Outcome::tracked       ? s.tracked
+       : frame.outcome == Outcome::relocalised ? s.relocalised
+       : frame.outcome == Outcome::lost        ? s.lost
+                                               : s.skipped);
+    s.fallbacks += frame.health.fallback != cfp::WeightFallback::none;
+  }
+  s.keyframes = run.keyframes;
+  s.map_points = run.map_points;
+  s.alignment = to_string(run.absolute.alignment);
+  if (has_error(run.absolute)) {
+    const cfp::ErrorStatistics& e = run.absolute.translation_m;
+    s.ate_rmse_m = e.rmse;
+    s.ate_sd_m = e.standard_deviation;
+    s.ate_mean_m = e.mean;
+    s.ate_median_m = e.median;
+    s.ate_max_m = e.maximum;
+    s.matched = run.absolute.coverage.matched;
+    s.expected = run.absolute.coverage.expected;
+    s.time_fraction = run.absolute.coverage.time_fraction;
+    s.largest_gap_s = run.absolute.coverage.largest_gap_s;
+  }
+  if (has_error(run.relative)) {
+    s.rpe_rmse_m = run.relative.translation_m.rmse;
+    s.rpe_sd_m = run.relative.translation_m.standard_deviation;
+    s.rpe_rmse_deg = run.relative.rotation_deg.rmse;
+    s.rpe_sd_deg = run.relative.rotation_deg.standard_deviation;
+    if (run.relative.unit == cfp::DeltaUnit::seconds) s.rpe_delta_s = run.relative.delta;
+  }
+  for (std::size_t m = 0; m < module_count; ++m) {
+    const std::vector<double> ms = milliseconds_of(run, static_cast<Module>(m));
+    s.median_ms[m] = quantile(ms, 0.5);
+    s.p95_ms[m] = quantile(ms, 0.95);
+    double sum = 0;
+    for (const double value : ms) sum += value;
+    s.mean_ms[m] = ms.empty() ? not_known : sum / static_cast<double>(ms.size());
+  }
+  s.first_stage = summarize(run.first_stage);
+  s.second_stage = summarize(run.second_stage);
+  s.map_point = summarize(run.map_point);
+  s.object = summarize(run.object);
+  return s;
+}
+
+}  // namespace cfp_slam
