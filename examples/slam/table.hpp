@@ -1,0 +1,86 @@
+// A table as data, with its protocol, and its two forms: Markdown and HTML.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "html.hpp"
+
+namespace cfp_slam {
+
+enum class Rank { none, best, second };
+
+struct Cell {
+  std::string text;
+  std::string range;  // spread, coverage: beside the figure, less prominent
+  Rank rank = Rank::none;
+};
+
+struct Table {
+  std::string title;
+  std::string protocol;  // how the figures came about
+  std::vector<std::string> header;
+  std::vector<std::vector<Cell>> rows;
+  std::string note;  // below
+};
+
+// Text in a Markdown table's cell: the pipe and what would be read as mark-up.
+inline std::string markdown_escape(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '|' || c == '\\' || c == '`' || c == '*' || c == '_' || c == '[' || c == ']') out += '\\';
+    if (c == '<') {
+      out += "&lt;";
+    } else if (c == '&') {
+      out += "&amp;";
+    } else {
+      out += c == '\n' || c == '\r' ? ' ' : c;
+    }
+  }
+  return out;
+}
+
+inline std::string to_markdown(const Table& table) {
+  std::string out = "### " + markdown_escape(table.title) + "\n\n";
+  if (!table.protocol.empty()) out += markdown_escape(table.protocol) + "\n\n";
+  std::string rule = "|";
+  out += '|';
+  for (std::size_t c = 0; c < table.header.size(); ++c) {
+    out += ' ' + markdown_escape(table.header[c]) + " |";
+    rule += c == 0 ? "---|" : "---:|";
+  }
+  out += '\n' + rule + '\n';
+  for (const auto& row : table.rows) {
+    out += '|';
+    for (const Cell& cell : row) {
+      const char* mark = cell.rank == Rank::best ? "**" : cell.rank == Rank::second ? "*" : "";
+      out += ' ' + (mark + markdown_escape(cell.text) + mark) + (cell.range.empty() ? "" : " (" + markdown_escape(cell.range) + ')') + " |";
+    }
+    out += '\n';
+  }
+  if (!table.note.empty()) out += '\n' + markdown_escape(table.note) + '\n';
+  return out + '\n';
+}
+
+inline std::string to_html(const Table& table) {
+  std::string out = "<h3>" + escape(table.title) + "</h3>\n";
+  if (!table.protocol.empty()) out += "<p class=\"note\">" + escape(table.protocol) + "</p>\n";
+  out += "<div class=\"scroll\"><table><thead><tr>";
+  for (const std::string& h : table.header) out += "<th>" + escape(h) + "</th>";
+  out += "</tr></thead><tbody>\n";
+  for (const auto& row : table.rows) {
+    out += "<tr>";
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      const char* mark = row[c].rank == Rank::best ? "b" : row[c].rank == Rank::second ? "u" : "span";
+      out += std::string(c == 0 ? "<th scope=\"row\">" : "<td>") + '<' + mark + '>' + escape(row[c].text) + "</" + mark + '>' +
+             (row[c].range.empty() ? "" : "<br><span class=\"range\">" + escape(row[c].range) + "</span>") + (c == 0 ? "</th>" : "</td>");
+    }
+    out += "</tr>\n";
+  }
+  out += "</tbody></table></div>\n";
+  if (!table.note.empty()) out += "<p class=\"note\">" + escape(table.note) + "</p>\n";
+  return out;
+}
+
+}  // namespace cfp_slam
