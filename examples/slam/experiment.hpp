@@ -60,14 +60,21 @@ inline Spread spread_of(const std::vector<RunSummary>& runs, std::string_view se
   return spread_of(values_of(runs, sequence, variant, [field](const RunSummary& run) { return run.*field; }));
 }
 
-// Matched poses in percent of the frames; 0 for a run with a truth but without a result is not told from one without truth: not_known.
+// Matched poses in percent of the frames; not_known without a truth.
 inline double coverage_percent(const RunSummary& run) {
   return run.expected > 0 ? 100 * static_cast<double>(run.matched) / static_cast<double>(run.expected) : not_known;
 }
 
-// "0.0138–0.0150", "" for a single value; the runs without a result are named.
+// TUM's long names as the paper has them.
+inline std::string shown_name(const std::string& sequence) {
+  const std::size_t k = paper_sequence(sequence);
+  return k < paper_sequence_count ? paper_names[k] : sequence;
+}
+
+// "0.0138–0.0150", "" when the values do not differ as printed; the runs without a result are named.
 inline std::string range_text(const Spread& s, int decimals) {
-  std::string out = s.known > 1 ? number(s.minimum, decimals) + "–" + number(s.maximum, decimals) : "";
+  const std::string low = number(s.minimum, decimals), high = number(s.maximum, decimals);
+  std::string out = low != high ? low + "–" + high : "";
   if (s.known < s.total) out += (out.empty() ? "" : ", ") + number(s.known) + " of " + number(s.total) + " runs";
   return out;
 }

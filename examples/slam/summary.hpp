@@ -28,7 +28,7 @@ struct RunSummary {
   std::size_t frames = 0, tracked = 0, relocalised = 0, lost = 0, skipped = 0, fallbacks = 0, keyframes = 0, map_points = 0;
   double ate_rmse_m = not_known, ate_sd_m = not_known, ate_mean_m = not_known, ate_median_m = not_known, ate_max_m = not_known;
   double rpe_rmse_m = not_known, rpe_sd_m = not_known, rpe_rmse_deg = not_known, rpe_sd_deg = not_known, rpe_delta_s = not_known;
-  std::size_t matched = 0, expected = 0;
+  std::size_t matched = 0, expected = 0;  // poses with a truth; frames, 0 when the run has no truth
   double time_fraction = not_known, largest_gap_s = not_known;
   // Over the frames in which the module ran.
   std::array<double, module_count> median_ms{}, p95_ms{}, mean_ms{};
@@ -89,6 +89,7 @@ inline RunSummary summarize(const RunRecord& run) {
   s.keyframes = run.keyframes;
   s.map_points = run.map_points;
   s.alignment = to_string(run.absolute.alignment);
+  s.expected = run.truth.empty() ? 0 : run.frames.size();
   if (has_error(run.absolute)) {
     const cfp::ErrorStatistics& e = run.absolute.translation_m;
     s.ate_rmse_m = e.rmse;
@@ -97,7 +98,6 @@ inline RunSummary summarize(const RunRecord& run) {
     s.ate_median_m = e.median;
     s.ate_max_m = e.maximum;
     s.matched = run.absolute.coverage.matched;
-    s.expected = run.absolute.coverage.expected;
     s.time_fraction = run.absolute.coverage.time_fraction;
     s.largest_gap_s = run.absolute.coverage.largest_gap_s;
   }

@@ -1,6 +1,7 @@
 // A table as data, with its protocol, and its two forms: Markdown and HTML.
 #pragma once
 
+#include <cctype>
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -25,11 +26,14 @@ struct Table {
   std::string note;  // below
 };
 
-// Text in a Markdown table's cell: the pipe and what would be read as mark-up.
+// Text in a Markdown table's cell: the pipe and what would be read as mark-up. An underscore inside a word is none.
 inline std::string markdown_escape(const std::string& text) {
   std::string out;
-  for (const char c : text) {
-    if (c == '|' || c == '\\' || c == '`' || c == '*' || c == '_' || c == '[' || c == ']') out += '\\';
+  const auto is_word = [&text](std::size_t k) { return k < text.size() && std::isalnum(static_cast<unsigned char>(text[k])) != 0; };
+  for (std::size_t k = 0; k < text.size(); ++k) {
+    const char c = text[k];
+    const bool underscore = c == '_' && !(k > 0 && is_word(k - 1) && is_word(k + 1));
+    if (c == '|' || c == '\\' || c == '`' || c == '*' || underscore || c == '[' || c == ']') out += '\\';
     if (c == '<') {
       out += "&lt;";
     } else if (c == '&') {

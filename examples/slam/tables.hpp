@@ -15,6 +15,7 @@
 #include "published.hpp"
 #include "statistics.hpp"
 #include "summary.hpp"
+#include "system_table.hpp"
 #include "table.hpp"
 
 namespace cfp_slam {
@@ -38,30 +39,13 @@ inline constexpr std::array<const char*, 3> compared_variants{"plain", "cfp-minu
 // Our names for the rows of Table IV, in its order.
 inline constexpr std::array<const char*, 6> ablation_variants{"cfp", "cfp-minus", "no-mdc", "no-dbscan", "no-ksp", "only-boxes"};
 
-// Marks the smallest and the second smallest of some cells; equal figures as printed share a rank.
-inline void rank(const std::vector<Cell*>& cells, const std::vector<double>& values) {
-  std::vector<double> sorted;
-  for (const double v : values) {
-    if (std::isfinite(v)) sorted.push_back(v);
-  }
-  std::sort(sorted.begin(), sorted.end());
-  sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
-  if (sorted.size() < 2) return;
-  for (std::size_t k = 0; k < cells.size(); ++k) {
-    if (values[k] == sorted[0]) cells[k]->rank = Rank::best;
-    if (values[k] == sorted[1]) cells[k]->rank = Rank::second;
-  }
-}
-inline double as_printed(double value, int decimals) {
-  const double unit = std::pow(10.0, decimals);
-  return std::round(value * unit) / unit;
-}
-
-inline Cell cell_of(const Spread& spread, int decimals) { return {number(spread.median, decimals), range_text(spread, decimals), Rank::none}; }
+inline constexpr const char* rank_note =
+    "Bold: best; second best underlined or in italics. Coverage: matched poses, of all frames; a figure whose coverage is more than 2 points below "
+    "the best one is not ranked, for a small error over few poses is no merit.";
 
 inline Table error_table(const std::vector<RunSummary>& runs, const ErrorKind& kind, const std::string& protocol) {
   Table table;
-  table.title = std::string("Table ") + kind.number + ": " + kind.name + " [" + kind.unit + "]";
+  table.title = std::string("Table ") + kind.number + ": " + kind.name + ", " + kind.unit;
   table.protocol = protocol;
   table.header = {"sequence"};
   for (const char* variant : compared_variants) {
@@ -69,8 +53,8 @@ inline Table error_table(const std::vector<RunSummary>& runs, const ErrorKind& k
   }
   table.header.insert(table.header.end(), {"cfp better than plain", "n"});
   for (const std::string& sequence : sequences_of(runs)) {
-    std::vector<Cell> row{{sequence, "", Rank::none}};
-    std::vector<double> medians;
+    std::vector<Cell> row{{shown_name(sequence), "", Rank::none}};
+    std::vector<double> medians, coverages;
     std::size_t n = 0;
     for (const char* variant : compared_variants) {
       const Spread rmse = spread_of(runs, sequence, variant, kind.rmse);
@@ -79,105 +63,27 @@ inline Table error_table(const std::vector<RunSummary>& runs, const ErrorKind& k
       row.push_back({number(spread_of(runs, sequence, variant, kind.sd).median, kind.decimals), "", Rank::none});
       row.push_back({number(coverage.median, 1) + (coverage.known > 0 ? " %" : ""), "", Rank::none});
       medians.push_back(rmse.median);
+      coverages.push_back(coverage.median);
       n = (std::max)(n, rmse.total);
     }
     const double better = improvement_percent(medians[0], medians[2]);
     row.push_back({number(better, 1) + (std::isfinite(better) ? " %" : ""), "", Rank::none});
     row.push_back({number(n), "", Rank::none});
-    for (double& m : medians) m = as_printed(m, kind.decimals);
-    rank({&row[1], &row[4], &row[7]}, medians);
+    rank({&row[1], &row[4], &row[7]}, comparable(medians, coverages), kind.decimals);
     table.rows.push_back(row);
   }
-  table.note = "Bold: best, second best marked. S.D.: standard deviation of the errors within a run. Coverage: poses with a truth, of all frames. "
-               "Better: 100 (plain - cfp) / plain of the RMSE.";
+  table.note = std::string(rank_note) + " S.D.: standard deviation of the errors within a run. Better: 100 (plain - cfp) / plain of the RMSE.";
   return table;
 }
 
-// The TUM sequences among the runs, by their index in the paper.
-inline std::vector<std::pair<std::size_t, std::string>> published_sequences(const std::vector<RunSummary>& runs) {
-  std::vector<std::pair<std::size_t, std::string>> out;
-  for (const std::string& sequence : sequences_of(runs)) {
-    const std::size_t k = paper_sequence(sequence);
-    if (k < paper_sequence_count) out.emplace_back(k, sequence);
-  }
-  std::sort(out.begin(), out.end());
-  return out;
-}
-
-// Collects rows of systems, one column per sequence, and ranks the columns.
-class SystemTable {
- public:
-  SystemTable(std::string title, std::string protocol, std::vector<std::pair<std::size_t, std::string>> sequences)
-      : sequences_(std::move(sequences)), best_(sequences_.size()) {
-    table_.title = std::move(title);
-    table_.protocol = std::move(protocol);
-    table_.header = {"system", "evidence"};
-    for (const auto& sequence : sequences_) table_.header.emplace_back(paper_names[sequence.first]);
-  }
-
-  void add_published(const PublishedRow& row, const std::string& name, bool ranked) {
-    std::vector<Cell> cells{{name, "", Rank::none}, {row.evidence, "", Rank::none}};
-    bool any = false;
-    for (const auto& sequence : sequences_) {
-      const PublishedError& e = row.error[sequence.first];
-      any = any || std::isfinite(e.rmse);
-      cells.push_back({number(e.rmse, row.decimals), std::isfinite(e.sd) ? "S.D. " + number(e.sd, row.decimals) : "", Rank::none});
-      values_.push_back(ranked ? e.rmse : not_known);
-    }
-    if (any) {
-      table_.rows.push_back(cells);
-    } else {
-      values_.resize(values_.size() - sequences_.size());
-    }
-  }
-
-  void add_ours(const std::vector<RunSummary>& runs, const char* variant, double RunSummary::*rmse, int decimals) {
-    std::vector<Cell> cells{{std::string("ours: ") + variant, "", Rank::none}, {"measured", "", Rank::none}};
-    std::size_t n = 0;
-    for (const auto& sequence : sequences_) {
-      const Spread spread = spread_of(runs, sequence.second, variant, rmse);
-      const Spread coverage = spread_of(values_of(runs, sequence.second, variant, coverage_percent));
-      Cell cell = cell_of(spread, decimals);
-      if (coverage.known > 0) cell.range += (cell.range.empty() ? "" : "; ") + number(coverage.median, 1) + " %";
-      n += spread.total;
-      cells.push_back(cell);
-      values_.push_back(as_printed(spread.median, decimals));
-    }
-    if (n > 0) {
-      table_.rows.push_back(cells);
-    } else {
-      values_.resize(values_.size() - sequences_.size());
-    }
-  }
-
-  [[nodiscard]] Table finished(const std::string& note) {
-    for (std::size_t c = 0; c < sequences_.size(); ++c) {
-      std::vector<Cell*> cells;
-      std::vector<double> column;
-      for (std::size_t r = 0; r < table_.rows.size(); ++r) {
-        cells.push_back(&table_.rows[r][c + 2]);
-        column.push_back(values_[r * sequences_.size() + c]);
-      }
-      rank(cells, column);
-    }
-    table_.note = note;
-    return table_;
-  }
-
- private:
-  std::vector<std::pair<std::size_t, std::string>> sequences_;
-  std::vector<double> best_, values_;  // values_: one per cell, not_known for what is not ranked
-  Table table_;
-};
-
-constexpr const char* evidence_note =
+inline constexpr const char* evidence_note =
     "Evidence: P printed by the authors themselves, 2 printed in somebody else's table, – not recorded which. Published figures are single runs "
     "nearly all, on other machines, seldom with coverage; below about 1 mm or 10 % a ranking is noise, and three printed digits cannot be "
     "ranked against four.";
 
 inline Table published_error_table(const std::vector<RunSummary>& runs, const ErrorKind& kind, const std::string& protocol) {
-  SystemTable out(std::string("Table ") + kind.number + " beside published figures: " + kind.name + ", RMSE [" + kind.unit + "]", protocol,
-                  published_sequences(runs));
+  SystemTable out(std::string("Table ") + kind.number + " beside published figures: " + kind.name + ", RMSE, " + kind.unit,
+                  protocol, published_sequences(runs));
   for (const PublishedRow& row : *kind.paper) out.add_published(row, std::string(row.system) + " (paper)", true);
   const bool absolute = kind.rmse == &RunSummary::ate_rmse_m;
   if (absolute) {
@@ -193,33 +99,32 @@ inline Table published_error_table(const std::vector<RunSummary>& runs, const Er
 
 inline Table ablation_table(const std::vector<RunSummary>& runs, const std::string& protocol) {
   Table table;
-  table.title = "Table IV: ATE of the variants, RMSE [m]";
+  table.title = "Table IV: ATE of the variants, RMSE, m";
   table.protocol = protocol;
   table.header = {"sequence"};
   const std::vector<std::string> variants = variants_of(runs);
   table.header.insert(table.header.end(), variants.begin(), variants.end());
   for (const std::string& sequence : sequences_of(runs)) {
-    std::vector<Cell> row{{sequence, "", Rank::none}};
-    std::vector<double> medians;
+    std::vector<Cell> row{{shown_name(sequence), "", Rank::none}};
+    std::vector<double> medians, coverages;
     for (const std::string& variant : variants) {
       const Spread rmse = spread_of(runs, sequence, variant, &RunSummary::ate_rmse_m);
       const Spread coverage = spread_of(values_of(runs, sequence, variant, coverage_percent));
-      Cell cell = cell_of(rmse, 4);
-      if (coverage.known > 0) cell.range += (cell.range.empty() ? "" : "; ") + number(coverage.median, 1) + " %";
-      row.push_back(cell);
-      medians.push_back(as_printed(rmse.median, 4));
+      row.push_back(cell_of(rmse, coverage, 4));
+      medians.push_back(rmse.median);
+      coverages.push_back(coverage.median);
     }
     std::vector<Cell*> cells;
     for (std::size_t k = 1; k < row.size(); ++k) cells.push_back(&row[k]);
-    rank(cells, medians);
+    rank(cells, comparable(medians, coverages), 4);
     table.rows.push_back(row);
   }
-  table.note = "Percentages in brackets: coverage. A variant that loses the camera may have a small error over the few poses it has.";
+  table.note = std::string("Percentages in brackets: coverage. ") + rank_note;
   return table;
 }
 
 inline Table published_ablation_table(const std::vector<RunSummary>& runs, const std::string& protocol) {
-  SystemTable out("Table IV beside the paper's: ATE, RMSE [m]", protocol, published_sequences(runs));
+  SystemTable out("Table IV beside the paper's: ATE, RMSE, m", protocol, published_sequences(runs));
   for (std::size_t k = 0; k < ablation_variants.size(); ++k) {
     out.add_published(paper_ablation_m[k], std::string(paper_ablation_m[k].system) + " (paper)", true);
     out.add_ours(runs, ablation_variants[k], &RunSummary::ate_rmse_m, 4);
@@ -229,7 +134,7 @@ inline Table published_ablation_table(const std::vector<RunSummary>& runs, const
 
 inline Table latency_table(const std::vector<RunSummary>& runs, const std::string& protocol) {
   Table table;
-  table.title = "Table V: time per frame [ms]";
+  table.title = "Table V: time per frame, ms";
   table.protocol = protocol;
   table.header = {"module"};
   std::vector<std::string> variants;
@@ -247,7 +152,7 @@ inline Table latency_table(const std::vector<RunSummary>& runs, const std::strin
       const Spread median = spread_of(values_of(runs, "", variant, [m](const RunSummary& run) { return run.median_ms[m]; }));
       const Spread p95 = spread_of(values_of(runs, "", variant, [m](const RunSummary& run) { return run.p95_ms[m]; }));
       any = any || median.known > 0;
-      row.push_back({number(median.median, 2), median.known > 1 ? range_text({median.median, median.minimum, median.maximum, 1 + 1, 1 + 1}, 2) : "", Rank::none});
+      row.push_back({number(median.median, 2), range_text({median.median, median.minimum, median.maximum, median.known, median.known}, 2), Rank::none});
       row.push_back({number(p95.median, 2), "", Rank::none});
     }
     for (const char* variant : {"cfp-minus", "cfp"}) {

@@ -90,6 +90,7 @@ inline cfp_slam::RunRecord fake_run(const FakeRun& fake) {
     T.translation += fake.drift_m * cfp::Vector3<double>(std::sin(5 * s + static_cast<double>(fake.seed)), std::sin(9 * s), std::cos(7 * s)) +
                      fake.bump_m * std::exp(-middle * middle) * cfp::Vector3<double>(1, 0.6, -0.2) +
                      0.15 * fake.drift_m * cfp::Vector3<double>(random.normal(), random.normal(), random.normal());
+    T.rotation = T.rotation * cfp::so3_exp(cfp::Vector3<double>(0.1 * fake.drift_m * random.normal(), 0.3 * fake.drift_m * std::sin(4 * s), 0));
     frame.T_world_cam = T;
     const bool lost = k >= fake.lost_from && k < fake.lost_from + fake.lost_count;
     frame.outcome = lost ? cfp_slam::Outcome::lost : cfp_slam::Outcome::tracked;

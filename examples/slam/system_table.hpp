@@ -1,0 +1,133 @@
+// Figures of many systems on the TUM sequences, one row per system, ours among them.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "experiment.hpp"
+#include "html.hpp"
+#include "published.hpp"
+#include "statistics.hpp"
+#include "summary.hpp"
+#include "table.hpp"
+
+namespace cfp_slam {
+
+inline double as_printed(double value, int decimals) {
+  const double unit = std::pow(10.0, decimals);
+  return std::round(value * unit) / unit;
+}
+
+// Marks the smallest and the second smallest of some cells; equal figures as printed share a rank.
+inline void rank(const std::vector<Cell*>& cells, std::vector<double> values, int decimals) {
+  std::vector<double> sorted;
+  for (double& v : values) {
+    v = as_printed(v, decimals);
+    if (std::isfinite(v)) sorted.push_back(v);
+  }
+  std::sort(sorted.begin(), sorted.end());
+  sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
+  if (sorted.size() < 2) return;
+  for (std::size_t k = 0; k < cells.size(); ++k) {
+    if (values[k] == sorted[0]) cells[k]->rank = Rank::best;
+    if (values[k] == sorted[1]) cells[k]->rank = Rank::second;
+  }
+}
+// Only figures with about the same coverage can be compared: not_known for those more than 2 points below the best covered one.
+inline std::vector<double> comparable(std::vector<double> values, const std::vector<double>& coverage_percent) {
+  double best = 0;
+  for (const double c : coverage_percent) best = c > best ? c : best;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    if (coverage_percent[k] < best - 2) values[k] = not_known;
+  }
+  return values;
+}
+
+inline Cell cell_of(const Spread& spread, int decimals) { return {number(spread.median, decimals), range_text(spread, decimals), Rank::none}; }
+inline Cell cell_of(const Spread& spread, const Spread& coverage_percent, int decimals) {
+  Cell cell = cell_of(spread, decimals);
+  if (coverage_percent.known > 0) cell.range += (cell.range.empty() ? "" : "; ") + number(coverage_percent.median, 1) + " %";
+  return cell;
+}
+
+// The TUM sequences among the runs, by their index in the paper.
+inline std::vector<std::pair<std::size_t, std::string>> published_sequences(const std::vector<RunSummary>& runs) {
+  std::vector<std::pair<std::size_t, std::string>> out;
+  for (const std::string& sequence : sequences_of(runs)) {
+    const std::size_t k = paper_sequence(sequence);
+    if (k < paper_sequence_count) out.emplace_back(k, sequence);
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+// Collects rows of systems, one column per sequence, and ranks the columns.
+class SystemTable {
+ public:
+  SystemTable(std::string title, std::string protocol, std::vector<std::pair<std::size_t, std::string>> sequences)
+      : sequences_(std::move(sequences)) {
+    table_.title = std::move(title);
+    table_.protocol = std::move(protocol);
+    table_.header = {"system", "evidence"};
+    for (const auto& sequence : sequences_) table_.header.emplace_back(paper_names[sequence.first]);
+  }
+
+  void add_published(const PublishedRow& row, const std::string& name, bool ranked) {
+    std::vector<Cell> cells{{name, "", Rank::none}, {row.evidence, "", Rank::none}};
+    bool any = false;
+    for (const auto& sequence : sequences_) {
+      const PublishedError& e = row.error[sequence.first];
+      any = any || std::isfinite(e.rmse);
+      cells.push_back({number(e.rmse, row.decimals), std::isfinite(e.sd) ? "S.D. " + number(e.sd, row.decimals) : "", Rank::none});
+      values_.push_back(ranked ? e.rmse : not_known);
+    }
+    if (any) {
+      table_.rows.push_back(cells);
+    } else {
+      values_.resize(values_.size() - sequences_.size());
+    }
+  }
+
+  // Not ranked below 95 % coverage: the published figures come from systems that held the camera.
+  void add_ours(const std::vector<RunSummary>& runs, const char* variant, double RunSummary::*rmse, int decimals) {
+    std::vector<Cell> cells{{std::string("ours: ") + variant, "", Rank::none}, {"measured", "", Rank::none}};
+    std::size_t n = 0;
+    for (const auto& sequence : sequences_) {
+      const Spread spread = spread_of(runs, sequence.second, variant, rmse);
+      const Spread coverage = spread_of(values_of(runs, sequence.second, variant, coverage_percent));
+      n += spread.total;
+      cells.push_back(cell_of(spread, coverage, decimals));
+      values_.push_back(coverage.median < 95 ? not_known : spread.median);
+    }
+    if (n > 0) {
+      table_.rows.push_back(cells);
+    } else {
+      values_.resize(values_.size() - sequences_.size());
+    }
+  }
+
+  [[nodiscard]] Table finished(const std::string& note) {
+    for (std::size_t c = 0; c < sequences_.size(); ++c) {
+      std::vector<Cell*> cells;
+      std::vector<double> column;
+      for (std::size_t r = 0; r < table_.rows.size(); ++r) {
+        cells.push_back(&table_.rows[r][c + 2]);
+        column.push_back(values_[r * sequences_.size() + c]);
+      }
+      rank(cells, column, 4);
+    }
+    table_.note = note;
+    return table_;
+  }
+
+ private:
+  std::vector<std::pair<std::size_t, std::string>> sequences_;
+  std::vector<double> values_;  // values_: one per cell, not_known for what is not ranked
+  Table table_;
+};
+
+}  // namespace cfp_slam
