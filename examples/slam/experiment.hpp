@@ -17,6 +17,9 @@
 
 namespace cfp_slam {
 
+// The columns of Tables I, II, III and V.
+inline constexpr std::array<const char*, 3> compared_variants{"plain", "cfp-minus", "cfp"};
+
 // Where a sequence stands in the tables: the paper's order for names that hold one of its keys ("walking_xyz"), then the others.
 inline std::size_t sequence_order(std::string_view name) {
   std::size_t k = 0;
@@ -56,7 +59,8 @@ std::vector<double> values_of(const std::vector<RunSummary>& runs, std::string_v
   }
   return out;
 }
-inline Spread spread_of(const std::vector<RunSummary>& runs, std::string_view sequence, std::string_view variant, double RunSummary::*field) {
+inline Spread spread_of(const std::vector<RunSummary>& runs, std::string_view sequence, std::string_view variant,
+                        double RunSummary::*field) {
   return spread_of(values_of(runs, sequence, variant, [field](const RunSummary& run) { return run.*field; }));
 }
 
@@ -111,8 +115,9 @@ inline std::string protocol_of(const std::vector<RunSummary>& runs, const std::s
   std::set<std::string> delta_texts;
   for (const double delta : deltas) delta_texts.insert(number(delta, 2) + " s");
   return "Alignment " + joined(alignments) + "; RPE over a fixed interval of " + joined(delta_texts) + "; n = " + range(seeds) +
-         " seeds per figure; " + range(frames) + " frames per sequence; detector: " + joined(detectors) + "; machine: " +
-         (machine.empty() ? "–" : machine) + ". Figures are medians over the seeds, in brackets the smallest and the largest.";
+         " seeds per figure; " + range(frames) + " frames per sequence; detector: " + joined(detectors) +
+         "; machine: " + (machine.empty() ? "–" : machine) +
+         ". Figures are medians over the seeds, in brackets the smallest and the largest.";
 }
 
 }  // namespace cfp_slam

@@ -61,7 +61,8 @@ thead th{vertical-align:bottom;border-bottom:2px solid var(--soft);white-space:n
 th:first-child,td:first-child{text-align:left;position:sticky;left:0;background:var(--ground)}
 figure th:first-child,figure td:first-child{background:var(--card)}
 tbody th{font-weight:500}
-td.words{text-align:left;white-space:normal;min-width:16rem}
+td.words,.words td,.words th{text-align:left;white-space:normal;vertical-align:top;min-width:5rem}
+.words th:first-child{position:static;min-width:13rem;font-weight:400}.words td:last-child{min-width:20rem}
 caption{text-align:left;padding:0 0 .3rem}
 td b{font-weight:700}td u{text-underline-offset:2px}
 .range{color:var(--soft);font-size:.85em}
@@ -93,15 +94,17 @@ svg .value{fill:var(--ink)}
     css += ".curve.c" + n + "{stroke-dasharray:" + series_styles[k].dashes + "}\n";
     css += "section:has(.t" + n + ":not(:checked)) .s" + n + "{display:none}\n";
   }
-  css += "@media(prefers-color-scheme:dark){:root{--ground:#12161c;--ink:#e6e9ee;--soft:#9aa5b4;--line:#343c48;--grid:#262d37;"
-         "--card:#1a2028;--good:#5fd07f;--bad:#ff8278}\n" + series_css(true) + "}\n";
+  css +=
+      "@media(prefers-color-scheme:dark){:root{--ground:#12161c;--ink:#e6e9ee;--soft:#9aa5b4;--line:#343c48;--grid:#262d37;"
+      "--card:#1a2028;--good:#5fd07f;--bad:#ff8278}\n" +
+      series_css(true) + "}\n";
   return css;
 }
 
 inline std::string page(const std::string& title, const std::string& body) {
   return "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, "
-         "initial-scale=1\">\n<title>" + escape(title) + "</title>\n<style>" + style_sheet() + "</style>\n</head>\n<body>\n" + body +
-         "</body>\n</html>\n";
+         "initial-scale=1\">\n<title>" +
+         escape(title) + "</title>\n<style>" + style_sheet() + "</style>\n</head>\n<body>\n" + body + "</body>\n</html>\n";
 }
 
 // Throws when the file cannot be written. A reader never sees half of it: it is renamed into place when complete.

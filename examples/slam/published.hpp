@@ -1,7 +1,7 @@
 // Published figures on the eight dynamic fr3 sequences of the TUM RGB-D benchmark, to stand beside ours.
 //
-// Evidence: P printed by the authors of the system themselves, 2 printed in somebody else's table, – not recorded which. Single runs nearly all of them,
-// on different machines, coverage seldom given: differences below about 1 mm or 10 % are noise.
+// Evidence: P printed by the authors of the system themselves, 2 printed in somebody else's table, – not recorded which. Single runs nearly
+// all of them, on different machines, coverage seldom given: differences below about 1 mm or 10 % are noise.
 #pragma once
 
 #include <array>
@@ -15,8 +15,9 @@ namespace cfp_slam {
 
 inline constexpr std::size_t paper_sequence_count = 8;
 // In the paper's order. TUM's folder is rgbd_dataset_freiburg3_<key>.
-inline constexpr std::array<const char*, paper_sequence_count> paper_keys{"sitting_xyz", "sitting_halfsphere", "sitting_static", "sitting_rpy",
-                                                                          "walking_xyz", "walking_halfsphere", "walking_static", "walking_rpy"};
+inline constexpr std::array<const char*, paper_sequence_count> paper_keys{"sitting_xyz",    "sitting_halfsphere", "sitting_static",
+                                                                          "sitting_rpy",    "walking_xyz",        "walking_halfsphere",
+                                                                          "walking_static", "walking_rpy"};
 inline constexpr std::array<const char*, paper_sequence_count> paper_names{"fr3/s/xyz", "fr3/s/half", "fr3/s/static", "fr3/s/rpy",
                                                                            "fr3/w/xyz", "fr3/w/half", "fr3/w/static", "fr3/w/rpy"};
 
@@ -46,6 +47,7 @@ struct PublishedRow {
   int decimals = 4;  // as published
 };
 
+// clang-format off
 // Table I of the paper: ATE in metres, RMSE and S.D.
 inline constexpr std::array<PublishedRow, 7> paper_ate_m{{
     {"ORB-SLAM2", "2", {{{0.0092, 0.0047}, {0.0192, 0.0110}, {0.0087, 0.0042}, {0.0195, 0.0124},
@@ -147,6 +149,7 @@ inline constexpr std::array<PublishedRow, 5> scaled_ate_m{{
       {0.012, no}, {0.016, no}, {0.005, no}, {0.031, no}}}, 3},
     {"Dream-SLAM", "–", {{{0.006, no}, {0.019, no}, {0.003, no}, {0.023, no},
       {0.017, no}, {0.016, no}, {0.003, no}, {no, no}}}, 3}}};
+// clang-format on
 
 // Table V: mean milliseconds on an Intel i7 with an RTX 3060; `no` where the paper gives none. "cfp-minus" has no object stage and
 // a shorter frame; the paper's times for the other variants are not published.
@@ -154,13 +157,20 @@ inline double paper_milliseconds(Module module, std::string_view variant) {
   const bool minus = variant == "cfp-minus";
   if (!minus && variant != "cfp") return no;
   switch (module) {
-    case Module::detection: return 12.44;
-    case Module::boxes: return 0.07;
-    case Module::objects: return minus ? no : 17.93;
-    case Module::keypoints_first: return 1.76;
-    case Module::keypoints_second: return 3.66;
-    case Module::tracking: return minus ? 24.77 : 42.7;
-    default: return no;
+    case Module::detection:
+      return 12.44;
+    case Module::boxes:
+      return 0.07;
+    case Module::objects:
+      return minus ? no : 17.93;
+    case Module::keypoints_first:
+      return 1.76;
+    case Module::keypoints_second:
+      return 3.66;
+    case Module::tracking:
+      return minus ? 24.77 : 42.7;
+    default:
+      return no;
   }
 }
 

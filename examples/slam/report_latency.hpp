@@ -77,18 +77,23 @@ inline std::string latency_over_time(const std::vector<Series>& all) {
   Plot plot("Time of the tracking thread", linear_axis(time, "time [s]"), linear_axis(ms, "ms per frame"));
   plot.line(Plot::usual_left, plot.py(1000.0 / 30), plot.width() - Plot::right, plot.py(1000.0 / 30), "guide");
   for (std::size_t k = 0; k < all.size(); ++k) plot.curve(curves[k].time_s, curves[k].value, all[k].css("curve"));
-  return figure("Time of the tracking thread", plot.svg(), "Dashed: 33.3 ms, a camera of 30 frames/s. Peaks above the 99th percentile are cut at the border.");
+  return figure("Time of the tracking thread", plot.svg(),
+                "Dashed: 33.3 ms, a camera of 30 frames/s. Peaks above the 99th percentile are cut at the border.");
 }
 
 inline std::string latency_section(const std::vector<Series>& all) {
   std::string figures = latency_over_time(all);
   for (const Series& s : all) figures += latency_bars(s);
   if (figures.empty()) return {};
-  return "<h3>Time</h3>\n<p class=\"note\">Bar: median over the frames in which the module ran; whisker: 95th percentile. Diamond: the paper's mean on "
-         "its machine (Intel i7, RTX 3060 for the detector): object detection 12.44 ms beside feature extraction, box filter 0.07, object probability "
-         "17.93, DBSCAN 1.76, keypoint probability 3.66, whole tracking 42.7 (24.77 without the object stage). Our “object probability” does not "
+  return "<h3>Time</h3>\n<p class=\"note\">Bar: median over the frames in which the module ran; whisker: 95th percentile. Diamond: the "
+         "paper's mean on "
+         "its machine (Intel i7, RTX 3060 for the detector): object detection 12.44 ms beside feature extraction, box filter 0.07, object "
+         "probability "
+         "17.93, DBSCAN 1.76, keypoint probability 3.66, whole tracking 42.7 (24.77 without the object stage). Our “object probability” "
+         "does not "
          "contain the optical flow, which has its own bar. Detection, reading and bundle adjustment run beside the tracking thread.</p>\n"
-         "<div class=\"grid\">\n" + figures + "</div>\n";
+         "<div class=\"grid\">\n" +
+         figures + "</div>\n";
 }
 
 }  // namespace cfp_slam

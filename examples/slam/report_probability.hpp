@@ -118,8 +118,8 @@ inline std::string objects_over_time(const Series& series, double start_s, doubl
     }
   }
   if (!any) return {};
-  return figure("O of the boxes over time: " + series.name, plot.svg(), "Filled: detected boxes; rings: compensated ones. Boxes without an O are left out.",
-                "s" + number(series.style));
+  return figure("O of the boxes over time: " + series.name, plot.svg(),
+                "Filled: detected boxes; rings: compensated ones. Boxes without an O are left out.", "s" + number(series.style));
 }
 
 // Reliability: a number that means what it says lies on the diagonal.
@@ -136,8 +136,8 @@ inline std::string reliability_plot(const Series& series) {
     const CalibrationSummary c = summarize(*samples[k]);
     if (c.samples == 0) continue;
     cfp::CalibrationWorkspace workspace;
-    const auto result = cfp::evaluate_calibration(cfp::span<const float>(samples[k]->probability), cfp::span<const char>(samples[k]->is_static),
-                                                  cfp::span<const float>(), workspace);
+    const auto result = cfp::evaluate_calibration(cfp::span<const float>(samples[k]->probability),
+                                                  cfp::span<const char>(samples[k]->is_static), cfp::span<const float>(), workspace);
     const std::string colour = "c" + number(styles[k]);
     std::vector<double> x, y;
     for (const cfp::ReliabilityBin& bin : result.table) {
@@ -150,19 +150,22 @@ inline std::string reliability_plot(const Series& series) {
       if (bin.count == 0) continue;
       const double share = static_cast<double>(bin.count) / static_cast<double>(result.used);
       plot.dot(bin.mean_probability, bin.static_fraction, 2 + 6 * std::sqrt(share), "dot " + colour,
-               std::string(probability_names[k]) + ": " + number(bin.count) + " samples, mean " + number(bin.mean_probability, 3) + ", static " +
-                   number(bin.static_fraction, 3));
+               std::string(probability_names[k]) + ": " + number(bin.count) + " samples, mean " + number(bin.mean_probability, 3) +
+                   ", static " + number(bin.static_fraction, 3));
     }
     key += "<span><svg viewBox=\"0 0 26 10\"><path class=\"curve " + colour + "\" d=\"M1 5H25\"/></svg>" + probability_names[k] + "</span>";
-    rows += std::string("<tr><th scope=\"row\">") + probability_names[k] + "</th><td>" + number(c.auc, 4) + "</td><td>" + number(c.brier, 4) +
-            "</td><td>" + number(c.ece, 4) + "</td><td>" + number(100 * c.static_fraction, 1) + " %</td><td>" + number(c.samples) + "</td></tr>\n";
+    rows += std::string("<tr><th scope=\"row\">") + probability_names[k] + "</th><td>" + number(c.auc, 4) + "</td><td>" +
+            number(c.brier, 4) + "</td><td>" + number(c.ece, 4) + "</td><td>" + number(100 * c.static_fraction, 1) + " %</td><td>" +
+            number(c.samples) + "</td></tr>\n";
   }
   if (rows.empty()) return {};
-  return figure("Reliability: " + series.name,
-                "<div class=\"legend\">" + key + "</div>" + plot.svg() +
-                    "<div class=\"scroll\"><table><thead><tr><th></th><th>AUC</th><th>Brier</th><th>ECE</th><th>static</th><th>samples</th></tr>"
-                    "</thead><tbody>\n" + rows + "</tbody></table></div>",
-                "The area of a dot grows with the share of the samples in its tenth. AUC 1, Brier 0, ECE 0 are best.", "s" + number(series.style));
+  return figure(
+      "Reliability: " + series.name,
+      "<div class=\"legend\">" + key + "</div>" + plot.svg() +
+          "<div class=\"scroll\"><table><thead><tr><th></th><th>AUC</th><th>Brier</th><th>ECE</th><th>static</th><th>samples</th></tr>"
+          "</thead><tbody>\n" +
+          rows + "</tbody></table></div>",
+      "The area of a dot grows with the share of the samples in its tenth. AUC 1, Brier 0, ECE 0 are best.", "s" + number(series.style));
 }
 
 inline std::string probability_section(const std::vector<Series>& all) {

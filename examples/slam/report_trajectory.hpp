@@ -43,8 +43,10 @@ inline std::string summary_table(const std::vector<Series>& all) {
       "<th>alignment</th><th>ms per frame, median / p95</th><th>keyframes / map points</th></tr></thead><tbody>\n";
   for (const Series& s : all) out += row_of(s);
   return out +
-         "</tbody></table></div>\n<p class=\"note\">ATE: distance of the matched poses to the truth after the alignment named. RPE: rmse over "
-         "all intervals of one second. A lost frame has no pose and none is invented: read every error beside its coverage. ms: the tracking "
+         "</tbody></table></div>\n<p class=\"note\">ATE: distance of the matched poses to the truth after the alignment named. RPE: rmse "
+         "over "
+         "all intervals of one second. A lost frame has no pose and none is invented: read every error beside its coverage. ms: the "
+         "tracking "
          "thread, the detector only as far as it was waited for.</p>\n";
 }
 
@@ -151,16 +153,20 @@ inline std::string notes_of(const std::vector<Series>& all) {
               to_string(noted[i]->outcome) + ": " + escape(noted[i]->note) + "</td></tr>\n";
     }
     if (noted.size() > shown) {
-      rows += "<tr><th scope=\"row\">" + escape(s.name) + "</th><td></td><td class=\"words\">and " + number(noted.size() - shown) + " more</td></tr>\n";
+      rows += "<tr><th scope=\"row\">" + escape(s.name) + "</th><td></td><td class=\"words\">and " + number(noted.size() - shown) +
+              " more</td></tr>\n";
     }
   }
   if (rows.empty()) return {};
-  return "<details><summary>Why frames were skipped or lost</summary><div class=\"scroll\"><table><thead><tr><th>variant</th><th>time [s]</th>"
-         "<th>reason</th></tr></thead><tbody>\n" + rows + "</tbody></table></div></details>\n";
+  return "<details><summary>Why frames were skipped or lost</summary><div class=\"scroll\"><table><thead><tr><th>variant</th><th>time "
+         "[s]</th>"
+         "<th>reason</th></tr></thead><tbody>\n" +
+         rows + "</tbody></table></div></details>\n";
 }
 
 inline std::string trajectory_section(const std::vector<Series>& all) {
-  return summary_table(all) + "<div class=\"grid\">\n" + trajectory_plots(all) + error_plot(all) + outcome_plot(all) + "</div>\n" + notes_of(all);
+  return summary_table(all) + "<div class=\"grid\">\n" + trajectory_plots(all) + error_plot(all) + outcome_plot(all) + "</div>\n" +
+         notes_of(all);
 }
 
 }  // namespace cfp_slam

@@ -143,7 +143,8 @@ inline std::string legend_of(const std::vector<Series>& all, bool with_truth) {
   return out + "</div>\n";
 }
 
-inline std::string figure(const std::string& title, const std::string& content, const std::string& caption = {}, const std::string& css = {}) {
+inline std::string figure(const std::string& title, const std::string& content, const std::string& caption = {},
+                          const std::string& css = {}) {
   return "<figure" + (css.empty() ? "" : " class=\"" + css + '"') + "><strong>" + escape(title) + "</strong>" + content +
          (caption.empty() ? "" : "<figcaption>" + escape(caption) + "</figcaption>") + "</figure>\n";
 }

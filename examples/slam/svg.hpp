@@ -20,8 +20,8 @@ class Plot {
   // Size of the drawing in units of which the page shows about one per CSS pixel. `title` is for screen readers.
   Plot(const std::string& title, Axis x, Axis y, double width = 480, double height = 270, double left = usual_left)
       : x_(std::move(x)), y_(std::move(y)), width_(width), height_(height), left_(left) {
-    out_ = "<svg class=\"plot\" viewBox=\"0 0 " + number(width, 0) + ' ' + number(height, 0) + "\" role=\"img\" aria-label=\"" + escape(title) +
-           "\">";
+    out_ = "<svg class=\"plot\" viewBox=\"0 0 " + number(width, 0) + ' ' + number(height, 0) + "\" role=\"img\" aria-label=\"" +
+           escape(title) + "\">";
     for (const Tick& tick : x_.marks) {
       line(px(tick.value), top, px(tick.value), height - bottom, "grid-line");
       text(px(tick.value), height - bottom + 15, tick.label, "middle");
@@ -32,7 +32,8 @@ class Plot {
     }
     text((left_ + width - right) / 2, height - 6, x_.label, "middle");
     const double middle = (top + height - bottom) / 2;
-    out_ += "<text transform=\"translate(12 " + number(middle, 1) + ") rotate(-90)\" text-anchor=\"middle\">" + escape(y_.label) + "</text>";
+    out_ +=
+        "<text transform=\"translate(12 " + number(middle, 1) + ") rotate(-90)\" text-anchor=\"middle\">" + escape(y_.label) + "</text>";
   }
 
   // Both axes in one scale, which the larger extent decides; height as needed, between 200 and 420.
@@ -90,8 +91,8 @@ class Plot {
 
   void dot(double x, double y, double radius, const std::string& style, const std::string& hint = {}) {
     if (!std::isfinite(x) || !std::isfinite(y)) return;
-    out_ += "<circle class=\"" + escape(style) + "\" cx=\"" + number(px(x), 1) + "\" cy=\"" + number(py(y), 1) + "\" r=\"" + number(radius, 1) +
-            "\">" + (hint.empty() ? std::string() : "<title>" + escape(hint) + "</title>") + "</circle>";
+    out_ += "<circle class=\"" + escape(style) + "\" cx=\"" + number(px(x), 1) + "\" cy=\"" + number(py(y), 1) + "\" r=\"" +
+            number(radius, 1) + "\">" + (hint.empty() ? std::string() : "<title>" + escape(hint) + "</title>") + "</circle>";
   }
 
   // In drawing units.
@@ -100,8 +101,8 @@ class Plot {
             "\" y2=\"" + number(v2, 1) + "\"/>";
   }
   void text(double u, double v, const std::string& words, const char* anchor, const std::string& style = {}) {
-    out_ += "<text" + (style.empty() ? std::string() : " class=\"" + escape(style) + '"') + " x=\"" + number(u, 1) + "\" y=\"" + number(v, 1) +
-            "\" text-anchor=\"" + anchor + "\">" + escape(words) + "</text>";
+    out_ += "<text" + (style.empty() ? std::string() : " class=\"" + escape(style) + '"') + " x=\"" + number(u, 1) + "\" y=\"" +
+            number(v, 1) + "\" text-anchor=\"" + anchor + "\">" + escape(words) + "</text>";
   }
 
   void shape(const std::string& path, const std::string& style) { out_ += "<path class=\"" + escape(style) + "\" d=\"" + path + "\"/>"; }

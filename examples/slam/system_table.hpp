@@ -47,7 +47,9 @@ inline std::vector<double> comparable(std::vector<double> values, const std::vec
   return values;
 }
 
-inline Cell cell_of(const Spread& spread, int decimals) { return {number(spread.median, decimals), range_text(spread, decimals), Rank::none}; }
+inline Cell cell_of(const Spread& spread, int decimals) {
+  return {number(spread.median, decimals), range_text(spread, decimals), Rank::none};
+}
 inline Cell cell_of(const Spread& spread, const Spread& coverage_percent, int decimals) {
   Cell cell = cell_of(spread, decimals);
   if (coverage_percent.known > 0) cell.range += (cell.range.empty() ? "" : "; ") + number(coverage_percent.median, 1) + " %";

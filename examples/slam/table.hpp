@@ -23,7 +23,8 @@ struct Table {
   std::string protocol;  // how the figures came about
   std::vector<std::string> header;
   std::vector<std::vector<Cell>> rows;
-  std::string note;  // below
+  std::string note;    // below
+  bool words = false;  // cells hold sentences, not figures
 };
 
 // Text in a Markdown table's cell: the pipe and what would be read as mark-up. An underscore inside a word is none.
@@ -52,7 +53,7 @@ inline std::string to_markdown(const Table& table) {
   out += '|';
   for (std::size_t c = 0; c < table.header.size(); ++c) {
     out += ' ' + markdown_escape(table.header[c]) + " |";
-    rule += c == 0 ? "---|" : "---:|";
+    rule += c == 0 || table.words ? "---|" : "---:|";
   }
   out += '\n' + rule + '\n';
   for (const auto& row : table.rows) {
@@ -70,7 +71,7 @@ inline std::string to_markdown(const Table& table) {
 inline std::string to_html(const Table& table) {
   std::string out = "<h3>" + escape(table.title) + "</h3>\n";
   if (!table.protocol.empty()) out += "<p class=\"note\">" + escape(table.protocol) + "</p>\n";
-  out += "<div class=\"scroll\"><table><thead><tr>";
+  out += "<div class=\"scroll\"><table" + std::string(table.words ? " class=\"words\"" : "") + "><thead><tr>";
   for (const std::string& h : table.header) out += "<th>" + escape(h) + "</th>";
   out += "</tr></thead><tbody>\n";
   for (const auto& row : table.rows) {

@@ -16,10 +16,10 @@ struct FakeRun {
   std::string sequence = "walking_halfsphere", variant = "cfp";
   std::uint64_t seed = 1;
   std::size_t frames = 300;
-  double drift_m = 0.01;     // size of the slow error
-  double bump_m = 0;         // an error that comes and goes in the middle, as a moving person makes it
+  double drift_m = 0.01;  // size of the slow error
+  double bump_m = 0;      // an error that comes and goes in the middle, as a moving person makes it
   std::size_t lost_from = 0, lost_count = 0;
-  double sharpness = 3;      // how well the probabilities separate
+  double sharpness = 3;  // how well the probabilities separate
   bool with_truth = true, with_boxes = true;
 };
 
@@ -87,10 +87,12 @@ inline cfp_slam::RunRecord fake_run(const FakeRun& fake) {
     frame.image = "rgb/" + std::to_string(k) + ".png";
     cfp::SE3<double> T = T_map_world * fake_truth(t);
     const double s = t / (0.2 + static_cast<double>(fake.frames) / 30), middle = (s - 0.55) / 0.1;
-    T.translation += fake.drift_m * cfp::Vector3<double>(std::sin(5 * s + static_cast<double>(fake.seed)), std::sin(9 * s), std::cos(7 * s)) +
-                     fake.bump_m * std::exp(-middle * middle) * cfp::Vector3<double>(1, 0.6, -0.2) +
-                     0.15 * fake.drift_m * cfp::Vector3<double>(random.normal(), random.normal(), random.normal());
-    T.rotation = T.rotation * cfp::so3_exp(cfp::Vector3<double>(0.1 * fake.drift_m * random.normal(), 0.3 * fake.drift_m * std::sin(4 * s), 0));
+    T.translation +=
+        fake.drift_m * cfp::Vector3<double>(std::sin(5 * s + static_cast<double>(fake.seed)), std::sin(9 * s), std::cos(7 * s)) +
+        fake.bump_m * std::exp(-middle * middle) * cfp::Vector3<double>(1, 0.6, -0.2) +
+        0.15 * fake.drift_m * cfp::Vector3<double>(random.normal(), random.normal(), random.normal());
+    T.rotation =
+        T.rotation * cfp::so3_exp(cfp::Vector3<double>(0.1 * fake.drift_m * random.normal(), 0.3 * fake.drift_m * std::sin(4 * s), 0));
     frame.T_world_cam = T;
     const bool lost = k >= fake.lost_from && k < fake.lost_from + fake.lost_count;
     frame.outcome = lost ? cfp_slam::Outcome::lost : cfp_slam::Outcome::tracked;
@@ -108,7 +110,8 @@ inline cfp_slam::RunRecord fake_run(const FakeRun& fake) {
     if (weighted && fake.with_boxes) fake_boxes(fake, k, random, frame, run);
     if (fake.with_truth) run.truth.push_back({frame.time_s + 0.003, fake_truth(t)});
     const auto take = [&](Module module, double ms) {
-      frame.milliseconds[static_cast<std::size_t>(module)] = ms * (1 + 0.12 * std::abs(random.normal())) + (random.uniform() < 0.02 ? ms : 0);
+      frame.milliseconds[static_cast<std::size_t>(module)] =
+          ms * (1 + 0.12 * std::abs(random.normal())) + (random.uniform() < 0.02 ? ms : 0);
     };
     if (frame.outcome != cfp_slam::Outcome::skipped) {
       take(Module::reading, 9);
