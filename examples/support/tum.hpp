@@ -2,13 +2,16 @@
 // wrong with a file is thrown as std::runtime_error that says file and line.
 #pragma once
 
+#include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -95,27 +98,80 @@ inline std::vector<TumImage> read_tum_list(const std::filesystem::path& file) {
   return images;
 }
 
-/// camera.txt: `fx fy cx cy width height depth_units_per_metre`.
+/// The camera of a recording, distortion as in OpenCV (k3 last); all zero: undistorted images.
 struct TumCamera {
   double fx = 0, fy = 0, cx = 0, cy = 0;
   int width = 0, height = 0;
   double depth_units_per_metre = 5000;
+  double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
+
+  [[nodiscard]] bool distorted() const { return k1 != 0 || k2 != 0 || p1 != 0 || p2 != 0 || k3 != 0; }
 };
+
+/// camera.txt: one line `fx fy cx cy width height depth_units_per_metre [k1 k2 p1 p2 k3]`. The distortion may stand in a comment
+/// instead, after the words `k1 k2 p1 p2 k3 =`, where programs that read seven numbers do not see it.
 inline TumCamera read_tum_camera(const std::filesystem::path& file) {
   TumCamera camera;
   int cameras = 0;
-  for_each_line(file, [&](int line, const std::vector<std::string>& words) {
-    if (words.size() != 7) bad_line(file, line, "expected 'fx fy cx cy width height depth_units_per_metre'");
-    if (++cameras > 1) bad_line(file, line, "a second camera");
-    double v[7];
-    for (std::size_t i = 0; i < 7; ++i) {
-      v[i] = parse_number(file, line, words[i], "camera");
-      if (!cfp::is_finite(v[i]) || (i != 2 && i != 3 && !(v[i] > 0 && v[i] < 1e6))) bad_line(file, line, "'" + words[i] + "' out of range");
+  const auto parse = [&](int line, const std::vector<std::string>& words) {
+    std::vector<double> v;
+    for (const std::string& word : words) {
+      v.push_back(parse_number(file, line, word, "camera"));
+      if (!cfp::is_finite(v.back()) || !(std::abs(v.back()) < 1e6)) bad_line(file, line, "'" + word + "' out of range");
     }
-    camera = {v[0], v[1], v[2], v[3], static_cast<int>(v[4]), static_cast<int>(v[5]), v[6]};
+    return v;
+  };
+  for_each_line(file, [&](int line, const std::vector<std::string>& words) {
+    if (words.size() != 7 && words.size() != 12)
+      bad_line(file, line, "expected 'fx fy cx cy width height depth_units_per_metre [k1 k2 p1 p2 k3]'");
+    if (++cameras > 1) bad_line(file, line, "a second camera");
+    std::vector<double> v = parse(line, words);
+    for (const std::size_t i : {0U, 1U, 4U, 5U, 6U}) {
+      if (!(v[i] > 0)) bad_line(file, line, "'" + words[i] + "' out of range");
+    }
+    for (const std::size_t i : {4U, 5U}) {
+      if (!(v[i] == std::floor(v[i]))) bad_line(file, line, "'" + words[i] + "' is no number of pixels");
+    }
+    v.resize(12, 0);
+    camera = {v[0], v[1], v[2], v[3], static_cast<int>(v[4]), static_cast<int>(v[5]), v[6], v[7], v[8], v[9], v[10], v[11]};
   });
   if (cameras == 0) throw std::runtime_error(file.string() + ": no camera in it");
+  std::ifstream stream(file);
+  std::string text;
+  for (int line = 1; std::getline(stream, text); ++line) {
+    static const std::string key = "k1 k2 p1 p2 k3 =";
+    const std::size_t comment = text.find('#'), at = text.find(key);
+    if (comment == std::string::npos || at == std::string::npos || at < comment) continue;
+    std::istringstream split(text.substr(at + key.size()));
+    std::vector<std::string> words(5);
+    for (std::string& word : words) split >> word;
+    while (!words[4].empty() && (words[4].back() == ')' || words[4].back() == '.')) words[4].pop_back();
+    const std::vector<double> d = parse(line, words);
+    if (camera.distorted()) bad_line(file, line, "a second distortion");
+    std::tie(camera.k1, camera.k2, camera.p1, camera.p2, camera.k3) = std::tie(d[0], d[1], d[2], d[3], d[4]);
+  }
   return camera;
+}
+
+/// The last part of a folder's path, trailing slash and `.` resolved.
+inline std::string folder_name(const std::filesystem::path& folder) {
+  const std::filesystem::path whole = std::filesystem::weakly_canonical(folder);
+  return (whole.has_filename() ? whole : whole.parent_path()).filename().string();
+}
+
+/// The calibration that the TUM RGB-D data set publishes for its three cameras, told from the folder's name (`freiburg2` or `fr2`
+/// in it): the drivers' depth is registered to the colour image, fr3's images are undistorted. Throws when the name tells nothing.
+inline TumCamera published_tum_camera(const std::filesystem::path& folder) {
+  const std::string name = folder_name(folder);
+  const auto is = [&](const char* number) {
+    return name.find(std::string("freiburg") + number) != std::string::npos || name.find(std::string("fr") + number) != std::string::npos;
+  };
+  if (is("1")) return {517.3, 516.5, 318.6, 255.3, 640, 480, 5000, 0.2624, -0.9531, -0.0054, 0.0026, 1.1633};
+  if (is("2")) return {520.9, 521.0, 325.1, 249.7, 640, 480, 5000, 0.2312, -0.7849, -0.0033, -0.0001, 0.9172};
+  if (is("3")) return {535.4, 539.2, 320.1, 247.6, 640, 480, 5000};
+  throw std::runtime_error(
+      folder.string() +
+      ": no camera.txt (fx fy cx cy width height depth_units_per_metre), and the name tells no TUM camera (fr1, fr2, fr3)");
 }
 
 }  // namespace cfp_examples

@@ -1,0 +1,237 @@
+// An RGB-D recording in the format of the TUM data set: opened with every list checked, read frame by frame. What cannot be read is
+// a frame with a note that says why, never an exception; what cannot be parsed refuses the recording with file and line.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <filesystem>
+#include <future>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "../support/tum.hpp"
+#include "cfp/geometry/box.hpp"
+#include "cfp/geometry/radial_tangential_camera.hpp"
+
+namespace cfp_slam {
+
+struct SequenceFrame {
+  double time_s = 0;
+  std::string image;    // file of the colour image, relative to the folder
+  cv::Mat bgr;          // 8-bit
+  cv::Mat depth;        // 16-bit, units of camera.txt, 0 = none
+  cv::Mat labels;       // 8-bit: 0 static, 1 moving, 2 part of a person but still; empty: the recording has none
+  bool usable = false;  // colour and depth are there, of the camera's size
+  std::string note;     // what is wrong, with file and line
+  double reading_ms = 0;
+};
+
+// A person in truth (boxes.txt of cfp_synthetic).
+struct TrueBox {
+  double time_s = 0;
+  int identity = 0;
+  cfp::Box<float> box;
+  double visible_fraction = 0;
+  int pixels = 0;
+};
+
+class Sequence {
+ public:
+  // Reads camera.txt (or takes the published TUM camera that the folder's name tells), rgb.txt, depth.txt and, when they are there,
+  // groundtruth.txt or pseudo_groundtruth.txt, labels.txt and boxes.txt. Lists are put in order; of equal stamps the first line stays.
+  // Colour and depth are matched one to one, nearest first, when nearer than max_difference_s, as by TUM's associate.py.
+  explicit Sequence(std::filesystem::path folder, double max_difference_s = 0.02) : folder_(std::move(folder)) {
+    camera_ = std::filesystem::exists(folder_ / "camera.txt") ? cfp_examples::read_tum_camera(folder_ / "camera.txt")
+                                                              : cfp_examples::published_tum_camera(folder_);
+    List colors = read_list("rgb.txt");
+    const List depths = read_list("depth.txt");
+    drop_absent_ends(colors);
+    if (colors.empty()) throw std::runtime_error((folder_ / "rgb.txt").string() + ": no image of it is there");
+    for (auto& color : colors) frames_.push_back({std::move(color), {}, {}});
+    match(depths, max_difference_s, &Frame::depth);
+    if (std::filesystem::exists(folder_ / "labels.txt")) match(read_list("labels.txt"), 0.001, &Frame::labels);
+    for (const char* name : {"groundtruth.txt", "pseudo_groundtruth.txt"}) {
+      if (!truth_file_.empty() || !std::filesystem::exists(folder_ / name)) continue;
+      truth_ = cfp_examples::read_tum_trajectory(folder_ / name);
+      truth_file_ = name;
+    }
+    if (std::filesystem::exists(folder_ / "boxes.txt")) read_true_boxes();
+  }
+
+  [[nodiscard]] std::size_t size() const { return frames_.size(); }
+  [[nodiscard]] double time_s(std::size_t i) const { return frames_.at(i).color.time_s; }
+  [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
+  [[nodiscard]] std::string name() const { return cfp_examples::folder_name(folder_); }
+  [[nodiscard]] const cfp_examples::TumCamera& calibration() const { return camera_; }
+  [[nodiscard]] cfp::RadialTangentialCamera<double> camera() const {
+    return {camera_.fx, camera_.fy, camera_.cx, camera_.cy, camera_.k1, camera_.k2, camera_.p1, camera_.p2, camera_.k3};
+  }
+  // Camera to world, for cfp's evaluation; empty: none known.
+  [[nodiscard]] const std::vector<cfp::StampedPose<double>>& truth() const { return truth_; }
+  [[nodiscard]] const std::string& truth_file() const { return truth_file_; }
+  // What was found odd about the lists, each with file and line.
+  [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
+
+  [[nodiscard]] std::vector<TrueBox> true_boxes(std::size_t i) const {
+    const auto from = std::lower_bound(true_boxes_.begin(), true_boxes_.end(), time_s(i) - 0.001,
+                                       [](const TrueBox& b, double t) { return b.time_s < t; });
+    const auto to = std::find_if(from, true_boxes_.end(), [&](const TrueBox& b) { return b.time_s > time_s(i) + 0.001; });
+    return {from, to};
+  }
+
+  // Frame i < size(). The same from any thread, at any time, as long as the files are.
+  [[nodiscard]] SequenceFrame load(std::size_t i) const {
+    const auto start = std::chrono::steady_clock::now();
+    const Frame& frame = frames_.at(i);
+    SequenceFrame out;
+    out.time_s = frame.color.time_s;
+    out.image = frame.color.file;
+    const auto note = [&](const char* list, const cfp_examples::TumImage& image, const std::string& what) {
+      out.note += (out.note.empty() ? "" : "; ") + (folder_ / list).string() + ":" + std::to_string(image.line) + ": " + what;
+    };
+    const auto read = [&](const char* list, const cfp_examples::TumImage& image, int flags, int type, const char* type_name,
+                          cv::Mat& picture) {
+      picture = read_image(folder_ / image.file, flags);
+      const std::string size = std::to_string(picture.cols) + "x" + std::to_string(picture.rows);
+      if (picture.empty()) {
+        note(list, image, image.file + " cannot be read");
+      } else if (picture.cols != camera_.width || picture.rows != camera_.height) {
+        note(list, image,
+             image.file + " is " + size + ", the camera's images are " + std::to_string(camera_.width) + "x" +
+                 std::to_string(camera_.height));
+        picture.release();
+      } else if (picture.type() != type) {
+        note(list, image, image.file + " is not " + type_name);
+        picture.release();
+      }
+    };
+    read("rgb.txt", frame.color, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION, CV_8UC3, "8-bit colour", out.bgr);
+    if (frame.depth.line > 0) {
+      read("depth.txt", frame.depth, cv::IMREAD_UNCHANGED, CV_16UC1, "16-bit grey", out.depth);
+    } else {
+      note("rgb.txt", frame.color, "no depth image near its time");
+    }
+    if (frame.labels.line > 0) read("labels.txt", frame.labels, cv::IMREAD_UNCHANGED, CV_8UC1, "8-bit grey", out.labels);
+    out.usable = !out.bgr.empty() && !out.depth.empty();
+    out.reading_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    return out;
+  }
+
+ private:
+  using List = std::vector<cfp_examples::TumImage>;
+  struct Frame {
+    cfp_examples::TumImage color, depth, labels;  // line 0: none
+  };
+
+  // In order of time, one line per stamp.
+  List read_list(const char* name) {
+    List list = cfp_examples::read_tum_list(folder_ / name);
+    const auto remark = [&](const cfp_examples::TumImage& image, const char* what) {
+      notes_.push_back((folder_ / name).string() + ":" + std::to_string(image.line) + ": " + what);
+    };
+    for (const auto& image : list) {
+      if (!cfp::is_finite(image.time_s)) cfp_examples::bad_line(folder_ / name, image.line, "the timestamp is not finite");
+    }
+    const auto earlier = [](const auto& a, const auto& b) { return a.time_s < b.time_s; };
+    const auto unordered = std::is_sorted_until(list.begin(), list.end(), earlier);
+    if (unordered != list.end()) {
+      remark(*unordered, "earlier than the line before; the list is put in order");
+      std::stable_sort(list.begin(), list.end(), earlier);
+    }
+    const auto repeated = [&](const auto& a, const auto& b) {
+      if (a.time_s == b.time_s) remark(b, "a second line with this timestamp is left out");
+      return a.time_s == b.time_s;
+    };
+    list.erase(std::unique(list.begin(), list.end(), repeated), list.end());
+    return list;
+  }
+
+  // An excerpt of a recording comes with the whole list: images that are not there before the first and after the last that is
+  // belong to no frame. Between those they are frames that cannot be read.
+  void drop_absent_ends(List& list) {
+    const auto there = [&](const auto& image) { return is_image_file(folder_ / image.file); };
+    const auto first = std::find_if(list.begin(), list.end(), there);
+    const auto last = std::find_if(list.rbegin(), std::make_reverse_iterator(first), there).base();
+    const auto absent = (first - list.begin()) + (list.end() - last);
+    if (absent > 0)
+      notes_.push_back((folder_ / "rgb.txt").string() + ": " + std::to_string(absent) + " of " + std::to_string(list.size()) +
+                       " images, before the first and after the last, are not there");
+    list = List(first, last);
+  }
+
+  void match(const List& list, double max_difference_s, cfp_examples::TumImage Frame::*member) {
+    std::vector<cfp::StampedPose<double>> colors, others;  // the association of the evaluation does for images, too
+    for (const Frame& frame : frames_) colors.push_back({frame.color.time_s, {}});
+    for (const auto& image : list) others.push_back({image.time_s, {}});
+    cfp::AssociationOptions options;
+    options.max_difference_s = max_difference_s;
+    cfp::AssociationWorkspace workspace;
+    std::vector<cfp::TimeMatch> matches;
+    using View = cfp::span<const cfp::StampedPose<double>>;
+    cfp::associate(View(colors), View(others), options, workspace, matches);
+    for (const cfp::TimeMatch& m : matches) frames_[m.first].*member = list[m.second];
+  }
+
+  void read_true_boxes() {
+    const auto file = folder_ / "boxes.txt";
+    cfp_examples::for_each_line(file, [&](int line, const std::vector<std::string>& words) {
+      if (words.size() != 8) cfp_examples::bad_line(file, line, "expected 'timestamp identity x1 y1 x2 y2 visible_fraction pixels'");
+      double v[8];
+      for (std::size_t i = 0; i < 8; ++i) {
+        v[i] = cfp_examples::parse_number(file, line, words[i], "box");
+        if (!(std::abs(v[i]) < (i == 0 ? 1e18 : 1e9))) cfp_examples::bad_line(file, line, "'" + words[i] + "' out of range");
+      }
+      true_boxes_.push_back({v[0], int(v[1]), {float(v[2]), float(v[3]), float(v[4]), float(v[5])}, v[6], int(v[7])});
+    });
+    std::stable_sort(true_boxes_.begin(), true_boxes_.end(), [](const TrueBox& a, const TrueBox& b) { return a.time_s < b.time_s; });
+  }
+
+  // A pipe under an image's name would be waited for.
+  static bool is_image_file(const std::filesystem::path& file) {
+    std::error_code ignored;
+    return std::filesystem::is_regular_file(file, ignored);
+  }
+  static cv::Mat read_image(const std::filesystem::path& file, int flags) {
+    if (!is_image_file(file)) return {};
+    try {
+      return cv::imread(file.string(), flags);
+    } catch (const cv::Exception&) {  // a header that states a monstrous size
+      return {};
+    }
+  }
+
+  std::filesystem::path folder_;
+  cfp_examples::TumCamera camera_;
+  std::vector<Frame> frames_;
+  std::vector<cfp::StampedPose<double>> truth_;
+  std::string truth_file_;
+  std::vector<TrueBox> true_boxes_;
+  std::vector<std::string> notes_;
+};
+
+// Loads frame i + 1 in the background while frame i is worked on. The frames are those of Sequence::load.
+class PrefetchingReader {
+ public:
+  explicit PrefetchingReader(const Sequence& sequence) : sequence_(sequence) {}  // the sequence must stay
+
+  SequenceFrame load(std::size_t i) {
+    SequenceFrame frame = ahead_.valid() && ahead_index_ == i ? ahead_.get() : sequence_.load(i);
+    if (i + 1 < sequence_.size()) {
+      ahead_index_ = i + 1;
+      ahead_ = std::async([&sequence = sequence_, next = i + 1] { return sequence.load(next); });
+    }
+    return frame;
+  }
+
+ private:
+  const Sequence& sequence_;
+  std::size_t ahead_index_ = 0;
+  std::future<SequenceFrame> ahead_;
+};
+
+}  // namespace cfp_slam
