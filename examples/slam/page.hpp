@@ -48,12 +48,14 @@ h3{font-size:1.05rem;margin:1.8rem 0 .3rem}
 p{margin:.3rem 0 .8rem;max-width:75ch}
 .note,figcaption,caption{color:var(--soft);font-size:.87rem}
 code{font-size:.92em}
-.grid{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,330px),1fr));gap:1rem}
-.pictures{grid-template-columns:repeat(auto-fill,minmax(min(100%,330px),1fr))}
+.grid{columns:2 440px;column-gap:1rem}
+.grid>figure{margin:0 0 1rem;break-inside:avoid}
+.pictures{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,330px),1fr));gap:1rem;align-items:start}
 figure{margin:0;padding:.7rem;background:var(--card);border:1px solid var(--line);border-radius:8px;min-width:0}
 figcaption{margin:.35rem 0 0}
 figure>strong{display:block;margin-bottom:.2rem;font-size:.95rem}
 figure img{display:block;width:100%;height:auto;border-radius:4px}
+details{margin:1rem 0}summary{cursor:pointer;margin-bottom:.6rem;font-weight:600}
 .scroll{overflow-x:auto;margin:.4rem 0 1rem}
 table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.9rem}
 th,td{padding:.28rem .6rem;text-align:right;border-bottom:1px solid var(--line);white-space:nowrap}
@@ -74,6 +76,7 @@ td b{font-weight:700}td u{text-underline-offset:2px}
 .swatch{width:.9em;height:.9em;display:inline-block;border-radius:2px}
 .ramp{width:5em;height:.8em;display:inline-block;border-radius:2px;background:linear-gradient(90deg,#f00,#7f7f00,#0f0)}
 svg.plot{display:block;width:100%;height:auto;font-size:11px}
+@media(max-width:600px){svg.plot{font-size:13px}}
 svg text{fill:var(--soft)}
 svg .value{fill:var(--ink)}
 .grid-line{stroke:var(--grid);stroke-width:1}

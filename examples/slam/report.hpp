@@ -40,7 +40,7 @@ inline std::string gallery(const std::vector<Series>& all) {
       "<span><i class=\"swatch\" style=\"border:2px solid #ff8c00\"></i>compensated box</span><span>keypoints inside boxes: moving "
       "<i class=\"ramp\"></i> static</span><span><i class=\"swatch\" style=\"border:2px solid #a0a0a0;border-radius:50%\"></i>outside "
       "boxes</span></div>\n"
-      "<div class=\"grid pictures\">\n";
+      "<div class=\"pictures\">\n";
   for (const Entry& entry : entries) {
     const Series& s = all[entry.series];
     const std::string caption =

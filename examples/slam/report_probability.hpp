@@ -118,8 +118,7 @@ inline std::string objects_over_time(const Series& series, double start_s, doubl
     }
   }
   if (!any) return {};
-  return figure("O of the boxes over time: " + series.name, plot.svg(),
-                "Filled: detected boxes; rings: compensated ones. Boxes without an O are left out.", "s" + number(series.style));
+  return figure("O of the boxes over time: " + series.name, plot.svg(), {}, "s" + number(series.style));
 }
 
 // Reliability: a number that means what it says lies on the diagonal.
@@ -165,16 +164,34 @@ inline std::string reliability_plot(const Series& series) {
           "<div class=\"scroll\"><table><thead><tr><th></th><th>AUC</th><th>Brier</th><th>ECE</th><th>static</th><th>samples</th></tr>"
           "</thead><tbody>\n" +
           rows + "</tbody></table></div>",
-      "The area of a dot grows with the share of the samples in its tenth. AUC 1, Brier 0, ECE 0 are best.", "s" + number(series.style));
+      {}, "s" + number(series.style));
 }
 
+// The curves over time fill a screen per variant: folded away when there are many.
 inline std::string probability_section(const std::vector<Series>& all) {
   const double start = start_of(all), end = end_of(all);
-  std::string figures = histogram_plot(all);
-  for (const Series& s : all) figures += reliability_plot(s);
-  for (const Series& s : all) figures += histogram_over_time(s, start, end) + objects_over_time(s, start, end);
-  if (figures.empty()) return "<h3>Static probability</h3>\n<p class=\"note\">No boxes, so no probabilities.</p>\n";
-  return "<h3>Static probability</h3>\n<div class=\"grid\">\n" + figures + "</div>\n";
+  std::string figures = histogram_plot(all), keypoints, objects;
+  for (const Series& s : all) {
+    figures += reliability_plot(s);
+    keypoints += histogram_over_time(s, start, end);
+    objects += objects_over_time(s, start, end);
+  }
+  if (figures.empty() && keypoints.empty() && objects.empty()) {
+    return "<h3>Static probability</h3>\n<p class=\"note\">No boxes, so no probabilities.</p>\n";
+  }
+  std::string out =
+      "<h3>Static probability</h3>\n<p class=\"note\">1 = static throughout. K: keypoint, M: map point, O: object. Reliability: what means "
+      "what it says lies on the diagonal; a dot's area grows with the samples in its tenth. AUC 1, Brier 0, ECE 0 are best.</p>\n"
+      "<div class=\"grid\">\n" +
+      figures + "</div>\n";
+  if (!(keypoints + objects).empty()) {
+    out += std::string("<details") + (all.size() <= 3 ? " open" : "") +
+           "><summary>K and O over time, per variant</summary>\n<p class=\"note\">K: the stronger the colour, the larger the share of the "
+           "frame's in-box "
+           "keypoints. O: dots are detected boxes, rings compensated ones; boxes without an O are left out.</p>\n<div class=\"grid\">\n" +
+           keypoints + objects + "</div></details>\n";
+  }
+  return out;
 }
 
 }  // namespace cfp_slam
