@@ -69,7 +69,7 @@ struct Axis {
   // 0 to 1 inside; what lies outside stays at the border.
   [[nodiscard]] double place(double value) const {
     const double share = logarithmic ? std::log((std::max)(value, low) / low) / std::log(high / low) : (value - low) / (high - low);
-    return (std::min)((std::max)(share, 0.0), 1.0);
+    return (std::min)((std::max)(0.0, share), 1.0);  // in this order not a number is 0
   }
 };
 

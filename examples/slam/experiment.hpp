@@ -117,7 +117,7 @@ inline std::string protocol_of(const std::vector<RunSummary>& runs, const std::s
   return "Alignment " + joined(alignments) + "; RPE over a fixed interval of " + joined(delta_texts) + "; n = " + range(seeds) +
          " seeds per figure; " + range(frames) + " frames per sequence; detector: " + joined(detectors) +
          "; machine: " + (machine.empty() ? "–" : machine) +
-         ". Figures are medians over the seeds, in brackets the smallest and the largest.";
+         ". Figures are medians over the seeds, beside them the smallest and the largest.";
 }
 
 }  // namespace cfp_slam

@@ -37,7 +37,7 @@ inline std::string latency_bars(const Series& series) {
   Plot plot("Time per module, " + series.name, linear_axis(time, "ms per frame"), row_axis(names), 480, height, 136);
   for (std::size_t k = 0; k < modules.size(); ++k) {
     const double row = static_cast<double>(k), median = s.median_ms[modules[k]], p95 = s.p95_ms[modules[k]];
-    plot.rectangle(0, row + 0.22, median, row + 0.78, series.css("bar"));
+    plot.shape(plot.box(0, row + 0.22, median, row + 0.78), series.css("bar"));
     const double middle = plot.py(row + 0.5);
     plot.line(plot.px(median), middle, plot.px(p95), middle, "whisker");
     plot.line(plot.px(p95), middle - 4, plot.px(p95), middle + 4, "whisker");
@@ -75,7 +75,7 @@ inline std::string latency_over_time(const std::vector<Series>& all) {
   ms.add(1.15 * quantile(every, 0.99));
   Plot plot("Time of the tracking thread", linear_axis(time, "time [s]"), linear_axis(ms, "ms per frame"));
   plot.line(Plot::usual_left, plot.py(1000.0 / 30), plot.width() - Plot::right, plot.py(1000.0 / 30), "guide");
-  for (std::size_t k = 0; k < all.size(); ++k) plot.curve(curves[k].time_s, curves[k].value, all[k].css("curve"));
+  for (const std::size_t k : drawing_order(all)) plot.curve(curves[k].time_s, curves[k].value, all[k].css("curve"));
   return figure("Time of the tracking thread", plot.svg(),
                 "Dashed: 33.3 ms, a camera of 30 frames/s. Peaks above the 99th percentile are cut at the border.");
 }
@@ -85,7 +85,8 @@ inline std::string latency_section(const std::vector<Series>& all) {
   for (const Series& s : all) figures += latency_bars(s);
   if (figures.empty()) return {};
   return "<h3>Time</h3>\n<p class=\"note\">Bar and figure: median over the frames in which the module ran; whisker: 95th percentile. "
-         "Diamond and brackets: the paper's mean on an Intel i7, its detector on an RTX 3060. The paper's 17.93 ms for the object probability "
+         "Diamond and brackets: the paper's mean on an Intel i7, its detector on an RTX 3060. The paper's 17.93 ms for the object "
+         "probability "
          "hold the optical flow, which has its own bar here. Reading, detection and bundle adjustment run beside the tracking thread.</p>\n"
          "<div class=\"grid\">\n" +
          figures + "</div>\n";

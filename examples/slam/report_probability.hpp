@@ -50,7 +50,7 @@ inline std::string histogram_plot(const std::vector<Series>& all) {
   unit.add(1);
   share.add(share.high * 1.05);
   Plot plot("K of the keypoints inside boxes", linear_axis(unit, "K, 1 = static"), linear_axis(share, "share of the keypoints"));
-  for (std::size_t k = 0; k < all.size(); ++k) {
+  for (const std::size_t k : drawing_order(all)) {
     std::vector<double> x, y;
     for (std::size_t b = 0; b < histogram_bins; ++b) {
       for (const std::size_t edge : {b, b + 1}) {
@@ -87,18 +87,20 @@ inline std::string histogram_over_time(const Series& series, double start_s, dou
   unit.add(0);
   unit.add(1);
   Plot plot("K over time, " + series.name, linear_axis(time, "time [s]"), linear_axis(unit, "K, 1 = static"), 480, 200);
+  // One shape per strength of the colour. The square root keeps small shares visible.
+  constexpr int strengths = 12;
+  std::array<std::string, strengths + 1> shapes;
   const double step = (end_s - start_s) / static_cast<double>(columns);
   for (std::size_t c = 0; c < columns; ++c) {
     double sum = 0;
     for (const double n : cells[c]) sum += n;
     for (std::size_t b = 0; b < histogram_bins && sum > 0; ++b) {
-      // The square root keeps small shares visible.
-      const double opacity = std::sqrt(cells[c][b] / sum);
-      if (opacity < 0.03) continue;
-      plot.rectangle(step * static_cast<double>(c), static_cast<double>(b) / histogram_bins, step * static_cast<double>(c + 1),
-                     static_cast<double>(b + 1) / histogram_bins, series.css("bar"), opacity);
+      const auto strength = static_cast<std::size_t>(std::lround(strengths * std::sqrt(cells[c][b] / sum)));
+      shapes[strength] += plot.box(step * static_cast<double>(c), static_cast<double>(b) / histogram_bins,
+                                   step * static_cast<double>(c + 1), static_cast<double>(b + 1) / histogram_bins);
     }
   }
+  for (std::size_t k = 1; k < shapes.size(); ++k) plot.shape(shapes[k], series.css("bar"), static_cast<double>(k) / strengths);
   return figure("K inside boxes over time: " + series.name, plot.svg(), {}, "s" + number(series.style));
 }
 
@@ -109,15 +111,17 @@ inline std::string objects_over_time(const Series& series, double start_s, doubl
   unit.add(0);
   unit.add(1);
   Plot plot("O of the boxes over time, " + series.name, linear_axis(time, "time [s]"), linear_axis(unit, "O, 1 = static"), 480, 200);
-  bool any = false;
+  std::string detected, compensated;
   for (const FrameRecord& frame : series.run->frames) {
     for (const BoxRecord& box : frame.boxes) {
-      if (!box.object_known) continue;
-      any = true;
-      plot.dot(frame.time_s - start_s, box.object_probability, 2.2, series.css(box.compensated ? "ring" : "dot"));
+      if (!box.object_known || !std::isfinite(frame.time_s) || !std::isfinite(box.object_probability)) continue;
+      const std::string point = plot.point(frame.time_s - start_s, box.object_probability);
+      (box.compensated ? compensated : detected) += point + (box.compensated ? "m-3-3l6 6m0-6l-6 6" : "h0");
     }
   }
-  if (!any) return {};
+  if (detected.empty() && compensated.empty()) return {};
+  plot.shape(detected, series.css("dots"));
+  plot.shape(compensated, series.css("crosses"));
   return figure("O of the boxes over time: " + series.name, plot.svg(), {}, "s" + number(series.style));
 }
 
@@ -188,7 +192,7 @@ inline std::string probability_section(const std::vector<Series>& all) {
     out += std::string("<details") + (all.size() <= 3 ? " open" : "") +
            "><summary>K and O over time, per variant</summary>\n<p class=\"note\">K: the stronger the colour, the larger the share of the "
            "frame's in-box "
-           "keypoints. O: dots are detected boxes, rings compensated ones; boxes without an O are left out.</p>\n<div class=\"grid\">\n" +
+           "keypoints. O: dots are detected boxes, crosses compensated ones; boxes without an O are left out.</p>\n<div class=\"grid\">\n" +
            keypoints + objects + "</div></details>\n";
   }
   return out;

@@ -38,8 +38,8 @@ inline std::string row_of(const Series& series) {
 
 inline std::string summary_table(const std::vector<Series>& all) {
   std::string out =
-      "<div class=\"scroll\"><table><thead><tr><th>variant</th><th>ATE rmse [m]</th><th>median</th><th>max</th><th>RPE [m/s]</th>"
-      "<th>RPE [°/s]</th><th>coverage: matched poses</th><th>lost / skipped / relocalised frames</th><th>largest gap [s]</th>"
+      "<div class=\"scroll\"><table><thead><tr><th>variant</th><th>ATE rmse [m]</th><th>median</th><th>max</th><th>RPE rmse [m/s]</th>"
+      "<th>RPE rmse [°/s]</th><th>coverage: matched poses</th><th>lost / skipped / relocalised frames</th><th>largest gap [s]</th>"
       "<th>alignment</th><th>ms per frame, median / p95</th><th>keyframes / map points</th></tr></thead><tbody>\n";
   for (const Series& s : all) out += row_of(s);
   return out +
@@ -50,8 +50,13 @@ inline std::string summary_table(const std::vector<Series>& all) {
          "thread, the detector only as far as it was waited for.</p>\n";
 }
 
-// Seen along the two shorter of the three directions of the motion, in metres and one scale.
-inline std::string trajectory_plots(const std::vector<Series>& all) {
+// Truth and variants in metres and one scale, the longest direction of the motion to the right: first the view that shows most, along
+// the shortest direction, then the one from the side.
+struct View {
+  std::string title;
+  Plot plot;
+};
+inline std::vector<View> trajectory_views(const std::vector<Series>& all) {
   const double start = start_of(all), end = end_of(all);
   Positions truth;
   std::vector<Positions> estimates;
@@ -65,25 +70,26 @@ inline std::string trajectory_plots(const std::vector<Series>& all) {
       for (const double v : p.coordinate[c]) range[c].add(v);
     }
   };
+  const bool with_truth = !truth.coordinate[0].empty();
   extend(truth);
+  if (!with_truth) std::for_each(estimates.begin(), estimates.end(), extend);
   std::array<std::size_t, 3> axes{0, 1, 2};
-  if (truth.coordinate[0].empty()) std::for_each(estimates.begin(), estimates.end(), extend);
   std::stable_sort(axes.begin(), axes.end(), [&](std::size_t a, std::size_t b) { return range[a].size() > range[b].size(); });
-  if (!truth.coordinate[0].empty()) std::for_each(estimates.begin(), estimates.end(), extend);
+  if (with_truth) std::for_each(estimates.begin(), estimates.end(), extend);
 
   constexpr std::array<const char*, 3> names{"x [m]", "y [m]", "z [m]"};
-  std::string out;
-  for (const std::size_t second : {axes[1], axes[2]}) {
-    const std::size_t first = axes[0];
-    const std::string title = std::string("Trajectory, ") + names[first][0] + " and " + names[second][0];
-    Plot plot = Plot::equal_scale(title, range[first], range[second], names[first], names[second]);
-    plot.curve(truth.coordinate[first], truth.coordinate[second], "truth");
-    for (std::size_t k = 0; k < all.size(); ++k) {
-      plot.curve(estimates[k].coordinate[first], estimates[k].coordinate[second], all[k].css("curve"));
+  std::vector<View> views;
+  for (const std::size_t up : {axes[1], axes[2]}) {
+    const std::size_t right = axes[0];
+    const std::string title = std::string("Trajectory, ") + names[right][0] + " and " + names[up][0];
+    Plot plot = Plot::equal_scale(title, range[right], range[up], names[right], names[up]);
+    plot.curve(truth.coordinate[right], truth.coordinate[up], "truth");
+    for (const std::size_t k : drawing_order(all)) {
+      plot.curve(estimates[k].coordinate[right], estimates[k].coordinate[up], all[k].css("curve"));
     }
-    out += figure(title, plot.svg());
+    views.push_back({title, plot});
   }
-  return out;
+  return views;
 }
 
 inline std::string error_plot(const std::vector<Series>& all) {
@@ -100,7 +106,7 @@ inline std::string error_plot(const std::vector<Series>& all) {
   }
   if (error.empty) return {};
   Plot plot("Translation error over time", linear_axis(time, "time [s]"), log_axis(error, "error [m], logarithmic"));
-  for (std::size_t k = 0; k < all.size(); ++k) plot.curve(curves[k].time_s, curves[k].value, all[k].css("curve"));
+  for (const std::size_t k : drawing_order(all)) plot.curve(curves[k].time_s, curves[k].value, all[k].css("curve"));
   return figure("Translation error over time", plot.svg(), "A curve is interrupted where frames have no pose.");
 }
 
@@ -127,7 +133,7 @@ inline std::string outcome_plot(const std::vector<Series>& all) {
       const double from = frames[i].time_s - start, to = (next < frames.size() ? frames[next].time_s : frames[next - 1].time_s) - start;
       if (frames[i].outcome != Outcome::tracked && std::isfinite(from) && std::isfinite(to)) {
         // At least 2 units wide: one frame in a thousand must still be seen.
-        plot.rectangle(from, row + 0.15, (std::max)(to, from + end / 200), row + 0.85, to_string(frames[i].outcome));
+        plot.shape(plot.box(from, row + 0.15, (std::max)(to, from + end / 200), row + 0.85), to_string(frames[i].outcome));
       }
       i = next;
     }
@@ -165,8 +171,9 @@ inline std::string notes_of(const std::vector<Series>& all) {
 }
 
 inline std::string trajectory_section(const std::vector<Series>& all) {
-  return summary_table(all) + "<div class=\"grid\">\n" + trajectory_plots(all) + error_plot(all) + outcome_plot(all) + "</div>\n" +
-         notes_of(all);
+  std::string views;
+  for (const View& view : trajectory_views(all)) views += figure(view.title, view.plot.svg());
+  return summary_table(all) + "<div class=\"grid\">\n" + views + error_plot(all) + outcome_plot(all) + "</div>\n" + notes_of(all);
 }
 
 }  // namespace cfp_slam

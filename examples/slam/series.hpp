@@ -11,9 +11,9 @@
 #include "cfp/core/span.hpp"
 #include "cfp/evaluation/trajectory_error.hpp"
 #include "html.hpp"
-#include "page.hpp"
 #include "record.hpp"
 #include "statistics.hpp"
+#include "style.hpp"
 #include "summary.hpp"
 
 namespace cfp_slam {
@@ -45,6 +45,15 @@ inline std::vector<Series> series_of(const std::vector<const RunRecord*>& runs) 
     out.push_back({run, run->variant + (alone ? "" : ", seed " + std::to_string(run->seed)), style});
   }
   return out;
+}
+
+// Curves that are drawn later lie above: the full model on top, then plain, then the others.
+inline std::vector<std::size_t> drawing_order(const std::vector<Series>& all) {
+  std::vector<std::size_t> order(all.size());
+  for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
+  const auto depth = [&all](std::size_t k) { return all[k].run->variant == "cfp" ? 0 : all[k].style + 1; };
+  std::stable_sort(order.begin(), order.end(), [&depth](std::size_t a, std::size_t b) { return depth(a) > depth(b); });
+  return order;
 }
 
 inline bool has_pose(const FrameRecord& frame) { return frame.outcome <= Outcome::relocalised; }

@@ -81,12 +81,18 @@ class Plot {
     if (!path.empty()) out_ += "<path class=\"" + escape(style) + "\" d=\"" + path + "\"/>";
   }
 
-  // In the axes' units; clipped to the plot.
-  void rectangle(double x1, double y1, double x2, double y2, const std::string& style, double opacity = 1) {
+  // Path text of a box and of a point in the axes' units, clipped to the plot; many of one look make one shape.
+  [[nodiscard]] std::string box(double x1, double y1, double x2, double y2) const {
     const double u1 = px(x1), u2 = px(x2), v1 = py(y1), v2 = py(y2);
-    out_ += "<rect class=\"" + escape(style) + "\" x=\"" + number((std::min)(u1, u2), 1) + "\" y=\"" + number((std::min)(v1, v2), 1) +
-            "\" width=\"" + number(std::abs(u2 - u1), 1) + "\" height=\"" + number(std::abs(v2 - v1), 1) + '"' +
-            (opacity < 1 ? " fill-opacity=\"" + number(opacity, 2) + '"' : std::string()) + "/>";
+    return 'M' + number((std::min)(u1, u2), 1) + ' ' + number((std::min)(v1, v2), 1) + 'h' + number(std::abs(u2 - u1), 1) + 'v' +
+           number(std::abs(v2 - v1), 1) + 'h' + number(-std::abs(u2 - u1), 1) + 'z';
+  }
+  [[nodiscard]] std::string point(double x, double y) const { return 'M' + number(px(x), 1) + ' ' + number(py(y), 1); }
+
+  void shape(const std::string& path, const std::string& style, double opacity = 1) {
+    if (path.empty()) return;
+    out_ += "<path class=\"" + escape(style) + "\" d=\"" + path + '"' + (opacity < 1 ? " fill-opacity=\"" + number(opacity, 2) + '"' : "") +
+            "/>";
   }
 
   void dot(double x, double y, double radius, const std::string& style, const std::string& hint = {}) {
@@ -104,8 +110,6 @@ class Plot {
     out_ += "<text" + (style.empty() ? std::string() : " class=\"" + escape(style) + '"') + " x=\"" + number(u, 1) + "\" y=\"" +
             number(v, 1) + "\" text-anchor=\"" + anchor + "\">" + escape(words) + "</text>";
   }
-
-  void shape(const std::string& path, const std::string& style) { out_ += "<path class=\"" + escape(style) + "\" d=\"" + path + "\"/>"; }
 
   [[nodiscard]] double width() const { return width_; }
   [[nodiscard]] double height() const { return height_; }

@@ -106,6 +106,7 @@ class SystemTable {
       values_.push_back(coverage.median < 95 ? not_known : spread.median);
     }
     if (n > 0) {
+      table_.own.insert(table_.rows.size());
       table_.rows.push_back(cells);
     } else {
       values_.resize(values_.size() - sequences_.size());

@@ -3,6 +3,7 @@
 
 #include <cctype>
 #include <cstddef>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -23,8 +24,9 @@ struct Table {
   std::string protocol;  // how the figures came about
   std::vector<std::string> header;
   std::vector<std::vector<Cell>> rows;
-  std::string note;    // below
-  bool words = false;  // cells hold sentences, not figures
+  std::string note;           // below
+  bool words = false;         // cells hold sentences, not figures
+  std::set<std::size_t> own;  // rows to be found at once among those of others
 };
 
 // Text in a Markdown table's cell: the pipe and what would be read as mark-up. An underscore inside a word is none.
@@ -75,7 +77,7 @@ inline std::string to_html(const Table& table) {
   for (const std::string& h : table.header) out += "<th>" + escape(h) + "</th>";
   out += "</tr></thead><tbody>\n";
   for (const auto& row : table.rows) {
-    out += "<tr>";
+    out += table.own.count(static_cast<std::size_t>(&row - table.rows.data())) > 0 ? "<tr class=\"own\">" : "<tr>";
     for (std::size_t c = 0; c < row.size(); ++c) {
       const char* mark = row[c].rank == Rank::best ? "b" : row[c].rank == Rank::second ? "u" : "span";
       out += std::string(c == 0 ? "<th scope=\"row\">" : "<td>") + '<' + mark + '>' + escape(row[c].text) + "</" + mark + '>' +

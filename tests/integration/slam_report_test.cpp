@@ -1,5 +1,7 @@
 #include "../../examples/slam/report.hpp"
 
+#include "../../examples/slam/picture.hpp"
+
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
@@ -136,8 +138,16 @@ TEST_CASE("The report survives runs without truth, frames, boxes or finite numbe
       run.first_stage.probability[k] = static_cast<float>(std::isfinite(broken) ? 2.0 : broken);
     }
     run.frames[7].time_s = broken;
+    run.frames[8].time_s = -broken;
+    run.truth[5].T_world_cam.translation.y() = broken;
+    run.truth[6].time_s = broken;
+    run.pictures.push_back({broken, "", {0xff, 0xd8}});
     run.absolute.translation_m.rmse = broken;
     check_page(report_page({run, cfp_test::fake_run({})}));
+    CHECK(count(report_page({run}), "d=\"M–") == 0);
+    CHECK(first_unbalanced(summary_picture({run})) == "");
+    cfp_test::evaluate(run);
+    check_page(report_page({run}));
   }
 }
 
@@ -173,4 +183,24 @@ TEST_CASE("The report is written whole or not at all", "[slam]") {
   CHECK(std::distance(std::filesystem::directory_iterator(folder / "deep"), {}) == 1);
   CHECK_THROWS(write_report(folder / "deep" / "report.html" / "below_a_file.html", {}));
   std::filesystem::remove_all(folder);
+}
+
+TEST_CASE("The summary picture is one small SVG with the frame that tells most and fits", "[slam]") {
+  auto runs = cfp_test::fake_variants("walking_xyz");
+  runs.resize(2);
+  const auto without = summary_picture(runs);
+  CHECK(first_unbalanced(without) == "");
+  CHECK(without.find("<image") == std::string::npos);
+  CHECK(without.size() < 150000);
+  runs[0].pictures.push_back({runs[0].frames[55].time_s, "plain", std::vector<unsigned char>(60000, 1)});
+  runs[1].pictures.push_back({runs[1].frames[10].time_s, "detected", std::vector<unsigned char>(30000, 2)});
+  runs[1].pictures.push_back({runs[1].frames[55].time_s, "compensated", std::vector<unsigned char>(30000, 3)});
+  runs[1].pictures.push_back({runs[1].frames[56].time_s, "too large", std::vector<unsigned char>(130000, 4)});
+  const auto with = summary_picture(runs);
+  CHECK(with.size() < 150000);
+  CHECK(with.find(base64(runs[1].pictures[1].jpeg)) != std::string::npos);
+  CHECK(count(with, "<image") == 1);
+  CHECK(count(with, "nan") == 0);
+  CHECK(first_unbalanced(summary_picture({})) == "");
+  CHECK(first_unbalanced(summary_picture({RunRecord{}})) == "");
 }

@@ -189,7 +189,7 @@ TEST_CASE("Tables of nothing and of runs without any figure are still tables", "
 }
 
 TEST_CASE("Names cannot break out of a cell", "[slam]") {
-  const Table table{"t", "", {"a|b"}, {{{"x | <b> *y* _z_ [l](u) walking_xyz", "1|2", Rank::best}}}, ""};
+  const Table table{"t", "", {"a|b"}, {{{"x | <b> *y* _z_ [l](u) walking_xyz", "1|2", Rank::best}}}, "", false, {}};
   const std::string markdown = to_markdown(table);
   CHECK(markdown.find("**x \\| &lt;b> \\*y\\* \\_z\\_ \\[l\\](u) walking_xyz** (1\\|2) |") != std::string::npos);
   CHECK(to_html(table).find("<b>x | &lt;b&gt; *y*") != std::string::npos);
