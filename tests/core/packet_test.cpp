@@ -48,6 +48,7 @@ TEMPLATE_TEST_CASE("Packet: every operation equals the scalar one in every lane"
   check_lanes<T>([](auto a, auto, auto) { return abs(a); }, T(-9), T(9), T(0));
   check_lanes<T>([](auto a, auto, auto) { return log1p(a); }, T(0), T(9), T(1));
   check_lanes<T>([](auto a, auto, auto) { return cfp::reciprocal(a); }, T(1), T(9), T(0));
+  check_lanes<T>([](auto a, auto, auto) { return cfp::reciprocal_sqrt(a); }, T(0.1), T(9), T(3));
   check_lanes<T>([](auto a, auto b, auto c) { return cfp::multiply_add(a, b, c); }, T(-9), T(9), T(1));
   check_lanes<T>([](auto a, auto b, auto c) { return cfp::select(a < b, b, c); }, T(-9), T(9), T(0));
   check_lanes<T>([](auto a, auto b, auto c) { return cfp::select((a <= b) & (b > c), a, c); }, T(-9), T(9), T(0));

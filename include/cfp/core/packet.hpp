@@ -175,6 +175,18 @@ template <typename T, int Lanes>
   return load<BasicPacket<T, Lanes>>(lanes);
 }
 
+/// 1 / sqrt(x) within 3 units in the last place; infinite at 0 (for packets also at denormals), 0 at infinity. One root and no
+/// division where the hardware has an estimate to refine.
+template <typename T>
+[[nodiscard]] T reciprocal_sqrt(const T& x) noexcept {
+  using std::sqrt;
+  return T(1) / sqrt(x);
+}
+template <typename T, int Lanes>
+[[nodiscard]] BasicPacket<T, Lanes> reciprocal_sqrt(const BasicPacket<T, Lanes>& x) noexcept {
+  return BasicPacket<T, Lanes>::wrap(Eigen::internal::prsqrt(x.bits));
+}
+
 /// 1 / x, correctly rounded (a division, not the hardware's estimate, whose bits differ between makers).
 template <typename P>
 [[nodiscard]] P reciprocal(const P& x) noexcept {
