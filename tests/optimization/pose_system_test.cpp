@@ -61,7 +61,7 @@ TEMPLATE_TEST_CASE("Pose system: H and g equal those of numeric Jacobians, pixel
     Scalar** pointers[10] = {&columns.x, &columns.y, &columns.z, &columns.u, &columns.v, &columns.u_right, &columns.information, &columns.active, &columns.error, &columns.weight};
     const auto fill = [&](bool normalised) {
       const double fu = normalised ? 1 / camera.fx : 1, fv = normalised ? 1 / camera.fy : 1, cu = normalised ? camera.cx : 0, cv = normalised ? camera.cy : 0;
-      const double values[10] = {X.x(), X.y(), X.z(), (measured[0] - cu) * fu, (measured[1] - cv) * fv, (measured[2] - cu) * fu, information, weight, 0, weight};
+      const double values[10] = {X.x(), X.y(), X.z(), (measured[0] - cu) * fu, (measured[1] - cv) * fv, (measured[2] - cu) * fu, information / (fu * fu), weight, 0, weight};
       for (int c = 0; c < 10; ++c) {
         storage[c].assign(lanes, Scalar(c == 6 ? 1 : 0));  // the other lanes: padding
         storage[c][0] = static_cast<Scalar>(values[c]);
@@ -97,7 +97,7 @@ TEMPLATE_TEST_CASE("Pose system: H and g equal those of numeric Jacobians, pixel
 TEST_CASE("Pose system: a point behind the camera keeps the error it last had in front and adds nothing to H and g", "[optimization]") {
   using P = cfp::Packet<double>;
   const cfp::PinholeCamera<double> camera{500, 500, 320, 240};
-  std::vector<double> x(8), y(8), z(8, 2.0), u(8, 0.01), v(8), information(8, 1.0), active(8), error(8);
+  std::vector<double> x(8), y(8), z(8, 2.0), u(8, 0.01), v(8), information(8, 500.0 * 500.0), active(8), error(8);
   active[0] = 1;
   PoseColumns<double> columns;
   columns.x = x.data(), columns.y = y.data(), columns.z = z.data(), columns.u = u.data(), columns.v = v.data();

@@ -2,11 +2,13 @@
 /// The observations of one pose as arrays per quantity, for packets (internal to weighted_pnp.hpp).
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <type_traits>
 
+#include "cfp/core/chunk.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/optimization/weighted_pnp_types.hpp"
 
@@ -22,7 +24,7 @@ template <typename Scalar>
 struct PoseColumns {
   Scalar *x = nullptr, *y = nullptr, *z = nullptr;        // point relative to the start position, world axes, m
   Scalar *u = nullptr, *v = nullptr, *u_right = nullptr;  // px; pinhole: (pixel - centre) / focal length
-  Scalar* information = nullptr;                          // 1 / sigma^2
+  Scalar* information = nullptr;                          // 1 / sigma^2; pinhole: fx^2 / sigma^2; pinhole: fx^2 / sigma^2
   Scalar* weight = nullptr;                               // w / mean w
   Scalar* active = nullptr;                               // weight, or 0 for an outlier left out
   Scalar* error = nullptr;                                // s; negative: behind the camera, |s| as last seen in front
@@ -35,7 +37,7 @@ struct PoseColumns {
     constexpr std::size_t line = 64 / sizeof(Scalar);
     const std::size_t stride = (slots + line - 1) / line * line + line;  // an odd line: columns of 2^k points share no cache set
     if (workspace.columns.size() < 10 * stride + line) workspace.columns.resize(10 * stride + line);
-    if (workspace.indices.size() < slots) workspace.indices.resize(slots);
+    if (workspace.indices.size() < slots + 1) workspace.indices.resize(slots + 1);
     const std::size_t misaligned = reinterpret_cast<std::uintptr_t>(workspace.columns.data()) / sizeof(Scalar) % line;
     Scalar* next = workspace.columns.data() + (line - misaligned) % line;
     for (Scalar** column : {&x, &y, &z, &u, &v, &u_right, &information, &weight, &active, &error}) {
@@ -45,13 +47,15 @@ struct PoseColumns {
     index = workspace.indices.data();
   }
 
+  /// Calls visit(begin, end, chi2 threshold) for the pixels and for the pixels with a depth.
   template <typename Visit>
-  void for_each_slot(const WeightedPnPOptions& options, Visit&& visit) const noexcept {
-    for (std::size_t i = 0; i < mono; ++i) visit(i, static_cast<Scalar>(options.chi2_mono));
-    for (std::size_t i = stereo_begin; i < stereo_end; ++i) visit(i, static_cast<Scalar>(options.chi2_stereo));
+  void for_each_kind(const WeightedPnPOptions& options, Visit&& visit) const noexcept {
+    visit(std::size_t(0), mono, options.chi2_mono);
+    visit(stereo_begin, stereo_end, options.chi2_stereo);
   }
 
-  /// Copies the usable observations, points relative to `centre`; counts into the result.
+  /// Copies the usable observations, points relative to `centre`; counts into the result. Works on chunks, quantity by quantity,
+  /// which compilers vectorise; where all observations of a chunk are of one kind they are written without being sorted.
   template <typename Input, typename Camera>
   void load(const PoseObservations<Input>& observations, const Camera& camera, const Vector3<double>& centre, WeightConvention convention,
             std::size_t lanes, WeightedPnPWorkspace<Scalar>& workspace, WeightedPnPResult& result) {
@@ -66,65 +70,125 @@ struct PoseColumns {
     baseline_fx = observations.baseline_fx > 0 && observations.baseline_fx <= 1e6 ? observations.baseline_fx : 0;
     const bool has_depths = baseline_fx > 0 && !observations.depths.empty(), has_u_right = baseline_fx > 0 && !observations.u_right.empty();
     const bool scaled = convention == WeightConvention::information_scale;
-    double sum = 0, sum_sq = 0;
     std::size_t pixel_slot = 0, depth_slot = stereo_begin;
-    for (std::size_t i = 0; i < n; ++i) {
-      const double w = observations.weights.empty() ? 1 : static_cast<double>(observations.weights[i]);
-      double inverse_sq = observations.inverse_sigmas_sq.empty() ? 1 : static_cast<double>(observations.inverse_sigmas_sq[i]);
+    for_each_chunk(n, [&](std::size_t first, std::size_t count) {
+      double dx[chunk_size], dy[chunk_size], dz[chunk_size], pu[chunk_size], pv[chunk_size], right[chunk_size], w[chunk_size], inverse_sq[chunk_size];
+      copy_coordinate(observations.points, 0, first, count, centre.x(), 1, dx);
+      copy_coordinate(observations.points, 1, first, count, centre.y(), 1, dy);
+      copy_coordinate(observations.points, 2, first, count, centre.z(), 1, dz);
+      copy_coordinate(observations.pixels, 0, first, count, cu, fu, pu);
+      copy_coordinate(observations.pixels, 1, first, count, cv, fv, pv);
+      copy_or(observations.weights, first, count, w);
+      copy_or(observations.inverse_sigmas_sq, first, count, inverse_sq);
       if (!observations.sigmas.empty()) {
-        const double sigma = static_cast<double>(observations.sigmas[i]);
-        inverse_sq = sigma > 0 ? 1 / (sigma * sigma) : 0;
+        copy_or(observations.sigmas, first, count, inverse_sq);
+        for (std::size_t k = 0; k < count; ++k) inverse_sq[k] = inverse_sq[k] > 0 ? 1 / (inverse_sq[k] * inverse_sq[k]) : 0;
       }
-      const double dx = static_cast<double>(observations.points(i, 0)) - centre.x();
-      const double dy = static_cast<double>(observations.points(i, 1)) - centre.y();
-      const double dz = static_cast<double>(observations.points(i, 2)) - centre.z();
-      const double pu = static_cast<double>(observations.pixels(i, 0)), pv = static_cast<double>(observations.pixels(i, 1));
-      double right = 0;
-      bool has_right = false;
+      // Conditions as numbers, 1 or 0; a sum with NaN or infinity is not below its bound.
+      double usable[chunk_size], has_right[chunk_size];
+      const double pixel_bound = 1e7 * (std::min)(fu, fv);
+      std::size_t usable_count = 0, right_count = 0;
+      for (std::size_t k = 0; k < count; ++k) {
+        usable[k] = (std::abs(dx[k]) + std::abs(dy[k]) + std::abs(dz[k]) <= 1e9 ? 1.0 : 0.0) * (std::abs(pu[k]) + std::abs(pv[k]) <= pixel_bound ? 1.0 : 0.0) *
+                    (w[k] >= 1e-30 ? 1.0 : 0.0) * (w[k] <= 1e30 ? 1.0 : 0.0) * (inverse_sq[k] >= 1e-12 ? 1.0 : 0.0) * (inverse_sq[k] <= 1e12 ? 1.0 : 0.0);
+        has_right[k] = 0;
+      }
       if (has_depths) {
-        const double depth = static_cast<double>(observations.depths[i]);
-        right = pu - baseline_fx / depth;
-        has_right = depth > 0 && std::abs(right) <= 1e7;
+        copy_or(observations.depths, first, count, right);
+        for (std::size_t k = 0; k < count; ++k) {
+          const double depth = right[k];
+          right[k] = pu[k] - baseline_fx * fu / depth;
+          has_right[k] = (depth > 0 ? 1.0 : 0.0) * (std::abs(right[k]) <= pixel_bound ? 1.0 : 0.0);
+        }
       } else if (has_u_right) {
-        right = static_cast<double>(observations.u_right[i]);
-        has_right = right > 0 && right <= 1e7;
+        copy_or(observations.u_right, first, count, right);
+        for (std::size_t k = 0; k < count; ++k) {
+          has_right[k] = (right[k] > 0 ? 1.0 : 0.0) * (right[k] <= 1e7 ? 1.0 : 0.0);
+          right[k] = (right[k] - cu) * fu;
+        }
       }
-      const bool usable = w >= 1e-30 && w <= 1e30 && inverse_sq >= 1e-12 && inverse_sq <= 1e12 && std::abs(dx) <= 1e9 && std::abs(dy) <= 1e9 &&
-                          std::abs(dz) <= 1e9 && std::abs(pu) <= 1e7 && std::abs(pv) <= 1e7;
-      if (!usable) {
-        ++(w >= 0 && w < 1e-30 ? result.zero_weight : result.invalid);
-        continue;
+      std::size_t slots[chunk_size];
+      const std::size_t pixels_before = pixel_slot, depths_before = depth_slot, nowhere = 2 * stereo_begin;
+      for (std::size_t k = 0; k < count; ++k) {
+        const bool use = usable[k] > 0, stereo = has_right[k] > 0;
+        slots[k] = use ? (stereo ? depth_slot : pixel_slot) : nowhere;
+        pixel_slot += use && !stereo ? 1U : 0U;
+        depth_slot += use && stereo ? 1U : 0U;
       }
-      const std::size_t slot = has_right ? depth_slot++ : pixel_slot++;
-      x[slot] = static_cast<Scalar>(dx), y[slot] = static_cast<Scalar>(dy), z[slot] = static_cast<Scalar>(dz);
-      u[slot] = static_cast<Scalar>((pu - cu) * fu), v[slot] = static_cast<Scalar>((pv - cv) * fv);
-      if (has_right) u_right[slot] = static_cast<Scalar>((right - cu) * fu);
-      information[slot] = static_cast<Scalar>(scaled ? w * inverse_sq : inverse_sq);
-      weight[slot] = static_cast<Scalar>(scaled ? 1 : w);
-      index[slot] = static_cast<std::uint32_t>(i);
-      sum += w;
-      sum_sq += w * w;
-    }
+      usable_count = pixel_slot - pixels_before + depth_slot - depths_before, right_count = depth_slot - depths_before;
+      for (std::size_t k = 0; usable_count < count && k < count; ++k) {
+        if (!(usable[k] > 0)) ++(w[k] >= 0 && w[k] < 1e-30 ? result.zero_weight : result.invalid);
+      }
+      const bool in_order = usable_count == count && (right_count == 0 || right_count == count);
+      const auto put = [&](auto* column, auto&& value) {
+        using T = std::remove_pointer_t<decltype(column)>;
+        if (in_order) {
+          for (std::size_t k = 0; k < count; ++k) column[slots[0] + k] = static_cast<T>(value(k));
+        } else {
+          for (std::size_t k = 0; k < count; ++k) column[slots[k]] = static_cast<T>(value(k));
+        }
+      };
+      put(x, [&](std::size_t k) { return dx[k]; });
+      put(y, [&](std::size_t k) { return dy[k]; });
+      put(z, [&](std::size_t k) { return dz[k]; });
+      put(u, [&](std::size_t k) { return pu[k]; });
+      put(v, [&](std::size_t k) { return pv[k]; });
+      if (right_count > 0) put(u_right, [&](std::size_t k) { return right[k]; });
+      const double to_pixels = 1 / (fu * fu);
+      put(information, [&](std::size_t k) { return (scaled ? w[k] : 1.0) * inverse_sq[k] * to_pixels; });
+      put(weight, [&](std::size_t k) { return w[k]; });
+      put(index, [&](std::size_t k) { return first + k; });
+    });
     mono = pixel_slot, stereo_end = depth_slot;
     result.used_stereo = static_cast<int>(stereo_end - stereo_begin);
     result.used = static_cast<int>(mono) + result.used_stereo;
     if (result.used == 0) return;
+    double sum = 0, sum_sq = 0;
+    add_weights(0, mono, sum, sum_sq);
+    add_weights(stereo_begin, stereo_end, sum, sum_sq);
     result.effective = sum / sum_sq * sum;
     mean_weight = scaled ? 1 : sum / result.used;
-    finish(0, mono, lanes);
-    finish(stereo_begin, stereo_end, lanes);
+    finish(0, mono, lanes, scaled);
+    finish(stereo_begin, stereo_end, lanes, scaled);
   }
 
  private:
-  void finish(std::size_t begin, std::size_t end, std::size_t lanes) noexcept {
-    for (; end % lanes != 0; ++end) {
-      x[end] = y[end] = z[end] = u[end] = v[end] = u_right[end] = weight[end] = Scalar(0);
-      information[end] = Scalar(1);
+  /// (coordinate - offset) scale of `count` points.
+  template <typename Input, int Dim>
+  static void copy_coordinate(const PointSpan<Input, Dim>& points, int c, std::size_t first, std::size_t count, double offset, double scale, double* to) noexcept {
+    if (const Input* packed = points.packed(); packed != nullptr) {
+      packed += static_cast<std::size_t>(Dim) * first + static_cast<std::size_t>(c);
+      for (std::size_t k = 0; k < count; ++k) to[k] = (static_cast<double>(packed[static_cast<std::size_t>(Dim) * k]) - offset) * scale;
+    } else {
+      for (std::size_t k = 0; k < count; ++k) to[k] = (static_cast<double>(points(first + k, c)) - offset) * scale;
     }
+  }
+  /// The values, or 1 where there are none.
+  template <typename Input>
+  static void copy_or(span<const Input> values, std::size_t first, std::size_t count, double* to) noexcept {
+    for (std::size_t k = 0; k < count; ++k) to[k] = values.empty() ? 1.0 : static_cast<double>(values.data()[first + k]);
+  }
+
+  void add_weights(std::size_t begin, std::size_t end, double& sum, double& sum_sq) const noexcept {
+    double s[4] = {}, q[4] = {};  // four chains of additions
+    for (std::size_t i = begin; i < end; ++i) {
+      const double w = static_cast<double>(weight[i]);
+      s[(i - begin) % 4] += w;
+      q[(i - begin) % 4] += w * w;
+    }
+    sum += (s[0] + s[1]) + (s[2] + s[3]);
+    sum_sq += (q[0] + q[1]) + (q[2] + q[3]);
+  }
+
+  void finish(std::size_t begin, std::size_t end, std::size_t lanes, bool scaled) noexcept {
     const Scalar normal = static_cast<Scalar>(1 / mean_weight);
     for (std::size_t i = begin; i < end; ++i) {
-      active[i] = weight[i] = weight[i] * normal;
+      active[i] = weight[i] = scaled ? Scalar(1) : weight[i] * normal;
       error[i] = Scalar(0);
+    }
+    for (; end % lanes != 0; ++end) {
+      x[end] = y[end] = z[end] = u[end] = v[end] = u_right[end] = weight[end] = active[end] = error[end] = Scalar(0);
+      information[end] = Scalar(1);
     }
   }
 };

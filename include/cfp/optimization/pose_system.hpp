@@ -5,7 +5,8 @@
 ///   d x   = [ q  0  -x q  -x y       1 + x^2   -y ]       d y = [ 0  q  -y q  -(1 + y^2)  x y  x ]
 ///   d u_r = [ q  0  -k q  -k y       1 + k x   -y ]       with k = u_r = x - b q, b the stereo baseline in m,
 /// so the rows of u and u_right differ in one factor only and their products sum up in n, m1 = sum k, m2 = sum k^2 (k = x for
-/// u): a depth costs few operations more than a pixel. H(0,1) = 0 and H(2,5) = -H(0,3) - H(1,4) for every such row.
+/// u): a depth costs few operations more than a pixel. The row of v has kappa = fy^2 / fx^2 times their weight, so that its products
+/// join theirs before the multiplication with the weight. H(0,1) = 0, H(1,1) = kappa H(0,0) / n, H(2,5) = -H(0,3) - H(1,4).
 #pragma once
 
 #include <algorithm>
@@ -43,18 +44,19 @@ P stored_error(const Mask& front, const P& error) noexcept {
 /// Pinhole pass over the packets [begin, end); sums in lanes, handed to double every 64 packets.
 template <typename P, bool stereo, typename Loss, typename C>
 void add_pinhole(const PoseColumns<scalar_of<P>>& columns, std::size_t begin, std::size_t end, const PinholeCamera<C>& camera, double baseline_fx,
-                 const SE3<double>& T, const Loss& loss, PoseSystem& system) noexcept {
+                 const SE3<double>& T, const Loss& given_loss, PoseSystem& system) noexcept {
   using Scalar = scalar_of<P>;
   constexpr std::size_t lanes = static_cast<std::size_t>(lanes_of<P>);
-  enum { h00, h02, h03, h04, h05, h11, h12, h13, h14, h15, h22, h23, h24, h33, h34, h35, h44, h45, h55, g0, g1, g2, g3, g4, g5, cost, count };
+  enum { cost, g0, g1, g2, g3, g4, g5, h00, h02, h03, h04, h05, h12, h13, h14, h15, h22, h23, h24, h33, h34, h35, h44, h45, h55, count };
   const auto constant = [](double value) { return P(static_cast<Scalar>(value)); };
   const P r00 = constant(T.rotation(0, 0)), r01 = constant(T.rotation(0, 1)), r02 = constant(T.rotation(0, 2)), t0 = constant(T.translation.x());
   const P r10 = constant(T.rotation(1, 0)), r11 = constant(T.rotation(1, 1)), r12 = constant(T.rotation(1, 2)), t1 = constant(T.translation.y());
   const P r20 = constant(T.rotation(2, 0)), r21 = constant(T.rotation(2, 1)), r22 = constant(T.rotation(2, 2)), t2 = constant(T.translation.z());
-  const P fxx = constant(static_cast<double>(camera.fx) * static_cast<double>(camera.fx));
-  const P fyy = constant(static_cast<double>(camera.fy) * static_cast<double>(camera.fy));
-  const P base = constant(baseline_fx / static_cast<double>(camera.fx));
-  const P near = constant(static_cast<double>(Tolerance<Scalar>::min_depth)), wide = constant(100), one = constant(1), two = constant(2), zero = constant(0);
+  const double aspect = static_cast<double>(camera.fy) / static_cast<double>(camera.fx), aspect_sq = aspect * aspect;
+  const P kappa = constant(aspect_sq), base = constant(baseline_fx / static_cast<double>(camera.fx));
+  const P near = constant(static_cast<double>(Tolerance<Scalar>::min_depth)), wide = constant(100), one = constant(1), zero = constant(0);
+  const P n = constant(stereo ? 2 : 1);
+  const Loss loss = given_loss;  // a copy, which the stores below cannot change
   using std::abs;
 
   while (begin < end) {
@@ -71,61 +73,60 @@ void add_pinhole(const PoseColumns<scalar_of<P>>& columns, std::size_t begin, st
       const P x = px * q, y = py * q;
       const P ru = x - load<P>(columns.u + begin), rv = y - load<P>(columns.v + begin);
 
-      // The rows of u and u_right: their number, the sums of k and k^2, of r and k r.
+      // The rows of u and u_right: the sums of k and k^2, of r and k r.
       P m1 = x, m2 = x * x, sr = ru, skr = x * ru, uu = ru * ru;
-      P n = one;
       if constexpr (stereo) {
         const P k = x - base * q;
         const P r = k - load<P>(columns.u_right + begin);
         m1 = m1 + k, m2 = multiply_add(k, k, m2), sr = sr + r, skr = multiply_add(k, r, skr), uu = multiply_add(r, r, uu);
-        n = two;
       }
+      const P kv = kappa * rv;
       const P information = load<P>(columns.information + begin), active = load<P>(columns.active + begin);
-      const P s = visible_error<P>(front, information * multiply_add(fxx, uu, fyy * (rv * rv)), load<P>(columns.error + begin));
+      const P s = visible_error<P>(front, information * multiply_add(kv, rv, uu), load<P>(columns.error + begin));
       store(columns.error + begin, stored_error<P>(front, s));
       sum[cost] = multiply_add(active, loss.value(s), sum[cost]);
       const P W = select(front, active * information * loss.first(s), zero);
 
-      const P a = W * fxx, b = W * fyy;
-      const P aq = a * q, bq = b * q, ay = a * y, bx = b * x;
-      const P aqq = aq * q, bqq = bq * q, aqy = aq * y, bqy = bq * y, ayy = ay * y, xy = x * y;
-      const P e1 = multiply_add(x, m1, n), e2 = multiply_add(x, m2, m1), e3 = multiply_add(x, e2, e1);
-      const P f1 = multiply_add(y, y, one), bf = b * f1, bxy = bx * y;
-      sum[h00] = stereo ? multiply_add(n, aqq, sum[h00]) : sum[h00] + aqq;
-      sum[h02] = multiply_add(aqq, m1, sum[h02]);
-      sum[h03] = multiply_add(aqy, m1, sum[h03]);
-      sum[h04] = multiply_add(aq, e1, sum[h04]);
-      sum[h05] = stereo ? multiply_add(n, aqy, sum[h05]) : sum[h05] + aqy;
-      sum[h11] += bqq;
-      sum[h12] = multiply_add(bqq, y, sum[h12]);
-      sum[h13] = multiply_add(bq, f1, sum[h13]);
-      sum[h14] = multiply_add(bq, xy, sum[h14]);
-      sum[h15] = multiply_add(bq, x, sum[h15]);
-      sum[h22] = multiply_add(aqq, m2, multiply_add(bqy, y * q, sum[h22]));
-      sum[h23] = multiply_add(aqy, m2, multiply_add(bqy, f1, sum[h23]));
-      sum[h24] = multiply_add(aq, e2, multiply_add(bqy, xy, sum[h24]));
-      sum[h33] = multiply_add(ayy, m2, multiply_add(bf, f1, sum[h33]));
-      sum[h34] = multiply_add(ay, e2, multiply_add(bf, xy, sum[h34]));
-      sum[h35] = multiply_add(ayy, m1, sum[h35] - bf * x);
-      sum[h44] = multiply_add(a, e3, multiply_add(bxy, xy, sum[h44]));
-      sum[h45] = multiply_add(ay, e1, sum[h45] - bxy * x);
-      sum[h55] = multiply_add(bx, x, stereo ? multiply_add(n, ayy, sum[h55]) : sum[h55] + ayy);
-      sum[g0] = multiply_add(aq, sr, sum[g0]);
-      sum[g1] = multiply_add(bq, rv, sum[g1]);
-      sum[g2] = multiply_add(aq, skr, multiply_add(bqy, rv, sum[g2]));
-      sum[g3] = multiply_add(ay, skr, multiply_add(bf, rv, sum[g3]));
-      sum[g4] = multiply_add(a, multiply_add(x, skr, sr), multiply_add(bxy, rv, sum[g4]));
-      sum[g5] = multiply_add(ay, sr, sum[g5] - bx * rv);
+      const P br = W * kv, ar = W * sr, e = multiply_add(y, br, W * skr);
+      sum[g0] = multiply_add(q, ar, sum[g0]);
+      sum[g1] = multiply_add(q, br, sum[g1]);
+      sum[g2] = multiply_add(q, e, sum[g2]);
+      sum[g3] = multiply_add(y, e, sum[g3] + br);
+      sum[g4] = multiply_add(x, e, sum[g4] + ar);
+      sum[g5] = multiply_add(y, ar, sum[g5] - x * br);
+      const P Wq = W * q, Wqq = Wq * q, Wy = W * y, Wqy = Wq * y;
+      const P x2 = x * x, y2 = y * y, f1 = y2 + one, e1 = multiply_add(x, m1, n);
+      const P c = multiply_add(kappa, y2, m2), d = c + kappa, xc = multiply_add(x, c, m1);
+      sum[h00] += Wqq;
+      sum[h02] = multiply_add(Wqq, m1, sum[h02]);
+      sum[h03] = multiply_add(Wqy, m1, sum[h03]);
+      sum[h04] = multiply_add(Wq, e1, sum[h04]);
+      sum[h05] += Wqy;
+      sum[h12] = multiply_add(Wqq, y, sum[h12]);
+      sum[h13] = multiply_add(Wq, f1, sum[h13]);
+      sum[h14] = multiply_add(Wqy, x, sum[h14]);
+      sum[h15] = multiply_add(Wq, x, sum[h15]);
+      sum[h22] = multiply_add(Wqq, c, sum[h22]);
+      sum[h23] = multiply_add(Wqy, d, sum[h23]);
+      sum[h24] = multiply_add(Wq, xc, sum[h24]);
+      sum[h33] = multiply_add(W, multiply_add(y2, d, kappa * f1), sum[h33]);
+      sum[h34] = multiply_add(Wy, multiply_add(x, d, m1), sum[h34]);
+      sum[h35] = multiply_add(W, y2 * m1 - kappa * (f1 * x), sum[h35]);
+      sum[h44] = multiply_add(W, multiply_add(x, xc, e1), sum[h44]);
+      sum[h45] = multiply_add(Wy, e1 - kappa * x2, sum[h45]);
+      sum[h55] = multiply_add(W, multiply_add(kappa, x2, n * y2), sum[h55]);
     }
     double total[count];
     for (int i = 0; i < count; ++i) total[i] = static_cast<double>(reduce_add(sum[i]));
-    Matrix6<double>& H = system.H;
-    H(0, 0) += total[h00], H(0, 2) -= total[h02], H(0, 3) -= total[h03], H(0, 4) += total[h04], H(0, 5) -= total[h05];
-    H(1, 1) += total[h11], H(1, 2) -= total[h12], H(1, 3) -= total[h13], H(1, 4) += total[h14], H(1, 5) += total[h15];
-    H(2, 2) += total[h22], H(2, 3) += total[h23], H(2, 4) -= total[h24], H(2, 5) += total[h03] - total[h14];
-    H(3, 3) += total[h33], H(3, 4) -= total[h34], H(3, 5) += total[h35], H(4, 4) += total[h44], H(4, 5) -= total[h45], H(5, 5) += total[h55];
-    system.g[0] += total[g0], system.g[1] += total[g1], system.g[2] -= total[g2], system.g[3] -= total[g3], system.g[4] += total[g4], system.g[5] -= total[g5];
     system.cost += total[cost];
+    system.g[0] += total[g0], system.g[1] += total[g1], system.g[2] -= total[g2], system.g[3] -= total[g3], system.g[4] += total[g4], system.g[5] -= total[g5];
+    constexpr double rows = stereo ? 2 : 1;
+    Matrix6<double>& H = system.H;
+    H(0, 0) += rows * total[h00], H(0, 2) -= total[h02], H(0, 3) -= total[h03], H(0, 4) += total[h04], H(0, 5) -= rows * total[h05];
+    H(1, 1) += aspect_sq * total[h00], H(1, 2) -= aspect_sq * total[h12], H(1, 3) -= aspect_sq * total[h13], H(1, 4) += aspect_sq * total[h14];
+    H(1, 5) += aspect_sq * total[h15], H(2, 2) += total[h22], H(2, 3) += total[h23], H(2, 4) -= total[h24];
+    H(2, 5) += total[h03] - aspect_sq * total[h14], H(3, 3) += total[h33], H(3, 4) -= total[h34], H(3, 5) += total[h35];
+    H(4, 4) += total[h44], H(4, 5) -= total[h45], H(5, 5) += total[h55];
   }
 }
 

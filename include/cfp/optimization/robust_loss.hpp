@@ -11,6 +11,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/packet.hpp"
@@ -33,13 +34,11 @@ struct Huber {
   Scalar delta = Scalar(1);
 
   [[nodiscard]] Scalar value(const Scalar& s) const noexcept {
-    using std::sqrt;
-    return select(s <= delta * delta, s, Scalar(2) * delta * sqrt(s) - delta * delta);
+    // s / sqrt(s): no second root beside that of first(). The smallest number keeps infinity from meeting 0.
+    const Scalar root = s * (reciprocal_sqrt(s) + Scalar((std::numeric_limits<scalar_of<Scalar>>::min)()));
+    return select(s <= delta * delta, s, Scalar(2) * delta * root - delta * delta);
   }
-  [[nodiscard]] Scalar first(const Scalar& s) const noexcept {
-    using std::sqrt;
-    return select(s <= delta * delta, Scalar(1), delta / sqrt(s));
-  }
+  [[nodiscard]] Scalar first(const Scalar& s) const noexcept { return select(s <= delta * delta, Scalar(1), delta * reciprocal_sqrt(s)); }
   [[nodiscard]] Scalar second(const Scalar& s) const noexcept {
     return select(s <= delta * delta, Scalar(0), Scalar(-0.5) * first(s) / s);
   }
@@ -54,7 +53,7 @@ struct Cauchy {
     using std::log1p;
     return delta * delta * log1p(s / (delta * delta));
   }
-  [[nodiscard]] Scalar first(const Scalar& s) const noexcept { return Scalar(1) / (Scalar(1) + s / (delta * delta)); }
+  [[nodiscard]] Scalar first(const Scalar& s) const noexcept { return delta * delta / (delta * delta + s); }
   [[nodiscard]] Scalar second(const Scalar& s) const noexcept { return -first(s) * first(s) / (delta * delta); }
 };
 
@@ -65,16 +64,15 @@ struct GemanMcClure {
 
   [[nodiscard]] Scalar value(const Scalar& s) const noexcept {
     // Two forms of one quotient: the first is exact at 0, the second at infinity.
-    return select(s <= delta * delta, s / (Scalar(1) + s / (delta * delta)), delta * delta / (Scalar(1) + delta * delta / s));
+    return select(s <= delta * delta, s * share(s), delta * delta * (Scalar(1) - share(s)));
   }
-  [[nodiscard]] Scalar first(const Scalar& s) const noexcept {
-    const Scalar u = Scalar(1) / (Scalar(1) + s / (delta * delta));
-    return u * u;
-  }
+  [[nodiscard]] Scalar first(const Scalar& s) const noexcept { return share(s) * share(s); }
   [[nodiscard]] Scalar second(const Scalar& s) const noexcept {
-    const Scalar u = Scalar(1) / (Scalar(1) + s / (delta * delta));
-    return Scalar(-2) * u * u * u / (delta * delta);
+    return Scalar(-2) * share(s) * share(s) * share(s) / (delta * delta);
   }
+
+ private:
+  [[nodiscard]] Scalar share(const Scalar& s) const noexcept { return delta * delta / (delta * delta + s); }
 };
 
 /// rho = min(s, delta^2); rho' = 1 up to and at delta^2, 0 beyond; rho'' = 0. A hard cut: only for a nearby start.
