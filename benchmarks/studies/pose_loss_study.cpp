@@ -22,11 +22,12 @@ struct Schedule {
   cfp::WeightedPnPOptions options;
 };
 
-Schedule two_rounds(const char* name, double first_decrease, cfp::LossType loss, double scale) {
+Schedule two_rounds(const char* name, double first_mean_decrease, cfp::LossType loss, double scale, double last_decrease = 1e-2) {
   cfp::WeightedPnPOptions options;
-  options.rounds[0].min_decrease = first_decrease;
+  options.rounds[0].min_mean_decrease = first_mean_decrease;
   options.rounds[1].loss = loss;
   options.rounds[1].scale = scale;
+  options.rounds[1].min_decrease = last_decrease;
   return {name, options};
 }
 
@@ -35,27 +36,30 @@ Schedule two_rounds(const char* name, double first_decrease, cfp::LossType loss,
 int main(int argc, char** argv) {
   const int problems = argc > 1 ? std::max(1, std::atoi(argv[1])) : 200;
   std::vector<Schedule> schedules = {{"ORB-SLAM2 (hard cut)", cfp::orb_slam2_pose_options()}};
-  Schedule hard = two_rounds("Huber, hard cut, hard cut", 1e-1, cfp::LossType::trivial, 1);
+  Schedule hard = two_rounds("Huber, hard cut, hard cut", 3e-4, cfp::LossType::trivial, 1);
   hard.options.rounds[1].inliers_only = true;
   hard.options.rounds[2] = hard.options.rounds[1];
   hard.options.round_count = 3;
   schedules.push_back(hard);
-  schedules.push_back(two_rounds("Huber, truncated 1", 1, cfp::LossType::truncated, 1));
-  schedules.push_back(two_rounds("Huber, Cauchy 0.7", 1, cfp::LossType::cauchy, 0.7));
-  schedules.push_back(two_rounds("Huber, Cauchy 1", 1, cfp::LossType::cauchy, 1));
-  schedules.push_back(two_rounds("Huber, Geman-McClure 1", 1, cfp::LossType::geman_mcclure, 1));
-  schedules.push_back(two_rounds("Huber, Geman-McClure 1.5", 1, cfp::LossType::geman_mcclure, 1.5));
-  schedules.push_back(two_rounds("Huber, Geman-McClure 2", 1, cfp::LossType::geman_mcclure, 2));
-  schedules.push_back(two_rounds("Huber, Geman-McClure 3", 1, cfp::LossType::geman_mcclure, 3));
-  schedules.push_back(two_rounds("Huber to 0.1, Geman-McClure 1.5", 0.1, cfp::LossType::geman_mcclure, 1.5));
-  schedules.push_back(two_rounds("Huber to 10, Geman-McClure 1.5", 10, cfp::LossType::geman_mcclure, 1.5));
-  schedules.push_back(two_rounds("Huber to 100, Geman-McClure 1.5", 100, cfp::LossType::geman_mcclure, 1.5));
+  using cfp::LossType;
+  schedules.push_back(two_rounds("Huber, truncated 1", 0.003, LossType::truncated, 1));
+  schedules.push_back(two_rounds("Huber, Cauchy 0.7", 0.3, LossType::cauchy, 0.7));
+  schedules.push_back(two_rounds("Huber, Cauchy 1", 0.3, LossType::cauchy, 1));
+  schedules.push_back(two_rounds("Huber, Geman-McClure 1", 0.3, LossType::geman_mcclure, 1));
+  schedules.push_back(two_rounds("Huber, Geman-McClure 1.5", 0.3, LossType::geman_mcclure, 1.5));
+  schedules.push_back(two_rounds("Huber, Geman-McClure 2", 0.3, LossType::geman_mcclure, 2));
+  schedules.push_back(two_rounds("Huber, Geman-McClure 3", 0.3, LossType::geman_mcclure, 3));
+  schedules.push_back(two_rounds("Huber to 0.003, GM 1.5", 0.003, LossType::geman_mcclure, 1.5));
+  schedules.push_back(two_rounds("Huber to 0.03, GM 1.5", 0.03, LossType::geman_mcclure, 1.5));
+  schedules.push_back(two_rounds("Huber to 3, GM 1.5", 3, LossType::geman_mcclure, 1.5));
+  schedules.push_back(two_rounds("Huber, GM 1.5 to 1e-3", 0.3, LossType::geman_mcclure, 1.5, 1e-3));
+  schedules.push_back(two_rounds("Huber, GM 1.5 to 1e-6", 0.3, LossType::geman_mcclure, 1.5, 1e-6));
 
   struct Case {
     int points;
     double outliers, moving, start_m, start_deg;
   };
-  const Case cases[] = {{300, 0.1, 0, 0.02, 1}, {300, 0.3, 0, 0.02, 1}, {1000, 0.1, 0, 0.02, 1}, {1000, 0.3, 0, 0.02, 1}, {300, 0.1, 0.2, 0.02, 1}, {300, 0.3, 0, 0.2, 8}};
+  const Case cases[] = {{30, 0.1, 0, 0.02, 1}, {300, 0.1, 0, 0.02, 1}, {300, 0.3, 0, 0.02, 1}, {1000, 0.1, 0, 0.02, 1}, {1000, 0.3, 0, 0.02, 1}, {300, 0.1, 0.2, 0.02, 1}, {300, 0.3, 0, 0.2, 8}};
   std::printf("error relative to the floor (median) / data passes (median) / failures\n%-34s", "");
   for (const Case& c : cases) std::printf(" N%d o%.0f m%.0f %gcm,%gdeg |", c.points, 100 * c.outliers, 100 * c.moving, 100 * c.start_m, c.start_deg);
   std::printf("\n");

@@ -101,7 +101,7 @@
   CFP_LAYOUT(cfp::Truncated<double>, delta)                              \
   CFP_LAYOUT(cfp::RobustLoss<float>, delta)                              \
   CFP_LAYOUT(cfp::RobustLoss<double>, delta)                             \
-  CFP_LAYOUT(cfp::PoseRound, inliers_only)                               \
+  CFP_LAYOUT(cfp::PoseRound, min_mean_decrease)                          \
   CFP_LAYOUT(cfp::WeightedPnPOptions, round_count)                       \
   CFP_LAYOUT(cfp::PoseObservations<float>, baseline_fx)                  \
   CFP_LAYOUT(cfp::PoseObservations<double>, baseline_fx)                 \

@@ -71,7 +71,7 @@ TEST_CASE("Weighted PnP: ORB-SLAM2's schedule gives Ceres' pose to 1e-5 m on 300
 TEST_CASE("Weighted PnP: the default schedule gives Ceres' pose when both converge", "[optimization]") {
   cfp::WeightedPnPWorkspace<double> workspace;
   cfp::WeightedPnPOptions options;
-  for (cfp::PoseRound& round : options.rounds) round.min_decrease = 1e-12, round.max_iterations = 100;
+  for (cfp::PoseRound& round : options.rounds) round.min_decrease = 1e-12, round.min_mean_decrease = 0, round.max_iterations = 100;
   for (int i = 0; i < 100; ++i) {
     const auto scene = make_pose_scene<double>(static_cast<std::uint64_t>(2000 + i), scene_options(i));
     const std::vector<double> weights = random_weights(i, scene.points.size());

@@ -227,4 +227,5 @@ TEST_CASE("Weighted PnP: options outside their range are named", "[optimization]
   CHECK(named([](auto& o) { o.rounds[0].scale = -1; }) == "rounds.scale");
   CHECK(named([](auto& o) { o.rounds[1].max_iterations = 0; }) == "rounds.max_iterations");
   CHECK(named([](auto& o) { o.rounds[1].min_decrease = 0; }) == "rounds.min_decrease");
+  CHECK(named([](auto& o) { o.rounds[1].min_mean_decrease = -1; }) == "rounds.min_mean_decrease");
 }

@@ -28,7 +28,7 @@ PoseSceneOptions mixed(int points = 200) {
 /// Converged far below the statistical error, so that two ways to the same minimum can be compared.
 cfp::WeightedPnPOptions tight() {
   cfp::WeightedPnPOptions options;
-  for (cfp::PoseRound& round : options.rounds) round.min_decrease = 1e-14, round.max_iterations = 50;
+  for (cfp::PoseRound& round : options.rounds) round.min_decrease = 1e-14, round.min_mean_decrease = 0, round.max_iterations = 50;
   return options;
 }
 

@@ -171,11 +171,11 @@ struct PoseColumns {
 
   void add_weights(std::size_t begin, std::size_t end, double& sum, double& sum_sq) const noexcept {
     double s[4] = {}, q[4] = {};  // four chains of additions
-    for (std::size_t i = begin; i < end; ++i) {
-      const double w = static_cast<double>(weight[i]);
-      s[(i - begin) % 4] += w;
-      q[(i - begin) % 4] += w * w;
+    const auto add = [&](std::size_t chain, double w) { s[chain] += w, q[chain] += w * w; };
+    for (; begin + 4 <= end; begin += 4) {
+      for (std::size_t chain = 0; chain < 4; ++chain) add(chain, static_cast<double>(weight[begin + chain]));
     }
+    for (std::size_t chain = 0; begin < end; ++begin, ++chain) add(chain, static_cast<double>(weight[begin]));
     sum += (s[0] + s[1]) + (s[2] + s[3]);
     sum_sq += (q[0] + q[1]) + (q[2] + q[3]);
   }

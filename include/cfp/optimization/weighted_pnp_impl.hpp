@@ -187,6 +187,7 @@ class PoseRefinement {
   void solve(const PoseRound& round, WeightedPnPResult& result) noexcept {
     constexpr double degenerate = static_cast<double>(Tolerance<Scalar>::degenerate), rounding = static_cast<double>(std::numeric_limits<Scalar>::epsilon());
     constexpr double near = 100;  // decrease, so 10 sigma of the pose: further away a difference of gradients says little of the minimum
+    const double enough = (std::max)(round.min_decrease, round.min_mean_decrease * result.used);
     system_ = evaluate(pose_, round);
     ++result.evaluations;
     Matrix6<double> correction = Matrix6<double>::Zero();
@@ -205,7 +206,7 @@ class PoseRefinement {
       }
       double decrease = 0;  // of the quadratic model
       for (int i = 0; i < 6; ++i) decrease += -system_.g[i] * step[i] + damping * H(i, i) * step[i] * step[i];
-      if (damping == 0 && !(decrease > (std::max)(round.min_decrease, rounding * system_.cost))) {
+      if (damping == 0 && !(decrease > (std::max)(enough, rounding * system_.cost))) {
         result.reason = PoseStop::converged;
         break;
       }
