@@ -45,6 +45,7 @@
 #include "cfp/geometry/undistort.hpp"
 #include "cfp/math/chi_squared.hpp"
 #include "cfp/math/cubic.hpp"
+#include "cfp/math/exponential.hpp"
 #include "cfp/math/logistic.hpp"
 #include "cfp/math/order_statistic.hpp"
 #include "cfp/math/sampling.hpp"

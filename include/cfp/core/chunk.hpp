@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 
+#include "cfp/core/packet.hpp"
 #include "cfp/core/span.hpp"
 
 namespace cfp::detail {
@@ -22,6 +23,15 @@ using Chunk = Eigen::Array<Scalar, static_cast<int>(chunk_size), 1>;
 template <typename Work>
 void for_each_chunk(std::size_t n, Work&& work) {
   for (std::size_t first = 0; first < n; first += chunk_size) work(first, (std::min)(chunk_size, n - first));
+}
+
+/// to[i] = formula(from[i]...), packet by packet; `to` may be one of `from`. Formulas with a choice belong here: select() cannot
+/// become a branch, which the vectorisers of compilers do not promise for a conditional expression.
+template <typename Scalar, typename Formula, typename... From>
+void map_chunk(Chunk<Scalar>& to, const Formula& formula, const From&... from) noexcept {
+  constexpr std::size_t step = static_cast<std::size_t>(lanes_of<Packet<Scalar>>);
+  static_assert(chunk_size % step == 0, "whole packets");
+  for (std::size_t i = 0; i < chunk_size; i += step) store(to.data() + i, formula(load<Packet<Scalar>>(from.data() + i)...));
 }
 
 template <typename Scalar>

@@ -3,9 +3,13 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
 
+#include "cfp/core/chunk.hpp"
 #include "cfp/core/numeric.hpp"
+#include "cfp/core/span.hpp"
 #include "cfp/math/so3.hpp"
 
 namespace cfp {
@@ -19,6 +23,26 @@ inline constexpr Scalar no_distance = Scalar(-1);
 template <typename Scalar>
 [[nodiscard]] constexpr bool has_distance(const Scalar& d) noexcept {
   return d >= Scalar(0) && d <= Scalar((std::numeric_limits<Scalar>::max)());
+}
+
+/// Copies those of `from` that are distances, in their order; `to` needs room for all of them and may be the same memory.
+/// Returns how many there are. Without a branch per element: which distances are missing is hard to foresee.
+template <typename Scalar>
+std::size_t copy_distances(span<const Scalar> from, span<Scalar> to) noexcept {
+  CFP_ASSERT(to.size() >= from.size());
+  std::size_t kept = 0;
+  detail::for_each_chunk(from.size(), [&](std::size_t first, std::size_t count) {
+    detail::Chunk<Scalar> d;
+    std::uint8_t keep[detail::chunk_size];
+    detail::load_chunk(from, first, count, d);
+    for (std::size_t i = 0; i < detail::chunk_size; ++i)
+      keep[i] = static_cast<std::uint8_t>(static_cast<int>(d.data()[i] >= Scalar(0)) & static_cast<int>(d.data()[i] <= (std::numeric_limits<Scalar>::max)()));
+    for (std::size_t i = 0; i < count; ++i) {
+      to.data()[kept] = d.data()[i];
+      kept += keep[i];
+    }
+  });
+  return kept;
 }
 
 namespace detail {

@@ -5,12 +5,13 @@
 #pragma once
 
 #include <cmath>
-#include <limits>
+#include <cstddef>
 #include <type_traits>
 
 #include "cfp/core/chunk.hpp"
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
+#include "cfp/math/exponential.hpp"
 
 namespace cfp::detail {
 
@@ -122,13 +123,13 @@ template <typename T>
 template <typename Scalar>
 void half_exponential(span<const Scalar> x, Scalar factor, Scalar below, span<Scalar> out) noexcept {
   for_each_chunk(x.size(), [&](std::size_t first, std::size_t count) {
-    Chunk<Scalar> values;
+    using P = Packet<Scalar>;
+    using std::abs;
+    Chunk<Scalar> values, result;
     load_chunk(x, first, count, values);
-    Chunk<Scalar> result = factor * (Scalar(-0.5) * values).exp();
-    for (Eigen::Index i = 0; i < values.size(); ++i) {
-      const Scalar tail = values[i] <= (std::numeric_limits<Scalar>::max)() ? result[i] : Scalar(0);
-      result[i] = values[i] < Scalar(0) ? below : tail;
-    }
+    map_chunk(result, [](const P& v) { return P(Scalar(-0.5)) * abs(v); }, values);
+    const Chunk<Scalar> tail = exponential_of_nonpositive(result);
+    map_chunk(result, [&](const P& v, const P& t) { return select(v < P(Scalar(0)), P(below), P(factor) * t); }, values, tail);
     store_chunk(result, first, count, out);
   });
 }

@@ -3,11 +3,11 @@
 #pragma once
 
 #include <cmath>
-
-#include <Eigen/Core>
+#include <cstddef>
 
 #include "cfp/core/chunk.hpp"
 #include "cfp/core/span.hpp"
+#include "cfp/math/exponential.hpp"
 
 namespace cfp {
 
@@ -23,20 +23,37 @@ template <typename Scalar>
   return e / (Scalar(1) + e);
 }
 
+namespace detail {
+
+/// logistic of every element of the chunk, NaN becomes 0.
+template <typename Scalar>
+[[nodiscard]] Chunk<Scalar> logistic_of_chunk(const Chunk<Scalar>& x) noexcept {
+  using P = Packet<Scalar>;
+  using std::abs;
+  Chunk<Scalar> result;
+  map_chunk(result, [](const P& v) { return -abs(v); }, x);
+  const Chunk<Scalar> e = exponential_of_nonpositive(result);
+  map_chunk(
+      result,
+      [](const P& v, const P& power) {
+        const P p = select(v >= P(Scalar(0)), P(Scalar(1)), power) / (P(Scalar(1)) + power);
+        return select(v <= v, p, P(Scalar(0)));
+      },
+      x, e);
+  return result;
+}
+
+}  // namespace detail
+
 /// logistic of every element; `out` may be the same memory as `in`. Equal to the scalar function up to a few roundings
 /// (absolutely, not relatively, below -700 for double and -85 for float). Vectorised; allocates nothing.
 template <typename Scalar>
 void logistic(span<const Scalar> in, span<Scalar> out) noexcept {
   CFP_ASSERT(in.size() == out.size());
-  using Chunk = detail::Chunk<Scalar>;
   detail::for_each_chunk(in.size(), [&](std::size_t first, std::size_t count) {
-    Chunk x;
+    detail::Chunk<Scalar> x;
     detail::load_chunk(in, first, count, x);
-    const Chunk e = (-x.abs()).exp();
-    Chunk p = (Scalar(1) + e).inverse();
-    for (Eigen::Index i = 0; i < x.size(); ++i) p[i] *= x[i] >= Scalar(0) ? Scalar(1) : e[i];
-    for (Eigen::Index i = 0; i < x.size(); ++i) p[i] = x[i] == x[i] ? p[i] : Scalar(0);
-    detail::store_chunk(p, first, count, out);
+    detail::store_chunk(detail::logistic_of_chunk(x), first, count, out);
   });
 }
 

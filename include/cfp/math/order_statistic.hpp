@@ -44,16 +44,13 @@ template <typename Scalar>
 /// content is unspecified. 0 for an empty span; a rank beyond the end counts as the last.
 ///
 /// A histogram over the bit patterns, ordered as the numbers are, narrows the candidates to those of one of 256 buckets,
-/// again and again until few are left: linear for any distribution (at most 5 rounds for float, 10 for double), without
-/// the branch misses that make up most of std::nth_element's time. Allocates nothing.
+/// again and again until few are left, which are compared with each other: linear for any distribution (at most 5 rounds for
+/// float, 10 for double), without the branch misses that make up most of std::nth_element's time. Allocates nothing.
 template <typename Scalar>
 [[nodiscard]] Scalar order_statistic(span<Scalar> scratch, std::size_t rank0) noexcept {
   CFP_ASSERT(rank0 < scratch.size());
   if (scratch.empty()) return Scalar(0);
-  std::size_t ranks[1] = {(std::min)(rank0, scratch.size() - 1)};
-  Scalar values[1];
-  detail::select(scratch.data(), scratch.size(), ranks, values, 1);
-  return values[0];
+  return detail::select_one(scratch.data(), scratch.size(), (std::min)(rank0, scratch.size() - 1), detail::value_range(scratch.data(), scratch.size()));
 }
 
 /// The values at the quantile ranks of `quantiles` (ascending), as {0.1, 0.2, 0.3}, with one pass over the data for all.
@@ -68,7 +65,7 @@ template <typename Scalar, std::size_t Count>
     ranks[i] = quantile_rank(quantiles[i], scratch.size()) - 1;
     CFP_ASSERT(i == 0 || ranks[i - 1] <= ranks[i]);
   }
-  detail::select(scratch.data(), scratch.size(), ranks.data(), values.data(), Count);
+  detail::select(scratch.data(), scratch.size(), ranks, values);
   return values;
 }
 

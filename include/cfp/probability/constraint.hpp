@@ -9,9 +9,11 @@
 
 #include <Eigen/Core>
 
+#include "cfp/core/chunk.hpp"
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/status.hpp"
+#include "cfp/geometry/distance.hpp"
 #include "cfp/math/logistic.hpp"
 #include "cfp/math/order_statistic.hpp"
 
@@ -45,13 +47,20 @@ struct ConstraintModel {
 /// Compares with D_Th by that sum alone, so distances above the threshold (moving or mismatched) do not lower it.
 template <typename Scalar>
 [[nodiscard]] Scalar calculation_confidence(span<const Scalar> distances_px, Scalar threshold_px) noexcept {
+  using Chunk = detail::Chunk<Scalar>;
   double sum = 0;
   std::size_t n = 0;
-  for (const Scalar d : distances_px) {
-    const bool below = d >= Scalar(0) && d < threshold_px;
-    sum += below ? static_cast<double>(d) : 0.0;
-    n += below ? 1U : 0U;
-  }
+  detail::for_each_chunk(distances_px.size(), [&](std::size_t first, std::size_t count) {
+    using P = Packet<Scalar>;
+    Chunk d, below, one;
+    detail::load_chunk(distances_px, first, count, d);
+    for (std::size_t i = count; i < detail::chunk_size; ++i) d.data()[i] = Scalar(-1);
+    const P zero(Scalar(0)), threshold(threshold_px);
+    detail::map_chunk(below, [&](const P& v) { return select(both(v >= zero, v < threshold), v, zero); }, d);
+    detail::map_chunk(one, [&](const P& v) { return select(both(v >= zero, v < threshold), P(Scalar(1)), zero); }, d);
+    sum += static_cast<double>(below.sum());
+    n += static_cast<std::size_t>(one.sum());
+  });
   if (n == 0 || !is_finite(threshold_px)) return Scalar(0);
   return Scalar(clamp_probability(1.0 - sum / static_cast<double>(n) / static_cast<double>(threshold_px)));
 }
@@ -65,15 +74,13 @@ template <typename Scalar>
                                                      const ConstraintOptions& options) noexcept {
   CFP_ASSERT(scratch.size() >= outside_distances_px.size());
   ConstraintModel<Scalar> model;
-  std::size_t n = 0;
-  for (const Scalar d : outside_distances_px) {
-    if (d >= Scalar(0) && is_finite(d)) scratch[n++] = d;
-  }
+  const std::size_t n = copy_distances(outside_distances_px, scratch);
   model.samples = n;
   if (n < (std::max)(options.min_samples, std::size_t(1))) return model;
   const span<Scalar> samples = scratch.subspan(0, n);
-  model.minimum_px = minimum(samples);
-  model.threshold_px = order_statistic(samples, quantile_rank(options.quantile, n) - 1);
+  const detail::ValueRange<Scalar> range = detail::value_range(samples.data(), n);
+  model.minimum_px = range.smallest;
+  model.threshold_px = detail::select_one(samples.data(), n, quantile_rank(options.quantile, n) - 1, range);
   model.calculation_confidence = calculation_confidence(outside_distances_px, model.threshold_px);
   const Scalar spread = model.threshold_px - model.minimum_px;
   const Scalar slope = Scalar(options.steepness) / spread;
@@ -105,17 +112,16 @@ void static_probabilities(const ConstraintModel<Scalar>& model, span<const Scala
     for (std::size_t i = 0; i < n; ++i) out[i] = static_probability(model, distances_px[i]);
     return;
   }
-  constexpr std::size_t chunk = 64;
-  using Chunk = Eigen::Array<Scalar, Eigen::Dynamic, 1, 0, static_cast<int>(chunk), 1>;
-  for (std::size_t first = 0; first < n; first += chunk) {
-    const std::size_t m = (std::min)(chunk, n - first);
-    const Chunk d = Eigen::Map<const Chunk>(distances_px.data() + first, static_cast<Eigen::Index>(m));
-    Eigen::Map<Chunk> k(out.data() + first, static_cast<Eigen::Index>(m));
-    k = (model.threshold_px - d) * model.slope_per_px;
-    const span<Scalar> part = out.subspan(first, m);
-    logistic(span<const Scalar>(part), part);
-    k = (d >= Scalar(0)).select(k, Scalar(0));
-  }
+  using Chunk = detail::Chunk<Scalar>;
+  detail::for_each_chunk(n, [&](std::size_t first, std::size_t count) {
+    using P = Packet<Scalar>;
+    Chunk d, k;
+    detail::load_chunk(distances_px, first, count, d);
+    detail::map_chunk(k, [&](const P& v) { return (P(model.threshold_px) - v) * P(model.slope_per_px); }, d);
+    k = detail::logistic_of_chunk(k);
+    detail::map_chunk(k, [](const P& v, const P& p) { return select(v >= P(Scalar(0)), p, P(Scalar(0))); }, d, k);
+    detail::store_chunk(k, first, count, out);
+  });
 }
 
 }  // namespace cfp

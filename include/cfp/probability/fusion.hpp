@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/probability/keypoint_first_stage.hpp"
@@ -32,15 +33,13 @@ template <typename Scalar>
 /// epipolar constraint, or K^F if only that is available. Neither: 0.
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar fuse_low_dynamic(const Evidence<Scalar>& projection, const Evidence<Scalar>& epipolar) noexcept {
-  const Scalar ct = projection.available ? clamp_probability(projection.confidence) : Scalar(0);
-  const Scalar cf = epipolar.available ? clamp_probability(epipolar.confidence) : Scalar(0);
-  const Scalar sum = ct + cf;
+  if (!epipolar.available) return projection.available ? clamp_probability(projection.static_probability) : Scalar(0);
+  if (!projection.available) return clamp_probability(epipolar.static_probability);
+  const Scalar ct = clamp_probability(projection.confidence), sum = ct + clamp_probability(epipolar.confidence);
   // Confidences near the smallest normal number lose their digits; below it they are no confidences.
-  if (sum > (std::numeric_limits<Scalar>::min)()) {
-    return clamp_probability(projection.static_probability * (ct / sum) + epipolar.static_probability * (cf / sum));
-  }
-  if (projection.available) return clamp_probability(projection.static_probability);
-  return epipolar.available ? clamp_probability(epipolar.static_probability) : Scalar(0);
+  if (!(sum > (std::numeric_limits<Scalar>::min)())) return clamp_probability(projection.static_probability);
+  const Scalar share = ct / sum;
+  return clamp_probability(projection.static_probability * share + epipolar.static_probability * (Scalar(1) - share));
 }
 
 /// All that the second stage needs to know of one keypoint inside a box.

@@ -12,6 +12,7 @@
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/status.hpp"
+#include "cfp/geometry/distance.hpp"
 #include "cfp/math/chi_squared.hpp"
 #include "cfp/math/order_statistic.hpp"
 
@@ -86,10 +87,7 @@ template <typename Scalar>
   CFP_ASSERT(scratch.size() >= epipolar_distances_px.size());
   ObjectProbability result;
   result.static_probability = options.unknown_object_probability;
-  std::size_t n = 0;
-  for (const Scalar d : epipolar_distances_px) {
-    if (d >= Scalar(0) && is_finite(d)) scratch[n++] = d;
-  }
+  const std::size_t n = copy_distances(epipolar_distances_px, scratch);
   result.pairs = n;
   if (n < (std::max)(options.min_pairs, std::size_t(1))) return result;
 
