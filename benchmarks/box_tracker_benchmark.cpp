@@ -9,6 +9,7 @@
 #include "cfp/core/random.hpp"
 #include "cfp/detection/box_tracker.hpp"
 #include "cfp/detection/ekf.hpp"
+#include "support/call_times.hpp"
 
 #ifdef CFP_HAVE_OPENCV
 #include <opencv2/video/tracking.hpp>
@@ -132,7 +133,8 @@ void dlib_kalman_8x4(benchmark::State& state) {
 #endif
 
 /// A whole frame: predict, associate, update, output. Boxes on a grid move to and fro; 10 % of the detections are missed.
-template <typename Scalar>
+/// `percentiles`: times every call by itself, which adds two readings of the clock to each.
+template <typename Scalar, bool percentiles = false>
 void cfp_frame(benchmark::State& state) {
   const int n = static_cast<int>(state.range(0));
   cfp::Random random(2, "tracker frames");
@@ -151,12 +153,21 @@ void cfp_frame(benchmark::State& state) {
   cfp::BoxTracker<Scalar> tracker(options);
   std::size_t k = 0, compensated = 0;
   std::int64_t ids = 0;
-  for (auto _ : state) {
+  cfp_benchmark::CallTimes times(state);
+  const auto next = [&] {
     const auto result = tracker.update(frames[k], Scalar(dt));
     compensated += result.compensated;
     for (const auto& box : result.boxes) ids = (std::max)(ids, box.id);
     k = (k + 1) % frames.size();
+  };
+  for (auto _ : state) {
+    if (percentiles) {
+      times.add(next);
+    } else {
+      next();
+    }
   }
+  times.report(state);
   state.counters["compensated"] = static_cast<double>(compensated) / static_cast<double>(state.iterations());
   state.counters["ids_per_frame"] = static_cast<double>(ids) / static_cast<double>(state.iterations());
 }
@@ -175,4 +186,5 @@ BENCHMARK(dlib_kalman_8x4);
 #endif
 BENCHMARK(cfp_frame<double>)->Arg(1)->Arg(5)->Arg(20)->Arg(50);
 BENCHMARK(cfp_frame<float>)->Arg(5)->Arg(20);
+BENCHMARK(cfp_frame<float, true>)->Arg(5)->Arg(20);
 BENCHMARK_MAIN();

@@ -1,23 +1,15 @@
-// Stage 2's formulas on N keypoints: reprojection and epipolar distances, the 0.8 order statistic and minimum of each, and
-// the logistic of each; the library's arrays against the loop that one would write first (scalar, std::sort). Every
-// iteration takes another of 16 inputs, so that the branch predictor cannot learn the data. Time per keypoint is 1/items.
-// The counter `difference` is the largest deviation from the scalar double computation over all outputs.
+// The distances of 1000 keypoints, one array per call, and the distorted camera. Every iteration takes another of 16 inputs. Time
+// per keypoint is 1/items. All of stage 2's formulas together: static_probability_benchmark.
 #include <benchmark/benchmark.h>
 
-#include <algorithm>
-#include <cmath>
 #include <vector>
 
 #include "cfp/core/random.hpp"
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/radial_tangential_camera.hpp"
 #include "cfp/geometry/reprojection.hpp"
-#include "cfp/math/logistic.hpp"
-#include "cfp/math/order_statistic.hpp"
 
 namespace {
-
-using cfp::span;
 
 template <typename Scalar>
 struct Frame {
@@ -58,109 +50,6 @@ std::vector<Frame<Scalar>> frames(std::size_t n) {
   }
   return all;
 }
-
-template <typename Scalar>
-struct Buffers {
-  std::vector<Scalar> distance, scratch, probability;
-  explicit Buffers(std::size_t n) : distance(n), scratch(n), probability(n) {}
-};
-
-/// (d - threshold) * 5 / (threshold - minimum), in place of the constraint's own arithmetic.
-template <typename Scalar>
-void sigmoid_of(const std::vector<Scalar>& distance, Scalar threshold, Scalar minimum, std::vector<Scalar>& probability) {
-  const Scalar slope = Scalar(-5) / (threshold - minimum);
-  for (std::size_t i = 0; i < distance.size(); ++i) probability[i] = (distance[i] - threshold) * slope;
-  cfp::logistic(span<const Scalar>(probability), span<Scalar>(probability));
-}
-
-template <typename Scalar>
-void adaptive_sigmoid(Buffers<Scalar>& b) {
-  std::copy(b.distance.begin(), b.distance.end(), b.scratch.begin());
-  const Scalar minimum = cfp::minimum(span<const Scalar>(b.scratch));
-  const Scalar threshold = cfp::order_statistic(span<Scalar>(b.scratch), cfp::quantile_rank(0.8, b.scratch.size()) - 1);
-  sigmoid_of(b.distance, threshold, minimum, b.probability);
-}
-
-template <typename Scalar>
-void stage_two(const Frame<Scalar>& frame, const cfp::PinholeCamera<Scalar>& lens, const cfp::SE3<Scalar>& T, const cfp::Matrix3<Scalar>& F,
-               Buffers<Scalar>& projection, Buffers<Scalar>& epipolar) {
-  cfp::reprojection_distances(lens, T, frame.prev, frame.depth, frame.cur, projection.distance);
-  adaptive_sigmoid(projection);
-  cfp::epipolar_distances(F, frame.prev, frame.cur, epipolar.distance);
-  adaptive_sigmoid(epipolar);
-}
-
-void sorted_sigmoid(Buffers<double>& b) {
-  b.scratch = b.distance;
-  std::sort(b.scratch.begin(), b.scratch.end());
-  const double minimum = b.scratch.front(), threshold = b.scratch[cfp::quantile_rank(0.8, b.scratch.size()) - 1];
-  for (std::size_t i = 0; i < b.distance.size(); ++i)
-    b.probability[i] = 1 / (1 + std::exp((b.distance[i] - threshold) * 5 / (threshold - minimum)));
-}
-
-void stage_two_first_thought(const Frame<double>& frame, const cfp::SE3<double>& T, const cfp::Matrix3<double>& F,
-                             Buffers<double>& projection, Buffers<double>& epipolar) {
-  for (std::size_t i = 0; i < frame.prev.size(); ++i) {
-    const cfp::Vector3<double> p((frame.prev[i].x() - camera.cx) / camera.fx * frame.depth[i],
-                                 (frame.prev[i].y() - camera.cy) / camera.fy * frame.depth[i], frame.depth[i]);
-    const cfp::Vector3<double> q = T.rotation * p + T.translation;
-    projection.distance[i] =
-        (cfp::Vector2<double>(camera.fx * q.x() / q.z() + camera.cx, camera.fy * q.y() / q.z() + camera.cy) - frame.cur[i]).norm();
-    const cfp::Vector3<double> line = F * frame.prev[i].homogeneous();
-    epipolar.distance[i] = std::abs(line.dot(frame.cur[i].homogeneous())) / line.head<2>().norm();
-  }
-  sorted_sigmoid(projection);
-  sorted_sigmoid(epipolar);
-}
-
-template <typename Scalar>
-void BM_stage_two_cfp(benchmark::State& state) {
-  const std::size_t n = static_cast<std::size_t>(state.range(0));
-  const std::vector<Frame<Scalar>> inputs = frames<Scalar>(n);
-  const std::vector<Frame<double>> truth_inputs = frames<double>(n);
-  const cfp::SE3<double> T = pose();
-  const cfp::Matrix3<double> F = cfp::fundamental_from_pose(camera, T);
-  const cfp::Matrix3<Scalar> F_scalar = F.cast<Scalar>();
-  Buffers<Scalar> projection(n), epipolar(n);
-  Buffers<double> true_projection(n), true_epipolar(n);
-  std::size_t turn = 0;
-  for (auto _ : state) {
-    stage_two(inputs[turn++ % inputs.size()], camera_as<Scalar>(), T.cast<Scalar>(), F_scalar, projection, epipolar);
-    benchmark::DoNotOptimize(projection.probability.data());
-    benchmark::DoNotOptimize(epipolar.probability.data());
-    benchmark::ClobberMemory();
-  }
-  double difference = 0;
-  for (std::size_t f = 0; f < inputs.size(); ++f) {
-    stage_two(inputs[f], camera_as<Scalar>(), T.cast<Scalar>(), F_scalar, projection, epipolar);
-    stage_two_first_thought(truth_inputs[f], T, F, true_projection, true_epipolar);
-    for (std::size_t i = 0; i < n; ++i) {
-      difference = std::fmax(difference, std::abs(static_cast<double>(projection.probability[i]) - true_projection.probability[i]));
-      difference = std::fmax(difference, std::abs(static_cast<double>(epipolar.probability[i]) - true_epipolar.probability[i]));
-    }
-  }
-  state.counters["difference"] = difference;
-  state.SetItemsProcessed(state.iterations() * state.range(0));
-}
-BENCHMARK(BM_stage_two_cfp<float>)->Arg(100)->Arg(1000)->Arg(10000);
-BENCHMARK(BM_stage_two_cfp<double>)->Arg(100)->Arg(1000)->Arg(10000);
-
-void BM_stage_two_scalar_sort(benchmark::State& state) {
-  const std::size_t n = static_cast<std::size_t>(state.range(0));
-  const std::vector<Frame<double>> inputs = frames<double>(n);
-  const cfp::SE3<double> T = pose();
-  const cfp::Matrix3<double> F = cfp::fundamental_from_pose(camera, T);
-  Buffers<double> projection(n), epipolar(n);
-  std::size_t turn = 0;
-  for (auto _ : state) {
-    stage_two_first_thought(inputs[turn++ % inputs.size()], T, F, projection, epipolar);
-    benchmark::DoNotOptimize(projection.probability.data());
-    benchmark::DoNotOptimize(epipolar.probability.data());
-    benchmark::ClobberMemory();
-  }
-  state.SetItemsProcessed(state.iterations() * state.range(0));
-}
-BENCHMARK(BM_stage_two_scalar_sort)->Arg(100)->Arg(1000)->Arg(10000);
 
 template <typename Scalar>
 void BM_reprojection_distances(benchmark::State& state) {

@@ -1,0 +1,109 @@
+// What runs once per frame, as a whole, with the spread of single calls: the first and second stage on a frame of about 1000
+// keypoints, 3 boxes of people and 500 optical-flow pairs (images and the optical flow itself excluded), with the fundamental matrix
+// estimated and given. 16 frames rotate. Quality: `auc` of K after both stages for static against moving keypoints inside boxes.
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "cfp/evaluation/calibration.hpp"
+#include "cfp/geometry/epipolar.hpp"
+#include "support/call_times.hpp"
+#include "support/pipeline_runs.hpp"
+
+namespace {
+
+constexpr std::size_t frames = 16, flow_pairs = 500;
+
+template <typename Scalar>
+struct Frame {
+  cfp_test::SecondStageRun<Scalar> run;
+  std::vector<std::array<Scalar, 2>> flow_previous, flow_current;
+  cfp::Matrix3<Scalar> F;
+
+  explicit Frame(cfp_test::DynamicScene<Scalar> scene) : run(std::move(scene)) {
+    const auto& s = run.scene;
+    for (std::size_t i = 0; i < flow_pairs; ++i) {
+      const std::size_t at = i * s.keypoints.size() / flow_pairs;
+      flow_previous.push_back(s.previous_keypoints[at]);
+      flow_current.push_back(s.keypoints[at]);
+    }
+    const cfp::PinholeCamera<double> camera{static_cast<double>(s.camera.fx), static_cast<double>(s.camera.fy), static_cast<double>(s.camera.cx),
+                                            static_cast<double>(s.camera.cy)};
+    F = cfp::fundamental_from_pose(camera, s.T_cur_prev).template cast<Scalar>();
+  }
+  void first_stage(const cfp::FirstStageOptions& options, bool F_given) {
+    const auto& s = run.scene;
+    const cfp::FirstStageInput<Scalar> in{s.keypoints, s.depths, run.boxes, flow_previous, flow_current, F_given ? &F : nullptr};
+    cfp::first_stage(in, s.camera, {run.k, run.label, run.ruling_box, run.objects}, options, run.work);
+  }
+  void second_stage(const cfp::SecondStageOptions& options) {
+    std::fill(run.m.begin(), run.m.end(), Scalar(1));
+    run.second(options);
+  }
+};
+
+template <typename Scalar>
+std::vector<Frame<Scalar>> make_frames() {
+  std::vector<Frame<Scalar>> all;
+  cfp_test::DynamicSceneOptions options;
+  options.people = 3;
+  options.points_per_person = 110;
+  options.wall_points = 670;
+  for (std::size_t i = 0; i < frames; ++i) all.emplace_back(cfp_test::make_dynamic_scene<Scalar>(options, 100 + i));
+  return all;
+}
+
+enum class Stages { first, second, both };
+
+template <typename Scalar, Stages stages, bool F_given>
+void frame(benchmark::State& state) {
+  std::vector<Frame<Scalar>> all = make_frames<Scalar>();
+  const cfp::FirstStageOptions first_options;
+  const cfp::SecondStageOptions second_options;
+  const auto run = [&](Frame<Scalar>& f) {
+    if (stages != Stages::second) f.first_stage(first_options, F_given);
+    if (stages != Stages::first) f.second_stage(second_options);
+  };
+  for (Frame<Scalar>& f : all) {
+    f.first_stage(first_options, F_given);
+    run(f);
+  }
+  cfp_benchmark::CallTimes times(state);
+  std::size_t turn = 0;
+  for (auto _ : state) {
+    times.add([&] { run(all[turn]); });
+    turn = (turn + 1) % frames;
+  }
+  times.report(state);
+
+  std::vector<double> k;
+  std::vector<char> is_static;
+  double keypoints = 0;
+  for (Frame<Scalar>& f : all) {
+    f.first_stage(first_options, F_given);
+    if (stages != Stages::first) f.second_stage(second_options);
+    keypoints += static_cast<double>(f.run.k.size()) / frames;
+    for (std::size_t i = 0; i < f.run.k.size(); ++i) {
+      if (f.run.label[i] != cfp::KeypointLabel::foreground && f.run.label[i] != cfp::KeypointLabel::background) continue;
+      k.push_back(static_cast<double>(f.run.k[i]));
+      is_static.push_back(f.run.scene.is_static[i]);
+    }
+  }
+  state.counters["keypoints"] = keypoints;
+  cfp::CalibrationWorkspace workspace;
+  state.counters["auc"] = cfp::area_under_curve(cfp::span<const double>(k), cfp::span<const char>(is_static), cfp::span<const double>(), workspace).auc;
+}
+
+}  // namespace
+
+BENCHMARK(frame<float, Stages::both, false>)->Unit(benchmark::kMicrosecond);
+BENCHMARK(frame<float, Stages::both, true>)->Unit(benchmark::kMicrosecond);
+BENCHMARK(frame<double, Stages::both, false>)->Unit(benchmark::kMicrosecond);
+BENCHMARK(frame<double, Stages::both, true>)->Unit(benchmark::kMicrosecond);
+BENCHMARK(frame<float, Stages::first, true>)->Unit(benchmark::kMicrosecond);
+BENCHMARK(frame<float, Stages::second, true>)->Unit(benchmark::kMicrosecond);
+BENCHMARK_MAIN();
