@@ -10,16 +10,9 @@
 
 #include <opencv2/features2d.hpp>
 
-namespace cfp_slam {
+#include "options.hpp"
 
-struct FeatureOptions {
-  int count = 1000;           // keypoints kept
-  int candidates = 3000;      // corners to choose from
-  int levels = 8;             // of the image pyramid
-  float scale_factor = 1.2F;  // between them
-  int fast_threshold = 12;    // grey levels
-  int cell = 40;              // pixels, at the level's own scale
-};
+namespace cfp_slam {
 
 class FeatureExtractor {
  public:

@@ -8,19 +8,9 @@
 
 #include "features.hpp"
 #include "map.hpp"
+#include "options.hpp"
 
 namespace cfp_slam {
-
-struct MappingOptions {
-  int min_gap = 3;                    // frames between keyframes, at least; the bundle adjustment is handed over within it
-  int max_gap = 30;                   // and at most
-  double reference_share = 0.75;      // fewer inliers than this share of the reference keyframe's points: take one
-  float close_m = 3.2F;               // points whose depth says much about the position (ORB-SLAM2: 40 baselines)
-  std::size_t min_close = 100, new_close = 70;  // fewer close ones tracked, and more to be had: take one
-  float min_static_probability = 0.3F;          // keypoints below make no points; the paper's deletion threshold of M
-  double min_found_share = 0.25;      // points seen in a smaller share of the frames that should see them go
-  std::size_t min_observations = 2;   // as do points in fewer keyframes than this, three keyframes after their own
-};
 
 class Mapping {
  public:

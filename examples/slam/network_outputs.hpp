@@ -30,7 +30,7 @@ constexpr const char* to_string(NetworkFamily family) {
 }
 
 // A contiguous tensor of floats, seen as rows x columns of its last two dimensions.
-struct Table {
+struct OutputTable {
   const float* data = nullptr;
   int rows = 0, cols = 0;
   [[nodiscard]] const float* row(int r) const { return data + static_cast<std::ptrdiff_t>(r) * cols; }
@@ -42,7 +42,7 @@ inline bool is_table(const cv::Mat& m) {
   }
   return m.dims >= 2 && m.type() == CV_32F && m.isContinuous() && m.total() > 0;
 }
-inline Table table_of(const cv::Mat& m) { return {m.ptr<float>(), m.size[m.dims - 2], m.size[m.dims - 1]}; }
+inline OutputTable table_of(const cv::Mat& m) { return {m.ptr<float>(), m.size[m.dims - 2], m.size[m.dims - 1]}; }
 
 inline std::string shapes_of(const std::vector<cv::Mat>& outputs) {
   std::string text;
@@ -69,7 +69,7 @@ constexpr int nanodet_bins = 8;
 
 // NanoDet's outputs in pairs: scores and distances of one stride.
 struct NanodetLevel {
-  Table scores, distances;
+  OutputTable scores, distances;
   int stride;
 };
 inline std::vector<NanodetLevel> nanodet_levels(const std::vector<cv::Mat>& outputs, cv::Size input) {
@@ -100,7 +100,7 @@ inline NetworkLayout recognise(const std::vector<cv::Mat>& outputs, cv::Size inp
     return {NetworkFamily::darknet, table_of(outputs[0]).cols - 5};
   }
   if (outputs.size() == 1 && is_table(outputs[0])) {
-    const Table t = table_of(outputs[0]);
+    const OutputTable t = table_of(outputs[0]);
     const auto on_grid = [&](int n, int per_cell) {
       return n == per_cell * grid_cells(input, {8, 16, 32}) || n == per_cell * grid_cells(input, {8, 16, 32, 64});
     };
@@ -138,7 +138,7 @@ inline void keep(Detections& found, const cfp::Box<float>& box, int class_id, fl
 inline cfp::Box<float> centred(float cx, float cy, float w, float h) { return {cx - w / 2, cy - h / 2, cx + w / 2, cy + h / 2}; }
 
 inline void decode_yolov5(const cv::Mat& output, float min_score, Detections& found) {
-  const Table t = table_of(output);
+  const OutputTable t = table_of(output);
   for (int r = 0; r < t.rows; ++r) {
     const float* v = t.row(r);
     if (!(v[4] >= min_score)) continue;  // a class score is at most 1
@@ -148,7 +148,7 @@ inline void decode_yolov5(const cv::Mat& output, float min_score, Detections& fo
 }
 
 inline void decode_yolov8(const cv::Mat& output, float min_score, Detections& found) {
-  const Table t = table_of(output);
+  const OutputTable t = table_of(output);
   std::vector<float> best(static_cast<std::size_t>(t.cols), -1.0F);
   std::vector<int> id(best.size(), 0);
   for (int c = 4; c < t.rows; ++c) {  // along the rows, as they lie in memory
@@ -163,7 +163,7 @@ inline void decode_yolov8(const cv::Mat& output, float min_score, Detections& fo
 }
 
 inline void decode_darknet(const cv::Mat& output, cv::Size input, float min_score, Detections& found) {
-  const Table t = table_of(output);
+  const OutputTable t = table_of(output);
   const auto width = static_cast<float>(input.width), height = static_cast<float>(input.height);
   for (int r = 0; r < t.rows; ++r) {
     const float* v = t.row(r);

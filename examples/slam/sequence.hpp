@@ -172,8 +172,8 @@ class Sequence {
     options.max_difference_s = max_difference_s;
     cfp::AssociationWorkspace workspace;
     std::vector<cfp::TimeMatch> matches;
-    using View = cfp::span<const cfp::StampedPose<double>>;
-    cfp::associate(View(colors), View(others), options, workspace, matches);
+    using Stamps = cfp::span<const cfp::StampedPose<double>>;
+    cfp::associate(Stamps(colors), Stamps(others), options, workspace, matches);
     for (const cfp::TimeMatch& m : matches) frames_[m.first].*member = list[m.second];
   }
 

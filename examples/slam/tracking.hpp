@@ -16,31 +16,19 @@
 
 #include <opencv2/core.hpp>
 
+#include "cfp/geometry/radial_tangential_camera.hpp"
 #include "cfp/interop/opencv.hpp"
 #include "cfp/optimization/weighted_pnp.hpp"
 #include "cfp/pipeline/static_probability_pipeline.hpp"
 #include "local_bundle.hpp"
 #include "mapping.hpp"
 #include "matching.hpp"
+#include "options.hpp"
 #include "record.hpp"
 #include "relocalization.hpp"
 #include "stopwatch.hpp"
 
 namespace cfp_slam {
-
-struct TrackingOptions {
-  cfp::PipelineOptions pipeline;
-  FeatureOptions features;
-  MappingOptions mapping;
-  LocalBundleOptions bundle;
-  cfp::WeightedPnPOptions pose;
-  bool threads = true;                // bundle adjustment beside the tracking
-  double baseline_fx = 40;            // ORB-SLAM2's Camera.bf for this sensor
-  std::size_t min_first_inliers = 10;  // for the first stage's pose
-  std::size_t min_inliers = 20;        // for a tracked frame
-  std::size_t min_initial_points = 100;
-  float search_radius = 15;  // pixels at level 0, around a point of the last frame
-};
 
 // What the front end made of a frame.
 struct FrameFeatures {
@@ -53,18 +41,19 @@ struct FrameFeatures {
   std::vector<cfp::Detection<float>> detections;
 };
 
-template <typename Camera>
 class Tracking {
  public:
-  Tracking(const Camera& camera, const cfp::PinholeCamera<float>& pinhole, int width, int height, const TrackingOptions& options, std::uint64_t seed)
-      : options_(options), camera_(camera), pinhole_(pinhole), solver_camera_{pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy}, width_(width), height_(height),
-        pipeline_(options.pipeline), mapping_(options.mapping, options.features, pinhole), relocalization_(seed) {}
+  Tracking(const cfp::RadialTangentialCamera<float>& camera, int width, int height, const TrackingOptions& options)
+      : options_(options), camera_(camera), pinhole_(camera.pinhole()), solver_camera_{camera.fx, camera.fy, camera.cx, camera.cy}, width_(width), height_(height),
+        pipeline_(options.pipeline), mapping_(options.mapping, options.features, pinhole_), relocalization_(options.seed) {}
 
-  // observe(PipelineStep, FrameResult, Frame): for recordings.
+  // The outcome goes into the record, which will be the record_index-th of the run. observe(PipelineStep, FrameResult, Frame): for recordings.
   template <typename Observer>
-  void track(FrameFeatures&& features, FrameRecord& record, Observer&& observe) {
+  void track(FrameFeatures&& features, FrameRecord& record, std::size_t record_index, Observer&& observe) {
     Stopwatch watch(record.milliseconds);
+    record_index_ = record_index;
     finish_bundle(false);
+    record.milliseconds[static_cast<std::size_t>(Module::bundle_adjustment)] = bundle_milliseconds_;
     Frame frame = begin_frame(features);
     grid_.build(frame, width_, height_);
     predict(frame.time_s);
@@ -101,10 +90,8 @@ class Tracking {
     finish_bundle(true);
     for (const auto& [index, pose] : poses_) records[index].T_world_cam = (pose.T_cam_reference * map_.keyframe(pose.reference).frame.T_cam_world).inverse();
   }
-  // Where the pose of the frame recorded next is to be noted.
-  void set_record_index(std::size_t index) { record_index_ = index; }
   [[nodiscard]] const Map& map() const { return map_; }
-  [[nodiscard]] double last_bundle_milliseconds() const { return last_bundle_milliseconds_; }
+  [[nodiscard]] const Frame& last_frame() const { return last_; }
 
  private:
   struct RelativePose {
@@ -394,13 +381,13 @@ class Tracking {
 
   // Hands the result over `min_gap` frames after the start, whenever it was ready. The last frame moves with its reference.
   void finish_bundle(bool now) {
-    last_bundle_milliseconds_ = 0;
+    bundle_milliseconds_ = 0;
     if (bundle_ == nullptr || (!now && ++frames_since_bundle_ < options_.mapping.min_gap)) return;
     if (bundle_thread_.valid()) bundle_thread_.get();
     const cfp::SE3<double> T_cam_reference = last_.T_cam_world * map_.keyframe(reference_).frame.T_cam_world.inverse();
     bundle_->apply(map_);
     if (last_.has_pose) last_.T_cam_world = T_cam_reference * map_.keyframe(reference_).frame.T_cam_world;
-    last_bundle_milliseconds_ = bundle_->milliseconds();
+    bundle_milliseconds_ = bundle_->milliseconds();
     bundle_.reset();
   }
 
@@ -408,7 +395,7 @@ class Tracking {
   [[nodiscard]] bool in_image(const cfp::Vector2<double>& pixel) const { return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < width_ && pixel.y() < height_; }
 
   TrackingOptions options_;
-  Camera camera_;
+  cfp::RadialTangentialCamera<float> camera_;
   cfp::PinholeCamera<float> pinhole_;
   cfp::PinholeCamera<double> solver_camera_;
   int width_, height_;
@@ -419,7 +406,7 @@ class Tracking {
   std::unique_ptr<LocalBundle> bundle_;
   std::future<void> bundle_thread_;
   int frames_since_bundle_ = 0, frames_since_keyframe_ = 0;
-  double last_bundle_milliseconds_ = 0;
+  double bundle_milliseconds_ = 0;
 
   Frame last_;
   std::vector<cfp::Vector3<double>> last_points_;  // world, of the last frame's keypoints

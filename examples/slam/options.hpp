@@ -1,0 +1,76 @@
+// Everything that can be chosen about a run.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+
+#include "cfp/optimization/weighted_pnp_types.hpp"
+#include "cfp/pipeline/options.hpp"
+#include "flow.hpp"
+
+namespace cfp_slam {
+
+struct FeatureOptions {
+  int count = 1000;           // keypoints kept
+  int candidates = 3000;      // corners to choose from
+  int levels = 8;             // of the image pyramid
+  float scale_factor = 1.2F;  // between them
+  int fast_threshold = 12;    // grey levels
+  int cell = 40;              // pixels, at the level's own scale
+};
+
+struct MappingOptions {
+  int min_gap = 3;                    // frames between keyframes, at least; the bundle adjustment is handed over within it
+  int max_gap = 30;                   // and at most
+  double reference_share = 0.75;      // fewer inliers than this share of the reference keyframe's points: take one
+  float close_m = 3.2F;               // points whose depth says much about the position (ORB-SLAM2: 40 baselines)
+  std::size_t min_close = 100, new_close = 70;  // fewer close ones tracked, and more to be had: take one
+  float min_static_probability = 0.3F;          // keypoints below make no points; the paper's deletion threshold of M
+  double min_found_share = 0.25;      // points seen in a smaller share of the frames that should see them go
+  std::size_t min_observations = 2;   // as do points in fewer keyframes than this, three keyframes after their own
+};
+
+struct LocalBundleOptions {
+  std::size_t free_keyframes = 10;   // adjusted, the newest among them
+  std::size_t fixed_keyframes = 10;  // see the same points and hold the gauge
+  int max_iterations = 10;
+  double baseline_fx = 40;
+};
+
+struct TrackingOptions {
+  cfp::PipelineOptions pipeline;
+  FeatureOptions features;
+  MappingOptions mapping;
+  LocalBundleOptions bundle;
+  cfp::WeightedPnPOptions pose;
+  std::uint64_t seed = 1;             // of the relocalisation; the pipeline has its own
+  bool threads = true;                // bundle adjustment beside the tracking
+  double baseline_fx = 40;            // ORB-SLAM2's Camera.bf for this sensor
+  std::size_t min_first_inliers = 10;  // for the first stage's pose
+  std::size_t min_inliers = 20;        // for a tracked frame
+  std::size_t min_initial_points = 100;
+  float search_radius = 15;  // pixels at level 0, around a point of the last frame
+};
+
+struct FrontEndOptions {
+  FeatureOptions features;
+  FlowOptions flow;
+  bool use_flow = true;      // false: the object stage is off and needs none
+  bool use_detector = true;  // false: no boxes are asked for
+  bool threads = true;       // flow and detector beside the features
+};
+
+struct RunOptions {
+  cfp::Variant variant = cfp::Variant::cfp;
+  std::uint64_t seed = 1;
+  bool threads = true;              // false: everything on one thread; the trajectory is the same, bit for bit
+  std::size_t max_frames = 0;       // 0: all
+  std::size_t pictures = 0;         // annotated frames to keep for the report
+  std::filesystem::path picture_folder;  // every annotated frame goes here; empty: none is written
+  cfp::PipelineOptions pipeline;    // before the variant switches parts of it off
+  FrontEndOptions front_end;
+  TrackingOptions tracking;
+};
+
+}  // namespace cfp_slam
