@@ -14,6 +14,7 @@
 
 #include "../support/tum.hpp"
 #include "detector.hpp"
+#include "picture.hpp"
 #include "profile.hpp"
 #include "progress.hpp"
 #include "report.hpp"
@@ -29,7 +30,7 @@ namespace fs = std::filesystem;
 struct Arguments {
   std::vector<std::string> folders, variants = {"plain", "cfp"};
   std::string detector = "auto";
-  fs::path out = "slam_out";
+  fs::path out = "slam_out", picture;
   std::uint64_t seed = 1;
   std::size_t seeds = 3, frames = 0, pictures = 8;
   int features = 1000, threads = 2;
@@ -139,6 +140,11 @@ void run_command(const Arguments& arguments) {
       if (arguments.profile) std::printf("%s", cfp_slam::profile_text(run, arguments.target_fps, arguments.features).c_str());
     }
   }
+  if (!arguments.picture.empty()) {
+    const auto of_first = [&](const RunRecord& run) { return run.sequence == runs.front().sequence; };
+    cfp_slam::write_summary_picture(arguments.picture, {runs.begin(), std::find_if_not(runs.begin(), runs.end(), of_first)});
+    std::printf("picture: %s\n", arguments.picture.c_str());
+  }
   if (arguments.no_report) return;
   cfp_slam::write_report(arguments.out / "report.html", runs);
   std::printf("report: %s\n", (arguments.out / "report.html").c_str());
@@ -208,6 +214,7 @@ int main(int argc, char** argv) {
   run->add_option("--seed", a.seed, "of the random samplers")->capture_default_str();
   run->add_option("--report-pictures", a.pictures, "annotated frames in the report")->capture_default_str();
   run->add_flag("--pictures", a.write_pictures, "writes every annotated frame as PNG");
+  run->add_option("--picture", a.picture, "writes trajectories and a frame of the first recording as SVG");
   run->add_flag("--no-report", a.no_report, "writes no HTML");
   run->add_flag("--profile", a.profile, "prints where a frame's time goes and what to turn down");
   run->add_option("--target-fps", a.target_fps, "frame rate that --profile aims at")->check(CLI::PositiveNumber)->capture_default_str();

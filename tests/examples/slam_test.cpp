@@ -1,0 +1,126 @@
+#include "../../examples/slam/run.hpp"
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "../../examples/slam/simple_detectors.hpp"
+#include "../../examples/synthetic/writer.hpp"
+#include "support/catch.hpp"
+#include "support/data.hpp"
+#include "support/temporary_folder.hpp"
+
+using namespace cfp_slam;
+
+namespace {
+
+constexpr std::size_t frames = 48;
+
+/// A small walking sequence, rendered once for all tests.
+const std::filesystem::path& rendered() {
+  static const cfp_test::TemporaryFolder folder;
+  static const bool written = [] {
+    synthetic::SequenceOptions options;
+    options.scenario = synthetic::Scenario::walking;
+    options.motion = synthetic::Motion::xyz;
+    options.frames = static_cast<int>(frames);
+    options.camera = synthetic::SequenceOptions::default_camera(320);
+    synthetic::write_sequence(synthetic::Sequence(options), folder.path, 2, [](int) {});
+    return true;
+  }();
+  REQUIRE(written);
+  return folder.path;
+}
+
+RunRecord run(const std::filesystem::path& folder, cfp::Variant variant = cfp::Variant::cfp, bool threads = false, std::size_t pictures = 0) {
+  FileDetector detector((folder / "detections.txt").string(), {});
+  RunOptions options;
+  options.variant = variant;
+  options.threads = threads;
+  options.pictures = pictures;
+  return run_slam(Sequence(folder), detector, options, [](std::size_t) {});
+}
+
+std::size_t count(const RunRecord& run, Outcome outcome) {
+  return static_cast<std::size_t>(std::count_if(run.frames.begin(), run.frames.end(), [=](const FrameRecord& f) { return f.outcome == outcome; }));
+}
+
+/// The rendered sequence with other images in some places.
+template <typename Change>
+cfp_test::TemporaryFolder& changed(cfp_test::TemporaryFolder& folder, const Change& change) {
+  std::filesystem::copy(rendered(), folder.path, std::filesystem::copy_options::recursive);
+  const Sequence sequence(folder.path);
+  for (std::size_t k = 0; k < sequence.size(); ++k) change(k, folder.path / sequence.load(k).image);
+  return folder;
+}
+
+}  // namespace
+
+TEST_CASE("A sequence with walking people: every frame is tracked, to a centimetre", "[slam]") {
+  const RunRecord r = run(rendered(), cfp::Variant::cfp, false, 4);
+  CHECK(count(r, Outcome::tracked) == frames);
+  REQUIRE(r.absolute.coverage.matched == frames);
+  CHECK(r.absolute.translation_m.rmse < 0.01);
+  CHECK(r.relative.rotation_deg.rmse < 0.5);
+  CHECK(r.keyframes >= 1);
+  CHECK(r.pictures.size() == 4);
+  CHECK_FALSE(r.pictures[0].jpeg.empty());
+  CHECK_FALSE(r.second_stage.probability.empty());
+  CHECK(r.second_stage.probability.size() == r.first_stage.probability.size());
+}
+
+TEST_CASE("Threads change the time, not a bit of the trajectory", "[slam]") {
+  const std::vector<cfp::StampedPose<double>> one = run(rendered()).trajectory(), many = run(rendered(), cfp::Variant::cfp, true).trajectory();
+  REQUIRE(one.size() == many.size());
+  for (std::size_t k = 0; k < one.size(); ++k) {
+    CHECK(one[k].T_world_cam.rotation == many[k].T_world_cam.rotation);
+    CHECK(one[k].T_world_cam.translation == many[k].T_world_cam.translation);
+  }
+}
+
+TEST_CASE("Every variant runs the sequence to its end", "[slam]") {
+  for (int v = 0; v <= static_cast<int>(cfp::Variant::plain); ++v) {
+    const RunRecord r = run(rendered(), static_cast<cfp::Variant>(v));
+    CAPTURE(r.variant);
+    CHECK(r.frames.size() == frames);
+    for (const FrameRecord& f : r.frames) CHECK(cfp::is_usable(cfp::StampedPose<double>{f.time_s, f.T_world_cam}));
+  }
+}
+
+TEST_CASE("Frames that show nothing are lost, none is invented, and the map finds the camera again", "[slam]") {
+  cfp_test::TemporaryFolder folder;
+  changed(folder, [](std::size_t k, const std::filesystem::path& image) {
+    if (k >= 20 && k < 26) cv::imwrite(image.string(), cv::Mat(240, 320, CV_8UC3, cv::Scalar(90, 90, 90)));
+  });
+  const RunRecord r = run(folder.path);
+  for (std::size_t k = 20; k < 26; ++k) {
+    CHECK(r.frames[k].outcome == Outcome::lost);
+    CHECK_FALSE(r.frames[k].note.empty());
+  }
+  CHECK(r.frames[26].outcome == Outcome::relocalised);
+  CHECK(count(r, Outcome::tracked) == frames - 7);
+  CHECK(r.trajectory().size() == frames - 6);
+  CHECK(r.absolute.translation_m.rmse < 0.01);
+}
+
+TEST_CASE("Damaged frames are skipped with their line; the others are tracked", "[slam]") {
+  cfp_test::TemporaryFolder folder;
+  changed(folder, [&](std::size_t k, const std::filesystem::path& image) {
+    if (k == 10) std::filesystem::remove(image);
+    if (k == 11) std::filesystem::resize_file(image, 200);
+    if (k == 12) cv::imwrite(image.string(), cv::Mat(100, 100, CV_8UC3, cv::Scalar(0, 0, 0)));
+  });
+  const RunRecord r = run(folder.path);
+  for (std::size_t k = 10; k < 13; ++k) {
+    CHECK(r.frames[k].outcome == Outcome::skipped);
+    CHECK(r.frames[k].note.find("rgb.txt:") != std::string::npos);
+  }
+  CHECK(count(r, Outcome::skipped) == 3);
+  CHECK(r.trajectory().size() == frames - 3);
+  CHECK(r.absolute.translation_m.rmse < 0.01);
+}
+
+TEST_CASE("Two men stand up in a real clip: every frame has a pose, within centimetres of a published estimate", "[slam]") {
+  CFP_REQUIRE_DATA(folder, "tum_fr3_walking_halfsphere_30");
+  const RunRecord r = run(folder);
+  CHECK(count(r, Outcome::tracked) == 30);
+  CHECK(r.absolute.translation_m.rmse < 0.02);
+}
