@@ -45,11 +45,11 @@ td b{font-weight:700}td u{text-underline-offset:2px}
 .range{color:var(--soft);font-size:.85em}
 .own th,.own td{background:var(--card)}
 .legend{display:flex;flex-wrap:wrap;gap:.2rem 1rem;margin:.3rem 0 .6rem;font-size:.9rem}
-.legend label,.legend span{display:inline-flex;align-items:center;gap:.35rem;white-space:nowrap}
+.legend label,.legend span{display:inline-flex;flex-wrap:wrap;align-items:center;gap:.35rem}
 .legend input{margin:0;accent-color:var(--soft)}
 .legend svg{width:26px;height:10px}
 .swatch{width:.9em;height:.9em;display:inline-block;border-radius:2px}
-.ramp{width:5em;height:.8em;display:inline-block;border-radius:2px;background:linear-gradient(90deg,#f00,#7f7f00,#0f0)}
+.ramp{width:5em;height:.8em;display:inline-block;border-radius:2px;background:linear-gradient(90deg,#f00,#ff0,#0f0)}
 svg.plot{display:block;width:100%;height:auto;font-size:11px}
 @media(max-width:600px){svg.plot{font-size:13px}}
 @media print{body{max-width:none}figure{break-inside:avoid}}

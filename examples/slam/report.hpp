@@ -35,11 +35,12 @@ inline std::string gallery(const std::vector<Series>& all) {
   if (entries.empty()) return {};
   std::stable_sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.time_s < b.time_s; });
   const double start = start_of(all);
+  // The colours of annotate.hpp.
   std::string out =
       "<h3>Frames</h3>\n<div class=\"legend\"><span><i class=\"swatch\" style=\"border:2px solid #e6c700\"></i>detected box</span>"
-      "<span><i class=\"swatch\" style=\"border:2px solid #ff8c00\"></i>compensated box</span><span>keypoints inside boxes: moving "
-      "<i class=\"ramp\"></i> static</span><span><i class=\"swatch\" style=\"border:2px solid #a0a0a0;border-radius:50%\"></i>outside "
-      "boxes</span></div>\n"
+      "<span><i class=\"swatch\" style=\"border:2px solid #ff8c00\"></i>compensated box</span>"
+      "<span>keypoints inside boxes: K = 0 <i class=\"ramp\"></i> K = 1, filled on the foreground, rings on the background</span>"
+      "<span><i class=\"swatch\" style=\"background:#aaa;border-radius:50%;width:.5em;height:.5em\"></i>keypoints outside</span></div>\n"
       "<div class=\"pictures\">\n";
   for (const Entry& entry : entries) {
     const Series& s = all[entry.series];

@@ -74,6 +74,11 @@ TEST_CASE("Claims that hold are met", "[slam]") { check_only_unmet(good_runs(), 
 TEST_CASE("Without runs nothing is claimed", "[slam]") {
   for (const Verdict v : verdicts({})) CHECK(v == Verdict::not_tested);
   for (const Verdict v : verdicts({run_of("7scenes", "cfp", 0.01), run_of("7scenes", "plain", 0.01)})) CHECK(v == Verdict::not_tested);
+  for (const Verdict v :
+       verdicts({run_of("tum_fr3_walking_halfsphere_30", "cfp", 0.01), run_of("tum_fr3_walking_halfsphere_30", "plain", 0.01)})) {
+    CHECK(v == Verdict::not_tested);
+  }
+  CHECK(verdicts({run_of("my_walking_xyz", "cfp", 0.01), run_of("my_walking_xyz", "plain", 0.01)})[five_times] == Verdict::not_met);
   CHECK(claims_table({}, "").rows.size() == 7);
 }
 
