@@ -87,10 +87,10 @@ inline Axis linear_axis(Range range, std::string label, int tick_count = 6) {
   return {range.low, range.high, std::move(label), false, ticks(range.low, range.high, tick_count)};
 }
 
-// Three decades at most, so that one lucky value does not squeeze the rest.
+// Four decades at most.
 inline Axis log_axis(Range range, std::string label) {
   const double high = range.high > 0 ? range.high * 1.1 : 1;
-  const double low = (std::min)((std::max)(range.low, high * 1e-3), high / 3);
+  const double low = (std::min)((std::max)(range.low, high * 1e-4), high / 3);
   return {low, high, std::move(label), true, log_ticks(low, high)};
 }
 

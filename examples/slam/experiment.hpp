@@ -98,7 +98,7 @@ inline std::string protocol_of(const std::vector<RunSummary>& runs, const std::s
   std::set<double> deltas;
   for (const RunSummary& run : runs) {
     if (run.expected > 0) alignments.insert(run.alignment);
-    detectors.insert(run.detector);
+    detectors.insert(shown_detector(run.detector));
     frames.insert(run.frames);
     if (run.rpe_delta_s > 0) deltas.insert(run.rpe_delta_s);
   }

@@ -27,6 +27,7 @@ code{font-size:.92em}
 .grid{columns:2 440px;column-gap:1rem}
 .grid>figure{margin:0 0 1rem;break-inside:avoid}
 .pictures{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,330px),1fr));gap:1rem;align-items:start}
+.pairs{grid-template-columns:repeat(auto-fill,minmax(min(100%,440px),1fr))}
 figure{margin:0;padding:.7rem;background:var(--card);border:1px solid var(--line);border-radius:8px;min-width:0}
 figcaption{margin:.35rem 0 0}
 figure>strong{display:block;margin-bottom:.2rem;font-size:.95rem}

@@ -27,7 +27,9 @@ inline std::string gallery(const std::vector<Series>& all) {
     const AnnotatedFrame* picture;
   };
   std::vector<Entry> entries;
+  std::size_t with_pictures = 0;
   for (std::size_t k = 0; k < all.size(); ++k) {
+    with_pictures += all[k].run->pictures.empty() ? 0 : 1;
     for (const AnnotatedFrame& picture : all[k].run->pictures) {
       if (!picture.jpeg.empty()) entries.push_back({std::isfinite(picture.time_s) ? picture.time_s : 0, k, &picture});
     }
@@ -41,7 +43,8 @@ inline std::string gallery(const std::vector<Series>& all) {
       "<span><i class=\"swatch\" style=\"border:2px solid #ff8c00\"></i>compensated box</span>"
       "<span>keypoints inside boxes: K = 0 <i class=\"ramp\"></i> K = 1, filled on the foreground, rings on the background</span>"
       "<span><i class=\"swatch\" style=\"background:#aaa;border-radius:50%;width:.5em;height:.5em\"></i>keypoints outside</span></div>\n"
-      "<div class=\"pictures\">\n";
+      "<div class=\"pictures" +
+      std::string(with_pictures == 2 ? " pairs" : "") + "\">\n";
   for (const Entry& entry : entries) {
     const Series& s = all[entry.series];
     const std::string caption =
@@ -61,7 +64,7 @@ inline std::string sequence_section(const std::vector<const RunRecord*>& runs) {
   for (const RunRecord* run : runs) {
     frames = (std::max)(frames, run->frames.size());
     with_truth = with_truth || !run->truth.empty();
-    if (!run->detector.empty()) detectors.insert(run->detector);
+    if (!run->detector.empty()) detectors.insert(shown_detector(run->detector));
   }
   std::string about = number(frames) + " frames, " + number(end_of(all) - start_of(all), 1) + " s";
   for (const std::string& detector : detectors) about += ", detector: " + detector;

@@ -55,6 +55,9 @@ inline CalibrationSummary summarize(const LabelledSamples& samples) {
   return out;
 }
 
+// A detector's file without the folders of this machine; other names as they are.
+inline std::string shown_detector(const std::string& detector) { return detector.substr(detector.find_last_of("/\\") + 1); }
+
 // Milliseconds of the frames in which a module ran, in order. A module that does not run takes no time: zeros are left out, so
 // that the figure is what it costs when it is needed.
 inline std::vector<double> milliseconds_of(const RunRecord& run, Module module) {

@@ -168,6 +168,7 @@ TEST_CASE("Every table states its protocol", "[slam]") {
   std::vector<RunSummary> runs{run_of(walking_xyz, "plain", 1, 0.5), run_of(walking_xyz, "cfp", 1, 0.02),
                                run_of(walking_xyz, "cfp", 2, 0.03)};
   runs[1].frames = 90;
+  runs[1].detector = "/some/folder/text";
   const auto tables = tables_of(runs, "2 cores");
   CHECK(tables.size() == 11);
   for (const Table& table : tables) {
