@@ -38,8 +38,7 @@ inline constexpr std::array<const char*, 6> ablation_variants{"cfp", "cfp-minus"
 
 inline constexpr const char* rank_note =
     "Bold: best; second best underlined or in italics. Coverage: matched poses, of all frames; a figure whose coverage is more than 2 "
-    "points below "
-    "the best one is not ranked, for a small error over few poses is no merit.";
+    "points below the best one is not ranked, for a small error over few poses is no merit.";
 
 inline Table error_table(const std::vector<RunSummary>& runs, const ErrorKind& kind, const std::string& protocol) {
   Table table;
@@ -76,10 +75,9 @@ inline Table error_table(const std::vector<RunSummary>& runs, const ErrorKind& k
 }
 
 inline constexpr const char* evidence_note =
-    "Evidence: P printed by the authors themselves, 2 printed in somebody else's table, – not recorded which. Published figures are single "
-    "runs "
-    "nearly all, on other machines, seldom with coverage; below about 1 mm or 10 % a ranking is noise, and three printed digits cannot be "
-    "ranked against four.";
+    "Evidence: P printed by the authors themselves, 2 printed in somebody else's table, – not recorded which. Published figures are "
+    "single runs nearly all, on other machines, seldom with coverage; below about 1 mm or 10 % a ranking is noise, and three printed "
+    "digits cannot be ranked against four.";
 
 inline Table published_error_table(const std::vector<RunSummary>& runs, const ErrorKind& kind, const std::string& protocol) {
   SystemTable out(std::string("Table ") + kind.number + " beside published figures: " + kind.name + ", RMSE, " + kind.unit, protocol,

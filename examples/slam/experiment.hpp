@@ -64,11 +64,6 @@ inline Spread spread_of(const std::vector<RunSummary>& runs, std::string_view se
   return spread_of(values_of(runs, sequence, variant, [field](const RunSummary& run) { return run.*field; }));
 }
 
-// Matched poses in percent of the frames; not_known without a truth.
-inline double coverage_percent(const RunSummary& run) {
-  return run.expected > 0 ? 100 * static_cast<double>(run.matched) / static_cast<double>(run.expected) : not_known;
-}
-
 // TUM's long names as the paper has them.
 inline std::string shown_name(const std::string& sequence) {
   const std::size_t k = paper_sequence(sequence);

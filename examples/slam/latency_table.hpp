@@ -49,10 +49,8 @@ inline Table latency_table(const std::vector<RunSummary>& runs, const std::strin
   }
   table.note =
       "Of the frames in which a module ran; medians over all runs. The paper gives means, on an Intel i7 with an RTX 3060. The detector "
-      "runs "
-      "beside feature extraction, reading and bundle adjustment beside the tracking thread. The paper's object probability (17.93 ms) "
-      "holds "
-      "the optical flow, ours stands in its own row.";
+      "runs beside feature extraction, reading and bundle adjustment beside the tracking thread. The paper's object probability (17.93 "
+      "ms) holds the optical flow, ours stands in its own row.";
   return table;
 }
 

@@ -1,7 +1,7 @@
 // Published figures on the eight dynamic fr3 sequences of the TUM RGB-D benchmark, to stand beside ours.
 //
-// Evidence: P printed by the authors of the system themselves, 2 printed in somebody else's table, – not recorded which. Single runs nearly
-// all of them, on different machines, coverage seldom given: differences below about 1 mm or 10 % are noise.
+// Evidence: P printed by the authors of the system themselves, 2 printed in somebody else's table, – not recorded which. Single runs
+// nearly all of them, on different machines, coverage seldom given: differences below about 1 mm or 10 % are noise.
 #pragma once
 
 #include <array>

@@ -86,8 +86,8 @@ inline std::string latency_section(const std::vector<Series>& all) {
   if (figures.empty()) return {};
   return "<h3>Time</h3>\n<p class=\"note\">Bar and figure: median over the frames in which the module ran; whisker: 95th percentile. "
          "Diamond and brackets: the paper's mean on an Intel i7, its detector on an RTX 3060. The paper's 17.93 ms for the object "
-         "probability "
-         "hold the optical flow, which has its own bar here. Reading, detection and bundle adjustment run beside the tracking thread.</p>\n"
+         "probability hold the optical flow, which has its own bar here. Reading, detection and bundle adjustment run beside the "
+         "tracking thread.</p>\n"
          "<div class=\"grid\">\n" +
          figures + "</div>\n";
 }

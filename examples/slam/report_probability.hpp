@@ -191,8 +191,8 @@ inline std::string probability_section(const std::vector<Series>& all) {
   if (!(keypoints + objects).empty()) {
     out += std::string("<details") + (all.size() <= 3 ? " open" : "") +
            "><summary>K and O over time, per variant</summary>\n<p class=\"note\">K: the stronger the colour, the larger the share of the "
-           "frame's in-box "
-           "keypoints. O: dots are detected boxes, crosses compensated ones; boxes without an O are left out.</p>\n<div class=\"grid\">\n" +
+           "frame's in-box keypoints. O: dots are detected boxes, crosses compensated ones; boxes without an O are left out.</p>\n"
+           "<div class=\"grid\">\n" +
            keypoints + objects + "</div></details>\n";
   }
   return out;

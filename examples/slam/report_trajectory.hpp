@@ -27,8 +27,7 @@ inline std::string row_of(const Series& series) {
   cell(number(s.ate_max_m, 4));
   cell(number(s.rpe_rmse_m, 4));
   cell(number(s.rpe_rmse_deg, 3));
-  const double coverage = s.expected > 0 ? 100 * static_cast<double>(s.matched) / static_cast<double>(s.expected) : not_known;
-  cell(s.expected > 0 ? number(s.matched) + " of " + number(s.expected) + " (" + number(coverage, 1) + " %)" : "–");
+  cell(s.expected > 0 ? number(s.matched) + " of " + number(s.expected) + " (" + number(coverage_percent(s), 1) + " %)" : "–");
   cell(number(s.lost) + " / " + number(s.skipped) + " / " + number(s.relocalised));
   cell(number(s.largest_gap_s, 2));
   cell(s.expected > 0 ? escape(s.alignment) : "–");
@@ -45,17 +44,17 @@ inline std::string summary_table(const std::vector<Series>& all) {
   for (const Series& s : all) out += row_of(s);
   return out +
          "</tbody></table></div>\n<p class=\"note\">ATE: distance of the matched poses to the truth after the alignment named. RPE: rmse "
-         "over "
-         "all intervals of one second. A lost frame has no pose and none is invented: read every error beside its coverage. ms: the "
-         "tracking "
-         "thread, the detector only as far as it was waited for.</p>\n";
+         "over all intervals of one second. A lost frame has no pose and none is invented: read every error beside its coverage. "
+         "ms: the tracking thread, the detector only as far as it was waited for.</p>\n";
 }
 
 // Truth and variants in metres and one scale, the longest direction of the motion to the right: first the view that shows most, along
-// the shortest direction, then the one from the side.
+// the shortest direction, then the one from the side. What is farther from the truth than twice its extent (at least 1 m) is cut
+// off: one variant that flew away must not shrink the rest to a dot.
 struct View {
   std::string title;
   Plot plot;
+  bool cut_off = false;
 };
 inline std::vector<View> trajectory_views(const std::vector<Series>& all) {
   const double start = start_of(all), end = end_of(all);
@@ -76,7 +75,19 @@ inline std::vector<View> trajectory_views(const std::vector<Series>& all) {
   if (!with_truth) std::for_each(estimates.begin(), estimates.end(), extend);
   std::array<std::size_t, 3> axes{0, 1, 2};
   std::stable_sort(axes.begin(), axes.end(), [&](std::size_t a, std::size_t b) { return range[a].size() > range[b].size(); });
-  if (with_truth) std::for_each(estimates.begin(), estimates.end(), extend);
+  const double reach = (std::max)(2 * range[axes[0]].size(), 1.0);
+  const std::array<Range, 3> inner = range;
+  bool cut_off = false;
+  for (Positions& p : estimates) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      for (double& v : p.coordinate[c]) {
+        if (!with_truth || !(v < inner[c].low - reach || v > inner[c].high + reach)) continue;
+        v = not_known;
+        cut_off = true;
+      }
+    }
+    extend(p);
+  }
 
   constexpr std::array<const char*, 3> names{"x [m]", "y [m]", "z [m]"};
   std::vector<View> views;
@@ -88,7 +99,7 @@ inline std::vector<View> trajectory_views(const std::vector<Series>& all) {
     for (const std::size_t k : drawing_order(all)) {
       plot.curve(estimates[k].coordinate[right], estimates[k].coordinate[up], all[k].css("curve"));
     }
-    views.push_back({title, plot});
+    views.push_back({title, plot, cut_off});
   }
   return views;
 }
@@ -175,7 +186,9 @@ inline std::string notes_of(const std::vector<Series>& all) {
 
 inline std::string trajectory_section(const std::vector<Series>& all) {
   std::string views;
-  for (const View& view : trajectory_views(all)) views += figure(view.title, view.plot.svg());
+  for (const View& view : trajectory_views(all)) {
+    views += figure(view.title, view.plot.svg(), view.cut_off ? "Poses far from the truth are cut off." : "");
+  }
   return summary_table(all) + "<div class=\"grid\">\n" + views + error_plot(all) + outcome_plot(all) + "</div>\n" + notes_of(all);
 }
 

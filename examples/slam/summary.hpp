@@ -55,6 +55,11 @@ inline CalibrationSummary summarize(const LabelledSamples& samples) {
   return out;
 }
 
+// Matched poses in percent of the frames; not_known without a truth.
+inline double coverage_percent(const RunSummary& run) {
+  return run.expected > 0 ? 100 * static_cast<double>(run.matched) / static_cast<double>(run.expected) : not_known;
+}
+
 // A detector's file without the folders of this machine; other names as they are.
 inline std::string shown_detector(const std::string& detector) { return detector.substr(detector.find_last_of("/\\") + 1); }
 

@@ -37,6 +37,7 @@ inline void rank(const std::vector<Cell*>& cells, std::vector<double> values, in
     if (values[k] == sorted[1]) cells[k]->rank = Rank::second;
   }
 }
+
 // Only figures with about the same coverage can be compared: not_known for those more than 2 points below the best covered one.
 inline std::vector<double> comparable(std::vector<double> values, const std::vector<double>& coverage_percent) {
   double best = 0;

@@ -151,6 +151,20 @@ TEST_CASE("The report survives runs without truth, frames, boxes or finite numbe
   }
 }
 
+TEST_CASE("A variant that flew away does not shrink the others", "[slam]") {
+  cfp_test::FakeRun fake;
+  auto good = cfp_test::fake_run(fake), bad = good;
+  bad.variant = "plain";
+  for (std::size_t k = 200; k < bad.frames.size(); ++k) bad.frames[k].T_world_cam.translation.x() += 1000;
+  bad.absolute = good.absolute;  // its alignment
+  const std::vector<const RunRecord*> runs{&good, &bad}, alone{&good};
+  const auto with = trajectory_views(series_of(runs)), without = trajectory_views(series_of(alone));
+  CHECK(with[0].cut_off);
+  CHECK_FALSE(without[0].cut_off);
+  CHECK(with[0].plot.px(1) - with[0].plot.px(0) > 0.15 * (without[0].plot.px(1) - without[0].plot.px(0)));
+  check_page(report_page({good, bad}));
+}
+
 TEST_CASE("Runs are grouped by sequence, and seeds of one variant get their own names and colours", "[slam]") {
   cfp_test::FakeRun fake;
   fake.frames = 60;
