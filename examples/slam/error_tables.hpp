@@ -118,7 +118,7 @@ inline Table ablation_table(const std::vector<RunSummary>& runs, const std::stri
     rank(cells, comparable(medians, coverages), 4);
     table.rows.push_back(row);
   }
-  table.note = std::string("Percentages in brackets: coverage. ") + rank_note;
+  table.note = std::string("Percentages: coverage. ") + rank_note;
   return table;
 }
 

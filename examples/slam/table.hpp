@@ -70,6 +70,12 @@ inline std::string to_markdown(const Table& table) {
   return out + '\n';
 }
 
+// The parts of a range below each other: a column no wider than it must be.
+inline std::string in_lines(std::string range) {
+  for (std::size_t at = range.find("; "); at != std::string::npos; at = range.find("; ", at)) range.replace(at, 2, "<br>");
+  return range;
+}
+
 inline std::string to_html(const Table& table) {
   std::string out = "<h3>" + escape(table.title) + "</h3>\n";
   if (!table.protocol.empty()) out += "<p class=\"note\">" + escape(table.protocol) + "</p>\n";
@@ -81,7 +87,8 @@ inline std::string to_html(const Table& table) {
     for (std::size_t c = 0; c < row.size(); ++c) {
       const char* mark = row[c].rank == Rank::best ? "b" : row[c].rank == Rank::second ? "u" : "span";
       out += std::string(c == 0 ? "<th scope=\"row\">" : "<td>") + '<' + mark + '>' + escape(row[c].text) + "</" + mark + '>' +
-             (row[c].range.empty() ? "" : "<br><span class=\"range\">" + escape(row[c].range) + "</span>") + (c == 0 ? "</th>" : "</td>");
+             (row[c].range.empty() ? "" : "<br><span class=\"range\">" + in_lines(escape(row[c].range)) + "</span>") +
+             (c == 0 ? "</th>" : "</td>");
     }
     out += "</tr>\n";
   }
