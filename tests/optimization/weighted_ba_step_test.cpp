@@ -81,11 +81,11 @@ DenseSystem dense_system(const cfp_test::BaScene& scene, const cfp::WeightedBaWo
 }
 
 template <typename Loss, typename Camera>
-void check_step(const Loss& mono, double stereo_share, const Camera& camera) {
+void check_step(const Loss& mono, double stereo_share, const Camera& camera, bool few_points = false) {
   cfp_test::BaSceneOptions options;
-  options.poses = 5;
-  options.points = 25;
-  options.views_per_point = 4;
+  options.poses = few_points ? 30 : 5;
+  options.points = few_points ? 4 : 25;
+  options.views_per_point = few_points ? 30 : 4;
   options.stereo_share = stereo_share;
   options.random_weights = options.octaves = true;
   options.outlier_share = 0.2;
@@ -101,6 +101,7 @@ void check_step(const Loss& mono, double stereo_share, const Camera& camera) {
   cfp::detail::build_index(problem, work.index, result);
   cfp::detail::prepare(problem, work, result);
   REQUIRE(result.used == scene.pose.size());
+  REQUIRE(work.index.eliminate_poses == few_points);
   REQUIRE(cfp::is_finite(cfp::detail::linearize(problem, mono, stereo, work.index, work.state, work.linear, executor)));
 
   const DenseSystem system = dense_system(scene, work, mono, stereo);
@@ -134,6 +135,14 @@ TEST_CASE("A step solves the damped normal equations of numerically differentiat
     check_step(cfp::Cauchy<double>{2.5}, stereo_share, camera);
     check_step(cfp::GemanMcClure<double>{20}, stereo_share, camera);
     check_step(cfp::Truncated<double>{30}, stereo_share, camera);
+  }
+}
+
+TEST_CASE("With few points the poses are eliminated: the same step", "[optimization][weighted_ba]") {
+  const cfp::PinholeCamera<double> camera = cfp_test::BaScene{}.camera;
+  for (const double stereo_share : {0.0, 0.5, 1.0}) {
+    CAPTURE(stereo_share);
+    check_step(cfp::Huber<double>{2.5}, stereo_share, camera, true);
   }
 }
 

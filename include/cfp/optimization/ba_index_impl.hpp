@@ -43,6 +43,7 @@ struct BaIndex {
   std::vector<int> block_row, block_column;
   std::vector<int> diagonal_block;  // per free rank
   int max_free_slots = 0;
+  bool eliminate_poses = false;  // few points seen by many poses; the blocks above stay empty
   std::array<int, ba_parts + 1> rank_part{}, point_part{};
 
   // Scratch of build.
@@ -227,13 +228,15 @@ void sort_by_pose(const BaProblem<Camera, Scalar>& problem, BaIndex& index) {
 inline void find_blocks(BaIndex& index) {
   const std::size_t points = index.point_of.size();
   index.pair_begin.assign(points + 1, 0);
+  index.block_row.clear();
+  index.block_column.clear();
+  index.eliminate_poses = 4 * points < to_index(index.free_poses);  // then the points' system has less than an eighth of the rows
+  if (index.eliminate_poses) return;
   for (std::size_t j = 0; j < points; ++j) {
     const std::size_t f = to_index(index.free_slots[j]);
     index.pair_begin[j + 1] = index.pair_begin[j] + f * (f + 1) / 2;
   }
   index.pair_block.resize(index.pair_begin[points]);
-  index.block_row.clear();
-  index.block_column.clear();
   index.diagonal_block.resize(to_index(index.free_poses));
   index.stamp.assign(to_index(index.free_poses), -1);
   index.stamp_block.resize(to_index(index.free_poses));

@@ -76,7 +76,7 @@ struct WeightedBaResult {
   std::size_t behind = 0;            ///< left out: at the start the camera did not see the point (behind it or beyond its model)
   std::size_t free_poses = 0;        ///< poses that were adjusted
   std::size_t adjusted_points = 0;   ///< points that were adjusted: those with a used observation
-  std::size_t reduced_blocks = 0;    ///< 6x6 blocks of the reduced camera system, lower triangle
+  std::size_t reduced_blocks = 0;    ///< 6x6 blocks of the reduced camera system, lower triangle; 0 when the poses were eliminated
   std::size_t factor_blocks = 0;     ///< 6x6 blocks of its Cholesky factor
 };
 

@@ -97,8 +97,29 @@ inline void subtract_pairs(const double* scratch, int count, const int* pair, do
   }
 }
 
-/// The share of one part of the points in the reduced system; part 0 starts from the poses' own blocks. False when a point's
-/// block is not positive definite, which only rounding or overflow can cause.
+/// V' of point j, and in schur.points what its step needs; false when V' is not positive definite, which only rounding or overflow can cause.
+[[nodiscard]] inline bool damp_point(const BaIndex& index, const BaLinearization& linear, double lambda, std::size_t j, double (&V)[6], BaSchur& schur) noexcept {
+  double sum[9] = {};
+  for (std::size_t s = index.slot_begin[j]; s < index.slot_begin[j + 1]; ++s) {
+    for (std::size_t e = 0; e < 9; ++e) sum[e] += linear.slots[BaLinearization::slot_doubles * s + e];
+  }
+  const double scale = damping_scale(sum[0] + sum[3] + sum[5]);
+  std::copy(sum, sum + 6, V);
+  for (const int diagonal : {0, 3, 5}) V[diagonal] += lambda * scale;
+  double* const point = schur.points.data() + BaSchur::point_doubles * j;
+  std::copy(sum + 6, sum + 9, point + 6), point[9] = scale;
+  return invert_symmetric(V, point);
+}
+
+/// H' = H + lambda D of a pose.
+[[nodiscard]] inline Matrix6<double> damped_pose(const double* pose, double lambda) noexcept {
+  Matrix6<double> H = Eigen::Map<const Matrix6<double>>(pose);
+  const double t = lambda * damping_scale(pose[0] + pose[7] + pose[14]), r = lambda * damping_scale(pose[21] + pose[28] + pose[35]);
+  for (int e = 0; e < 3; ++e) H(e, e) += t, H(e + 3, e + 3) += r;
+  return H;
+}
+
+/// The share of one part of the points in the reduced system; part 0 starts from the poses' own blocks. False as damp_point.
 [[nodiscard]] inline bool eliminate_points(const BaIndex& index, const BaState& state, const BaLinearization& linear, double lambda, int part,
                                            BaSchur& schur) noexcept {
   double* const blocks = schur.blocks[part].data();
@@ -109,26 +130,16 @@ inline void subtract_pairs(const double* scratch, int count, const int* pair, do
   if (part == 0) {
     for (std::size_t k = 0; k < to_index(index.free_poses); ++k) {
       const double* pose = linear.poses.data() + k * BaLinearization::pose_doubles;
-      double* diagonal = blocks + 36 * to_index(index.diagonal_block[k]);
-      std::copy(pose, pose + 36, diagonal);
-      const double t = lambda * damping_scale(pose[0] + pose[7] + pose[14]), r = lambda * damping_scale(pose[21] + pose[28] + pose[35]);
-      for (std::size_t e = 0; e < 3; ++e) diagonal[7 * e] += t, diagonal[7 * (e + 3)] += r;
+      Eigen::Map<Matrix6<double>>(blocks + 36 * to_index(index.diagonal_block[k])) = damped_pose(pose, lambda);
       for (std::size_t e = 0; e < 6; ++e) right_side[6 * k + e] = -pose[36 + e];
     }
   }
   for (std::size_t j = to_index(index.point_part[to_index(part)]); j < to_index(index.point_part[to_index(part) + 1]); ++j) {
     const double* slot = linear.slots.data() + BaLinearization::slot_doubles * index.slot_begin[j];
-    const double* const slots_end = linear.slots.data() + BaLinearization::slot_doubles * index.slot_begin[j + 1];
-    double sum[9] = {};
-    for (const double* s = slot; s != slots_end; s += BaLinearization::slot_doubles) {
-      for (int e = 0; e < 9; ++e) sum[e] += s[e];
-    }
-    const double scale = damping_scale(sum[0] + sum[3] + sum[5]);
-    const double V[6] = {sum[0] + lambda * scale, sum[1], sum[2], sum[3] + lambda * scale, sum[4], sum[5] + lambda * scale};
-    const double gradient[3] = {sum[6], sum[7], sum[8]};
-    double* const point = schur.points.data() + BaSchur::point_doubles * j;
-    if (!invert_symmetric(V, point)) return false;
-    std::copy(gradient, gradient + 3, point + 6), point[9] = scale;
+    double V[6];
+    if (!damp_point(index, linear, lambda, j, V, schur)) return false;
+    const double* const point = schur.points.data() + BaSchur::point_doubles * j;
+    const double gradient[3] = {point[6], point[7], point[8]};
     double Vg[3];
     multiply_symmetric(point, gradient, Vg);
 

@@ -7,6 +7,7 @@
 ///
 /// Levenberg-Marquardt on the normal equations, points eliminated (Schur complement), the reduced camera system factorised by
 /// sparse block Cholesky. Time and memory per iteration are linear in the observations and in the pairs of observations of one point.
+/// With fewer than a quarter as many points as free poses the poses are eliminated instead, and the points' system is factorised.
 /// Sources: Triggs et al.: "Bundle adjustment - a modern synthesis", 2000; Lourakis, Argyros: SBA, 2009.
 #pragma once
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cfp/optimization/ba_problem.hpp"
+#include "cfp/optimization/ba_pose_elimination_impl.hpp"
 #include "cfp/optimization/ba_schur_impl.hpp"
 #include "cfp/optimization/block_cholesky.hpp"
 
@@ -23,6 +24,7 @@ class WeightedBaWorkspace {
   detail::BaState state, next_state;
   detail::BaLinearization linear, next_linear;
   detail::BaSchur schur;
+  detail::BaPoseElimination pose_elimination;
   std::vector<double> pose_steps;
   BlockCholesky cholesky;
 };
@@ -51,7 +53,8 @@ void prepare(const BaProblem<Camera, Scalar>& problem, WeightedBaWorkspace& work
   result.free_poses = free_poses;
   result.adjusted_points = points;
   result.reduced_blocks = index.block_row.size();
-  work.cholesky.analyze(index.free_poses, index.block_row, index.block_column);
+  work.cholesky.analyze(index.eliminate_poses ? 0 : index.free_poses, index.block_row, index.block_column);
+  if (index.eliminate_poses) work.pose_elimination.resize(index);
   result.factor_blocks = work.cholesky.factor_blocks();
   for (BaState* state : {&work.state, &work.next_state}) {
     state->poses.resize(ranks);
@@ -96,9 +99,9 @@ double linearize(const BaProblem<Camera, Scalar>& problem, const MonoLoss& mono,
   return cost;
 }
 
-/// Solves the damped normal equations and fills next_state. False when they are not positive definite.
+/// The poses' steps by elimination of the points.
 template <typename Executor>
-[[nodiscard]] bool take_step(WeightedBaWorkspace& work, double lambda, Executor& executor, double& promised) {
+[[nodiscard]] bool solve_for_poses(WeightedBaWorkspace& work, double lambda, Executor& executor) {
   bool definite[ba_parts];
   executor(ba_parts, [&](int part) { definite[part] = eliminate_points(work.index, work.state, work.linear, lambda, part, work.schur); });
   for (const bool part : definite) {
@@ -113,7 +116,16 @@ template <typename Executor>
   if (!work.cholesky.factorize(blocks[0])) return false;
   std::copy(right_side[0].begin(), right_side[0].end(), work.pose_steps.begin());
   work.cholesky.solve(work.pose_steps);
+  return true;
+}
 
+/// Solves the damped normal equations and fills next_state. False when they are not positive definite.
+template <typename Executor>
+[[nodiscard]] bool take_step(WeightedBaWorkspace& work, double lambda, Executor& executor, double& promised) {
+  const bool solved = work.index.eliminate_poses ? eliminate_poses(work.index, work.state, work.linear, lambda, work.schur, work.pose_elimination,
+                                                                   work.pose_steps.data())
+                                                 : solve_for_poses(work, lambda, executor);
+  if (!solved) return false;
   double by_points[ba_parts];
   executor(ba_parts, [&](int part) {
     by_points[part] = move_points(work.index, work.state, work.linear, work.schur, lambda, work.pose_steps.data(), part, work.next_state);
