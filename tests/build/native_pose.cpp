@@ -1,0 +1,93 @@
+// Poses by the machine's own instruction set against poses by the distribution's baseline. The same source is compiled with and
+// without -march=native into two programs, since units of one program must not mix such flags:
+//   cfp_build_pose_baseline <file>   writes its poses;   cfp_build_pose_native <file>   compares with them.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+#include "cfp/optimization/weighted_ba.hpp"
+#include "cfp/optimization/weighted_pnp.hpp"
+#include "support/ba_scene.hpp"
+#include "support/pose_scene.hpp"
+
+namespace {
+
+struct Answers {
+  std::vector<double> fine, coarse;  // of double arithmetic, and of float arithmetic
+};
+
+void append(std::vector<double>& list, const cfp::SE3<double>& T) {
+  list.insert(list.end(), T.rotation.data(), T.rotation.data() + 9);
+  list.insert(list.end(), T.translation.data(), T.translation.data() + 3);
+}
+
+template <typename Scalar>
+void append_refined(std::vector<double>& list, std::uint64_t seed, const cfp_test::PoseSceneOptions& scene_options, const cfp::WeightedPnPOptions& options) {
+  static cfp::WeightedPnPWorkspace<Scalar> workspace;
+  const auto scene = cfp_test::make_pose_scene<Scalar>(seed, scene_options);
+  const auto result = cfp::refine_pose(scene.observations(), scene.camera, scene.start, options, workspace);
+  append(list, result.T_cam_world);
+  list.push_back(static_cast<double>(result.reason));
+}
+
+Answers compute() {
+  Answers answers;
+  cfp::WeightedPnPOptions to_the_end;
+  for (std::size_t r = 0; r < to_the_end.round_count; ++r) to_the_end.rounds[r].min_mean_decrease = 0, to_the_end.rounds[r].min_decrease = 1e-3;
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    cfp_test::PoseSceneOptions options;
+    options.points = 40 + 7 * static_cast<int>(seed);
+    options.outlier_share = 0.1 * static_cast<double>(seed % 4);
+    options.stereo_share = 0.5 * static_cast<double>(seed % 3);
+    options.octaves = seed % 2 == 0;
+    append_refined<double>(answers.fine, seed, options, {});
+    append_refined<double>(answers.fine, seed, options, cfp::orb_slam2_pose_options());
+    append_refined<float>(answers.coarse, seed, options, to_the_end);
+  }
+  cfp::WeightedBaWorkspace workspace;
+  for (std::uint64_t seed = 0; seed < 3; ++seed) {
+    cfp_test::BaSceneOptions options;
+    options.points = 200;
+    options.stereo_share = 0.3;
+    cfp_test::BaScene scene = cfp_test::make_ba_scene(options, seed);
+    (void)cfp::adjust_bundle(scene.problem(), {}, workspace);
+    for (const cfp::SE3<double>& pose : scene.poses) append(answers.fine, pose);
+  }
+  return answers;
+}
+
+/// Largest difference; infinite for another number of answers or one that is not a number.
+[[maybe_unused]] double largest_difference(const std::vector<double>& a, std::FILE* file) {
+  double largest = 0;
+  for (const double x : a) {
+    double y = 0;
+    if (std::fscanf(file, "%lf", &y) != 1 || !(std::abs(x - y) < 1e300)) return HUGE_VAL;
+    largest = (std::max)(largest, std::abs(x - y));
+  }
+  return largest;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) return std::printf("usage: %s <file>\n", argv[0]), 2;
+  const Answers answers = compute();
+#ifdef CFP_NATIVE
+  std::FILE* file = std::fopen(argv[1], "r");
+  if (file == nullptr) return std::printf("%s cannot be opened\n", argv[1]), 1;
+  const double fine = largest_difference(answers.fine, file), coarse = largest_difference(answers.coarse, file);
+  std::fclose(file);
+  // Double: rounding, amplified by the condition of the problem. Float: its rounding, and steps that end a round earlier or later.
+  std::printf("lanes: %d double, %d float; largest difference of a pose: %.2g in double, %.2g in float\n", cfp::native_lanes<double>,
+              cfp::native_lanes<float>, fine, coarse);
+  return fine < 1e-8 && coarse < 1e-4 ? 0 : 1;
+#else
+  std::FILE* file = std::fopen(argv[1], "w");
+  if (file == nullptr) return std::printf("%s cannot be written\n", argv[1]), 1;
+  for (const std::vector<double>* list : {&answers.fine, &answers.coarse}) {
+    for (const double x : *list) std::fprintf(file, "%.17g\n", x);
+  }
+  return std::fclose(file) == 0 ? 0 : 1;
+#endif
+}
