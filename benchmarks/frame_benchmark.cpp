@@ -104,6 +104,7 @@ BENCHMARK(frame<float, Stages::both, false>)->Unit(benchmark::kMicrosecond);
 BENCHMARK(frame<float, Stages::both, true>)->Unit(benchmark::kMicrosecond);
 BENCHMARK(frame<double, Stages::both, false>)->Unit(benchmark::kMicrosecond);
 BENCHMARK(frame<double, Stages::both, true>)->Unit(benchmark::kMicrosecond);
+BENCHMARK(frame<float, Stages::first, false>)->Unit(benchmark::kMicrosecond);
 BENCHMARK(frame<float, Stages::first, true>)->Unit(benchmark::kMicrosecond);
 BENCHMARK(frame<float, Stages::second, true>)->Unit(benchmark::kMicrosecond);
 BENCHMARK_MAIN();

@@ -1,5 +1,5 @@
-// The formulas of both stages on arrays, beside the code that one would write first. Every iteration takes another of at least 16
-// inputs, so that the branch predictor cannot learn the data.
+// The formulas of both stages on arrays, beside the code that one would write first. Every iteration takes another input of at
+// least 2^14 matches together, so that the branch predictor cannot learn the data.
 //
 // stage_two: d^T, d^F, for each D_Th (0.8 order statistic), d_min, C_c and the sigmoid, then the combination of both with C_s; the
 // peer is scalar double with std::sort. `difference` is the largest deviation of K from the peer's over all inputs.
@@ -48,10 +48,10 @@ cfp::PinholeCamera<Scalar> camera_as() {
   return {Scalar(camera.fx), Scalar(camera.fy), Scalar(camera.cx), Scalar(camera.cy)};
 }
 
-/// Sets of n matches that are off by 1 px of noise, some 2^14 matches together or 16 sets.
+/// Sets of n matches that are off by 1 px of noise: 2^14 matches together, or 4 sets.
 template <typename Scalar>
 std::vector<Matches<Scalar>> make_matches(std::size_t n) {
-  std::vector<Matches<Scalar>> all((std::max)(std::size_t(16), (std::size_t(1) << 14U) / n));
+  std::vector<Matches<Scalar>> all((std::max)(std::size_t(4), (std::size_t(1) << 14U) / n));
   cfp::Random random(1, "matches");
   for (Matches<Scalar>& matches : all) {
     while (matches.prev.size() < n) {
