@@ -65,7 +65,7 @@ template <typename Scalar, std::size_t Count>
     ranks[i] = quantile_rank(quantiles[i], scratch.size()) - 1;
     CFP_ASSERT(i == 0 || ranks[i - 1] <= ranks[i]);
   }
-  detail::select(scratch.data(), scratch.size(), ranks, values);
+  detail::select_many(scratch.data(), scratch.size(), ranks, values);
   return values;
 }
 

@@ -155,7 +155,7 @@ template <typename Scalar>
 
 /// Sets results[i] to the value at 0-based position ranks[i], both ascending. n > 0. Destroys `values`.
 template <typename Scalar, std::size_t Count>
-void select(Scalar* values, std::size_t n, std::array<std::size_t, Count> ranks, std::array<Scalar, Count>& results) noexcept {
+void select_many(Scalar* values, std::size_t n, std::array<std::size_t, Count> ranks, std::array<Scalar, Count>& results) noexcept {
   using Counts = BucketCounts<Scalar>;
   std::size_t kept = n;
   if (n > few<Scalar>) {
