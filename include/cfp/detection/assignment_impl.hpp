@@ -33,31 +33,50 @@ struct CostLimits {
   }
 };
 
+/// std::vector::assign, but inline: for a handful of boxes the calls would count.
+template <typename T>
+void refill(std::vector<T>& v, std::size_t size, T value) {
+  v.resize(size);
+  std::fill_n(v.data(), size, value);
+}
+
 using RowView = Eigen::Map<const Eigen::ArrayXd>;
 
-/// Copies a row of costs, forbidden ones as infinity, padded to `stride` with infinity. Returns the least.
+struct CostRange {
+  double least, most;
+};
+
+/// Copies a row of costs, forbidden ones as infinity, padded to `stride` with infinity. Returns the least and the largest one, which
+/// is infinite when a pair of the row is forbidden.
 template <typename Scalar>
-double copy_costs(const Scalar* source, std::size_t step, std::size_t size, CostLimits limits, double* row, std::size_t stride) noexcept {
+CostRange copy_costs(const Scalar* source, std::size_t step, std::size_t size, CostLimits limits, double* row, std::size_t stride) noexcept {
   const double high = limits.high;  // a local: the stores might alias a member
+  double least[assignment_lanes] = {infinity, infinity, infinity, infinity}, most[assignment_lanes] = {-infinity, -infinity, -infinity, -infinity};
+  std::size_t j = 0;
   if (step == 1) {
-    for (std::size_t j = 0; j < size; ++j) {
-      const double c = static_cast<double>(source[j]);
-      row[j] = c < high ? c : infinity;
+    for (; j + assignment_lanes <= size; j += assignment_lanes) {
+      for (std::size_t k = 0; k < assignment_lanes; ++k) {
+        const double c = static_cast<double>(source[j + k]);
+        row[j + k] = c < high ? c : infinity;
+        least[k] = smaller(row[j + k], least[k]);
+        most[k] = larger(row[j + k], most[k]);
+      }
     }
-  } else {
-    for (std::size_t j = 0; j < size; ++j) row[j] = limits(source[j * step]);
+  }
+  for (; j < size; ++j) {
+    row[j] = limits(source[j * step]);
+    least[0] = smaller(row[j], least[0]);
+    most[0] = larger(row[j], most[0]);
   }
   std::fill(row + size, row + stride, infinity);
-  const double least = RowView(row, static_cast<Eigen::Index>(stride)).minCoeff();
-  if (least >= limits.low) return least;
-  for (std::size_t j = 0; j < size; ++j) row[j] = limits(row[j]);  // rare: something below the range
-  return RowView(row, static_cast<Eigen::Index>(stride)).minCoeff();
+  const CostRange range{smaller(smaller(least[0], least[1]), smaller(least[2], least[3])), larger(larger(most[0], most[1]), larger(most[2], most[3]))};
+  if (range.least >= limits.low) return range;
+  for (j = 0; j < size; ++j) row[j] = limits(row[j]);  // rare: something below the range
+  return {RowView(row, static_cast<Eigen::Index>(stride)).minCoeff(), infinity};
 }
 
 /// The largest allowed cost of a row, -infinity when there is none.
 [[nodiscard]] inline double largest_cost(const double* row, std::size_t size) noexcept {
-  const double most = RowView(row, static_cast<Eigen::Index>(size)).maxCoeff();
-  if (most < infinity) return most;
   double allowed = -infinity;
   for (std::size_t j = 0; j < size; ++j) allowed = row[j] < infinity ? larger(allowed, row[j]) : allowed;
   return allowed;
@@ -81,8 +100,8 @@ template <typename Scalar>
 AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_cost, span<int> column_of_row, AssignmentWorkspace& w) {
   CFP_ASSERT(column_of_row.size() == costs.rows);
   std::fill(column_of_row.begin(), column_of_row.end(), unassigned);
-  w.row_saving.assign(costs.rows, 0.0);
-  w.column_saving.assign(costs.cols, 0.0);
+  detail::refill(w.row_saving, costs.rows, 0.0);
+  detail::refill(w.column_saving, costs.cols, 0.0);
   AssignmentResult result;
   if (!(max_cost == max_cost)) {
     result.status = Status::invalid_input;
@@ -95,26 +114,29 @@ AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_co
   if (n == 0) return result;
   w.costs.resize(n * stride);
   double* row_least = (tall ? w.column_saving : w.row_saving).data();  // borrowed until the savings are known
-  double least = detail::infinity;
+  double least = detail::infinity, most = -detail::infinity;
   for (std::size_t i = 0; i < n; ++i) {
     const Scalar* source = costs.values.data() + (tall ? i : i * costs.cols);
-    row_least[i] = detail::copy_costs(source, tall ? costs.cols : 1, m, detail::CostLimits(max_cost), w.costs.data() + i * stride, stride);
-    least = (std::min)(least, row_least[i]);
+    const detail::CostRange range =
+        detail::copy_costs(source, tall ? costs.cols : 1, m, detail::CostLimits(max_cost), w.costs.data() + i * stride, stride);
+    row_least[i] = range.least;
+    least = (std::min)(least, range.least);
+    most = (std::max)(most, range.most);
   }
   if (!(least < detail::infinity)) {
     std::fill(row_least, row_least + n, 0.0);
     return result;
   }
-  double most = least;
-  if (!detail::is_moderate(max_cost, least)) {
+  if (!(most < detail::infinity) && !detail::is_moderate(max_cost, least)) {
+    most = least;
     for (std::size_t i = 0; i < n; ++i) most = (std::max)(most, detail::largest_cost(w.costs.data() + i * stride, m));
   }
   const double gate = detail::effective_gate(max_cost, least, most, n);
   w.distance.resize(stride);
-  w.price.assign(stride, 0.0);
+  detail::refill(w.price, stride, 0.0);
   w.open_price.resize(stride);
-  w.row_of_column.assign(stride, detail::nobody);
-  w.column_of_row.assign(n, detail::nobody);
+  detail::refill(w.row_of_column, stride, detail::nobody);
+  detail::refill(w.column_of_row, n, detail::nobody);
   w.queue.resize(n);
   w.visits.resize(n + 1);
 

@@ -68,8 +68,8 @@ class AssignmentSolver {
   [[nodiscard]] Offer offer(std::ptrdiff_t row) const noexcept {
     const double* c = costs(row);
     const double* p = w_.price.data();
-    TwoLeast t0, t1, t2, t3;
-    for (std::size_t j = 0; j < stride_; j += assignment_lanes) {
+    TwoLeast t0{c[0] - p[0]}, t1{c[1] - p[1]}, t2{c[2] - p[2]}, t3{c[3] - p[3]};
+    for (std::size_t j = assignment_lanes; j < stride_; j += assignment_lanes) {
       t0.add(c[j] - p[j]);
       t1.add(c[j + 1] - p[j + 1]);
       t2.add(c[j + 2] - p[j + 2]);
@@ -93,11 +93,15 @@ class AssignmentSolver {
     for (; j % 4 != 0; ++j) {
       if (c[j] - p[j] <= reduced) return j;
     }
-    while (static_cast<int>(c[j] - p[j] > reduced) & static_cast<int>(c[j + 1] - p[j + 1] > reduced) &
-           static_cast<int>(c[j + 2] - p[j + 2] > reduced) & static_cast<int>(c[j + 3] - p[j + 3] > reduced)) {
-      j += 4;
-    }
+    while (smaller(smaller(c[j] - p[j], c[j + 1] - p[j + 1]), smaller(c[j + 2] - p[j + 2], c[j + 3] - p[j + 3])) > reduced) j += 4;
     while (c[j] - p[j] > reduced) ++j;
+    return j;
+  }
+  /// The same from the first column on while no column has a price.
+  [[nodiscard]] static std::ptrdiff_t find(const double* c, double least) noexcept {
+    std::ptrdiff_t j = 0;
+    while (smaller(smaller(c[j], c[j + 1]), smaller(c[j + 2], c[j + 3])) > least) j += 4;
+    while (c[j] > least) ++j;
     return j;
   }
 
@@ -109,7 +113,7 @@ class AssignmentSolver {
       const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(k);
       const double least = row_least[k];
       if (!(least < gate_)) continue;
-      const std::ptrdiff_t j = find(costs(row), w_.price.data(), least, 0);
+      const std::ptrdiff_t j = find(costs(row), least);
       if (at(w_.row_of_column, j) != nobody) {
         w_.queue[left++] = row;
         continue;
