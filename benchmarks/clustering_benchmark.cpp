@@ -1,4 +1,4 @@
-// 1-D DBSCAN and depth foreground beside what one would use otherwise. Inputs rotate over 64 boxes: repeated on one input, the
+// 1-D DBSCAN and depth foreground beside what one would use otherwise. Inputs rotate over up to 64 boxes: repeated on one input, the
 // branch predictor learns the sort and every figure is wrong. `clusters` and `noise` (means over the boxes) show that all methods
 // give the same answer. scikit-learn: benchmarks/peers/sklearn_dbscan.py, on the same distribution of depths.
 #include <algorithm>
@@ -18,13 +18,13 @@
 namespace {
 
 constexpr double eps = 0.05;
-constexpr std::size_t min_pts = 5, boxes = 64;
+constexpr std::size_t min_pts = 5;
 
 // A person at 2 m, a wall at 3.5 m, a tenth spread between 1 and 6 m, as in the script for scikit-learn.
 template <typename Scalar>
 std::vector<std::vector<Scalar>> make_boxes(std::size_t n) {
   cfp::Random random(1, "clustering benchmark");
-  std::vector<std::vector<Scalar>> out(boxes);
+  std::vector<std::vector<Scalar>> out((std::min)(std::size_t(64), (std::max)(std::size_t(8), (std::size_t(1) << 16U) / n)));
   for (auto& box : out) {
     for (std::size_t i = 0; i < n; ++i) {
       const double kind = random.uniform();
@@ -77,14 +77,14 @@ void run(benchmark::State& state, const Method& method) {
   double clusters = 0, noise = 0;
   for (const auto& input : inputs) {
     const Outcome outcome = method(input, labels);
-    clusters += static_cast<double>(outcome.clusters) / boxes;
-    noise += static_cast<double>(outcome.noise) / boxes;
+    clusters += static_cast<double>(outcome.clusters) / static_cast<double>(inputs.size());
+    noise += static_cast<double>(outcome.noise) / static_cast<double>(inputs.size());
   }
   std::size_t next = 0;
   for (auto _ : state) {
     benchmark::DoNotOptimize(method(inputs[next], labels));
     benchmark::DoNotOptimize(labels.data());
-    next = (next + 1) % boxes;
+    next = (next + 1) % inputs.size();
   }
   state.counters["clusters"] = clusters;
   state.counters["noise"] = noise;

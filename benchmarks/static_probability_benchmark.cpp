@@ -1,8 +1,9 @@
 // The formulas of both stages on arrays, beside the code that one would write first. Every iteration takes another input of at
 // least 2^14 matches together, so that the branch predictor cannot learn the data.
 //
-// stage_two: d^T, d^F, for each D_Th (0.8 order statistic), d_min, C_c and the sigmoid, then the combination of both with C_s; the
-// peer is scalar double with std::sort. `difference` is the largest deviation of K from the peer's over all inputs.
+// stage_two: d^T, d^F, and for each D_Th (0.8 order statistic), d_min, C_c and the sigmoid; with `combined` also the combination of
+// both with C_s for every keypoint, by the scalar function (the pipeline does that for keypoints in boxes only). The peer is scalar
+// double with std::sort. `difference` is the largest deviation of K^T, K^F and K from the peer's over all inputs.
 // object_score: d^F of the pairs of one object under a given F, scores, O; the peer is scalar double, Boost.Math's density for the
 // score (the equation as printed) and std::sort. `O` is the mean over the inputs. The scores alone: math_benchmark.
 #include <benchmark/benchmark.h>
@@ -75,7 +76,7 @@ struct Buffers {
   explicit Buffers(std::size_t n) : projection(n), epipolar(n), k_projection(n), k_epipolar(n), scratch(n), k(n) {}
 };
 
-template <typename Scalar>
+template <bool combined, typename Scalar>
 void stage_two(const Matches<Scalar>& in, const cfp::SE3<Scalar>& T, const cfp::Matrix3<Scalar>& F, Buffers<Scalar>& b) {
   const cfp::ConstraintOptions options;
   cfp::reprojection_distances(camera_as<Scalar>(), T, in.prev, in.depth, in.cur, b.projection);
@@ -84,6 +85,7 @@ void stage_two(const Matches<Scalar>& in, const cfp::SE3<Scalar>& T, const cfp::
   const auto by_line = cfp::fit_constraint(span<const Scalar>(b.epipolar), span<Scalar>(b.scratch), options);
   cfp::static_probabilities(by_projection, span<const Scalar>(b.projection), span<Scalar>(b.k_projection));
   cfp::static_probabilities(by_line, span<const Scalar>(b.epipolar), span<Scalar>(b.k_epipolar));
+  if (!combined) return;
   const Scalar cs = cfp::statistical_confidence(pose_inliers, Scalar(20));
   const Scalar ct = cs * by_projection.calculation_confidence, cf = cs * by_line.calculation_confidence;
   for (std::size_t i = 0; i < b.k.size(); ++i) {
@@ -106,6 +108,7 @@ double sorted_sigmoid(const std::vector<double>& distance, std::vector<double>& 
   return 1 - sum / (below * threshold);
 }
 
+template <bool combined>
 void stage_two_first_thought(const Matches<double>& in, const cfp::SE3<double>& T, const cfp::Matrix3<double>& F, Buffers<double>& b) {
   for (std::size_t i = 0; i < in.prev.size(); ++i) {
     const cfp::Vector3<double> p((in.prev[i].x() - camera.cx) / camera.fx * in.depth[i], (in.prev[i].y() - camera.cy) / camera.fy * in.depth[i],
@@ -117,10 +120,12 @@ void stage_two_first_thought(const Matches<double>& in, const cfp::SE3<double>& 
   }
   const double cs = 1 / (1 + std::exp(-static_cast<double>(pose_inliers) + 0.5 * 20));
   const double ct = cs * sorted_sigmoid(b.projection, b.scratch, b.k_projection), cf = cs * sorted_sigmoid(b.epipolar, b.scratch, b.k_epipolar);
+  benchmark::DoNotOptimize(ct + cf);
+  if (!combined) return;
   for (std::size_t i = 0; i < b.k.size(); ++i) b.k[i] = (b.k_projection[i] * ct + b.k_epipolar[i] * cf) / (ct + cf);
 }
 
-template <typename Scalar>
+template <typename Scalar, bool combined = false>
 void stage_two_cfp(benchmark::State& state) {
   const std::size_t n = static_cast<std::size_t>(state.range(0));
   const std::vector<Matches<Scalar>> inputs = make_matches<Scalar>(n);
@@ -129,22 +134,27 @@ void stage_two_cfp(benchmark::State& state) {
   Buffers<Scalar> buffers(n);
   std::size_t turn = 0;
   for (auto _ : state) {
-    stage_two(inputs[turn++ % inputs.size()], T.cast<Scalar>(), cfp::Matrix3<Scalar>(F.cast<Scalar>()), buffers);
-    benchmark::DoNotOptimize(buffers.k.data());
+    stage_two<combined>(inputs[turn++ % inputs.size()], T.cast<Scalar>(), cfp::Matrix3<Scalar>(F.cast<Scalar>()), buffers);
+    for (const auto* out : {&buffers.k_projection, &buffers.k_epipolar, &buffers.k}) benchmark::DoNotOptimize(out->data());
     benchmark::ClobberMemory();
   }
   const std::vector<Matches<double>> truth_inputs = make_matches<double>(n);
   Buffers<double> truth(n);
   double difference = 0;
   for (std::size_t f = 0; f < inputs.size(); ++f) {
-    stage_two(inputs[f], T.cast<Scalar>(), cfp::Matrix3<Scalar>(F.cast<Scalar>()), buffers);
-    stage_two_first_thought(truth_inputs[f], T, F, truth);
-    for (std::size_t i = 0; i < n; ++i) difference = std::fmax(difference, std::abs(static_cast<double>(buffers.k[i]) - truth.k[i]));
+    stage_two<combined>(inputs[f], T.cast<Scalar>(), cfp::Matrix3<Scalar>(F.cast<Scalar>()), buffers);
+    stage_two_first_thought<combined>(truth_inputs[f], T, F, truth);
+    for (std::size_t i = 0; i < n; ++i) {
+      difference = std::fmax(difference, std::abs(static_cast<double>(buffers.k_projection[i]) - truth.k_projection[i]));
+      difference = std::fmax(difference, std::abs(static_cast<double>(buffers.k_epipolar[i]) - truth.k_epipolar[i]));
+      difference = std::fmax(difference, std::abs(static_cast<double>(buffers.k[i]) - truth.k[i]));
+    }
   }
   state.counters["difference"] = difference;
   state.SetItemsProcessed(state.iterations() * state.range(0));
 }
 
+template <bool combined = false>
 void stage_two_scalar_sort(benchmark::State& state) {
   const std::size_t n = static_cast<std::size_t>(state.range(0));
   const std::vector<Matches<double>> inputs = make_matches<double>(n);
@@ -153,8 +163,8 @@ void stage_two_scalar_sort(benchmark::State& state) {
   Buffers<double> buffers(n);
   std::size_t turn = 0;
   for (auto _ : state) {
-    stage_two_first_thought(inputs[turn++ % inputs.size()], T, F, buffers);
-    benchmark::DoNotOptimize(buffers.k.data());
+    stage_two_first_thought<combined>(inputs[turn++ % inputs.size()], T, F, buffers);
+    for (const auto* out : {&buffers.k_projection, &buffers.k_epipolar, &buffers.k}) benchmark::DoNotOptimize(out->data());
     benchmark::ClobberMemory();
   }
   state.SetItemsProcessed(state.iterations() * state.range(0));
@@ -211,9 +221,11 @@ void object_score_boost(benchmark::State& state) {
 }  // namespace
 
 #define SIZES Arg(100)->Arg(1000)->Arg(10000)->Arg(100000)
-BENCHMARK(stage_two_scalar_sort)->SIZES;
+BENCHMARK(stage_two_scalar_sort<>)->SIZES;
+BENCHMARK(stage_two_scalar_sort<true>)->Arg(1000);
 BENCHMARK(stage_two_cfp<float>)->SIZES;
 BENCHMARK(stage_two_cfp<double>)->SIZES;
+BENCHMARK(stage_two_cfp<float, true>)->Arg(1000);
 #ifdef CFP_HAVE_BOOST
 BENCHMARK(object_score_boost)->Arg(100)->Arg(500)->Arg(1000)->Arg(10000);
 #endif

@@ -2,6 +2,7 @@
 /// What all pixel distances of cfp share: the value that stands for "no distance", and the guarded quotient.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -37,6 +38,13 @@ std::size_t copy_distances(span<const Scalar> from, span<Scalar> to) noexcept {
     detail::load_chunk(from, first, count, d);
     for (std::size_t i = 0; i < detail::chunk_size; ++i)
       keep[i] = static_cast<std::uint8_t>(static_cast<int>(d.data()[i] >= Scalar(0)) & static_cast<int>(d.data()[i] <= (std::numeric_limits<Scalar>::max)()));
+    std::size_t kept_here = 0;
+    for (std::size_t i = 0; i < detail::chunk_size; ++i) kept_here += keep[i];
+    if (kept_here == detail::chunk_size && count == detail::chunk_size) {  // mostly none is missing, or there are gaps in every chunk
+      std::copy_n(d.data(), detail::chunk_size, to.data() + kept);
+      kept += detail::chunk_size;
+      return;
+    }
     for (std::size_t i = 0; i < count; ++i) {
       to.data()[kept] = d.data()[i];
       kept += keep[i];

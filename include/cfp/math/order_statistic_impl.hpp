@@ -83,11 +83,14 @@ class BucketCounts {
     while ((width >> shift_) >= buckets) ++shift_;
     for_each_block(values, n, [this](std::size_t, std::size_t size, const std::uint8_t* bucket) {
       std::size_t i = 0;
-      for (; i + 1 < size; i += 2) {
-        ++counts_[0][bucket[i]];
-        ++counts_[1][bucket[i + 1]];
+      for (; i + 4 <= size; i += 4) {
+        const std::size_t b0 = bucket[i], b1 = bucket[i + 1], b2 = bucket[i + 2], b3 = bucket[i + 3];
+        ++counts_[0][b0];
+        ++counts_[1][b1];
+        ++counts_[0][b2];
+        ++counts_[1][b3];
       }
-      if (i < size) ++counts_[0][bucket[i]];
+      for (; i < size; ++i) ++counts_[0][bucket[i]];
     });
   }
 
