@@ -1,6 +1,6 @@
-// Optical-flow pairs for the object stage: keypoints of the previous image, which the front end has anyway, tracked into the current
-// one by pyramidal Lucas-Kanade. Pyramids are built once per image and kept for the next one. The defaults and what they cost and
-// buy against the usual way (corners of their own, whole image): benchmarks/studies/object_flow_study.cpp.
+// Optical-flow pairs for the object stage by pyramidal Lucas-Kanade: corners, found at half resolution, and the front end's own
+// keypoints inside boxes. Pyramids are built once per image and kept for the next one. What the defaults cost and buy against the
+// usual way: benchmarks/studies/object_flow_study.cpp.
 #pragma once
 
 #include <algorithm>
@@ -18,19 +18,19 @@
 namespace cfp_slam {
 
 struct FlowOptions {
-  int points_per_box = 150;  // at most, spread over the box; one per cell of a grid
-  int points_outside = 250;  // at most, spread over the rest of the image: they support the camera's motion
-  // In boxes: corners of their own, found at half resolution, as keypoints are scarce on plain clothes. false: keypoints.
-  bool corners_in_boxes = true;
-  bool corners_outside = false;
-  double corner_quality = 0.01;  // least strength of a corner relative to the strongest of its box
-  float corner_distance = 6;     // between corners, px
+  int corners = 500;             // at most, over the whole image, found at half resolution: they carry the camera's motion
+  double corner_distance = 6;    // between two of them, px
+  double corner_quality = 0.01;  // least strength of a corner, as a share of the strongest one's
+  int keypoints_per_box = 100;   // at most, besides, in each box, one per cell of a grid
+  int keypoints_outside = 0;     // at most, outside all boxes, likewise
   int window = 15;               // side of the patch that is tracked, px
   int levels = 4;                // of the pyramid, >= 1
   int iterations = 20;           // per level
   double precision = 0.02;       // an update below this ends the iterations, px
-  bool backward = true;          // track back as well ...
-  float max_backward_px = 0.5F;  // ... and drop what does not return to where it came from
+  // Track back as well, and drop pairs that return further than max_backward_px from where they came. Off: it takes as long again,
+  // and what it drops lies mostly on moving limbs, which is what O looks for.
+  bool backward = false;
+  float max_backward_px = 0.5F;
 };
 
 class FlowTracker {
@@ -72,7 +72,7 @@ class FlowTracker {
   void reset() { pyramid_.clear(); }
 
  private:
-  // The strongest keypoint of every cell; the cells of each box are as many as it may have points, and so for the rest.
+  // The strongest keypoint of every cell; the cells of each box are at most as many as it may have points, and so for the rest.
   void choose(const std::vector<cv::KeyPoint>& keypoints, cfp::span<const cfp::Box<float>> boxes, cv::Size size) {
     const auto width = static_cast<float>(size.width), height = static_cast<float>(size.height);
     regions_.clear();
@@ -87,15 +87,14 @@ class FlowTracker {
       cells += static_cast<std::size_t>(region.across * region.down);
       regions_.push_back(region);
     };
-    for (const cfp::Box<float>& box : boxes) add(cfp::clip(box, width, height), options_.points_per_box);
-    add({0, 0, width, height}, options_.points_outside);
+    for (const cfp::Box<float>& box : boxes) add(cfp::clip(box, width, height), options_.keypoints_per_box);
+    add({0, 0, width, height}, options_.keypoints_outside);
 
     strongest_.assign(cells, nullptr);
     for (const cv::KeyPoint& k : keypoints) {
       const auto region =
           std::find_if(regions_.begin(), regions_.end(), [&](const Region& r) { return cfp::contains(r.box, k.pt.x, k.pt.y); });
       if (region == regions_.end() || region->across == 0) continue;
-      if (region + 1 == regions_.end() ? options_.corners_outside : options_.corners_in_boxes) continue;
       const auto cell = [](float x, float length, int n) {
         return static_cast<std::size_t>(std::clamp(static_cast<int>(x / length * static_cast<float>(n)), 0, n - 1));
       };
@@ -107,18 +106,16 @@ class FlowTracker {
     for (const cv::KeyPoint* k : strongest_) {
       if (k != nullptr) from_.push_back(k->pt);
     }
-    for (std::size_t r = 0; r < regions_.size(); ++r) {
-      const bool outside = r + 1 == regions_.size();
-      if (outside ? !options_.corners_outside : !options_.corners_in_boxes) continue;
-      const int points = outside ? options_.points_outside : options_.points_per_box;
-      const cv::Mat& half = previous_pyramid_[2];
-      const cfp::Box<float>& b = regions_[r].box;
-      const cv::Rect part =
-          cv::Rect(cv::Point(int(b.x1 / 2), int(b.y1 / 2)), cv::Point(int(b.x2 / 2), int(b.y2 / 2))) & cv::Rect({0, 0}, half.size());
-      if (part.width < 8 || part.height < 8) continue;
-      cv::goodFeaturesToTrack(half(part), corners_, points, options_.corner_quality, double(options_.corner_distance) / 2);
-      for (const cv::Point2f& c : corners_) from_.push_back({2 * (c.x + float(part.x)), 2 * (c.y + float(part.y))});
-    }
+    find_corners();
+  }
+
+  void find_corners() {
+    if (options_.corners <= 0) return;
+    const bool half = previous_pyramid_.size() > 2;  // images and derivatives take turns
+    const float scale = half ? 2 : 1;
+    cv::goodFeaturesToTrack(previous_pyramid_[half ? 2 : 0], corners_, options_.corners, options_.corner_quality,
+                            options_.corner_distance / double(scale));
+    for (const cv::Point2f& corner : corners_) from_.push_back(scale * corner);
   }
 
   template <typename Good>

@@ -1,0 +1,280 @@
+// Optical flow for the object stage: how few points, how small a window, which points, and is tracking back worth its time? The
+// usual way (1000 corners over the whole image, 22x22, five levels, no check) against keypoints of the previous frame on pyramids
+// that are kept. On rendered sequences with labels: time on one core for flow and for F and O, and how well O tells moving people
+// from still ones (AUC; a box is moving when at least half, still when at most 2 % of its person pixels move).
+// Supports cfp_slam::FlowOptions.
+//   cfp_object_flow_study [--smoke | --frames N | TUM_FOLDER...]   instead of rendering, folders of cfp_synthetic; one without
+// labels, with a detections.txt, gives times and mean O alone (as "partly")
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/video/tracking.hpp>
+
+#include "../../examples/slam/flow.hpp"
+#include "../../examples/slam/sequence.hpp"
+#include "../../examples/slam/simple_detectors.hpp"
+#include "../../examples/synthetic/sequence.hpp"
+#include "cfp/evaluation/calibration.hpp"
+#include "cfp/interop/opencv.hpp"
+#include "cfp/pipeline/first_stage.hpp"
+
+namespace {
+
+using Pairs = std::pair<std::vector<cv::Point2f>, std::vector<cv::Point2f>>;
+
+struct Person {
+  cfp::Box<float> box;
+  double moving_share = 0;
+};
+
+struct Image {
+  cv::Mat gray;
+  std::vector<cv::KeyPoint> keypoints;
+  std::vector<Person> people;
+};
+
+// A way to make the pairs, with what it measured.
+struct Candidate {
+  std::string name;
+  std::function<void(const cv::Mat& previous, const Image& before, const Image& now, Pairs& pairs)> track;
+  std::vector<double> flow_ms{}, object_ms{}, total_ms{};
+  std::vector<float> score{};
+  std::vector<char> is_static{};
+  double still_sum = 0, moving_sum = 0, partly_sum = 0, pairs = 0;
+  std::size_t still = 0, moving = 0, partly = 0, unknown = 0, frames = 0, still_passed = 0, moving_passed = 0, no_model = 0,
+              homographies = 0;
+};
+
+double processor_ms() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+double quantile(std::vector<double> values, double q) {
+  if (values.empty()) return 0;
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+// Corners of its own on the previous image, pyramids built anew.
+Candidate corners(const std::string& name, int count, double quality, double distance, int window, int levels, bool backward) {
+  return {name, [=](const cv::Mat& previous, const Image&, const Image& now, Pairs& pairs) {
+            std::vector<cv::Point2f> from, to, back;
+            std::vector<unsigned char> found, found_back;
+            std::vector<float> error;
+            cv::goodFeaturesToTrack(previous, from, count, quality, distance);
+            if (from.empty()) return;
+            cv::calcOpticalFlowPyrLK(previous, now.gray, from, to, found, error, {window, window}, levels - 1);
+            if (backward) cv::calcOpticalFlowPyrLK(now.gray, previous, to, back, found_back, error, {window, window}, levels - 1);
+            for (std::size_t i = 0; i < from.size(); ++i) {
+              if (found[i] == 0 || (backward && (found_back[i] == 0 || std::hypot(back[i].x - from[i].x, back[i].y - from[i].y) > 0.5F)))
+                continue;
+              pairs.first.push_back(from[i]);
+              pairs.second.push_back(to[i]);
+            }
+          }};
+}
+
+Candidate tracker(const std::string& name, const cfp_slam::FlowOptions& options) {
+  auto state = std::make_shared<std::pair<cfp_slam::FlowTracker, std::vector<cfp::Box<float>>>>(cfp_slam::FlowTracker(options),
+                                                                                                std::vector<cfp::Box<float>>());
+  return {name, [state](const cv::Mat& previous, const Image& before, const Image& now, Pairs& pairs) {
+            auto& [flow, boxes] = *state;
+            boxes.clear();
+            for (const Person& person : before.people) boxes.push_back(person.box);
+            if (previous.empty()) flow.reset();
+            flow.track(now.gray, before.keypoints, boxes);
+            pairs = {flow.previous(), flow.current()};
+          }};
+}
+
+std::vector<Candidate> candidates() {
+  const auto with = [](auto change) {
+    cfp_slam::FlowOptions o;
+    change(o);
+    return o;
+  };
+  std::vector<Candidate> all;
+  all.push_back(corners("1000 corners, 22 px, 5 levels", 1000, 0.01, 8, 22, 5, false));
+  all.push_back(corners("500 corners, 22 px, 5 levels", 500, 0.01, 8, 22, 5, false));
+  all.push_back(corners("500 corners, 21 px, 5 levels, back", 500, 0.01, 8, 21, 5, true));
+  all.push_back(tracker("default", {}));
+  all.push_back(tracker("  keypoints alone, 300 outside", with([](auto& o) { o.corners = 0, o.keypoints_outside = 300; })));
+  all.push_back(tracker("  corners alone", with([](auto& o) { o.keypoints_per_box = 0; })));
+  all.push_back(tracker("  250 corners", with([](auto& o) { o.corners = 250; })));
+  all.push_back(tracker("  800 corners", with([](auto& o) { o.corners = 800; })));
+  all.push_back(tracker("  50 keypoints in a box", with([](auto& o) { o.keypoints_per_box = 50; })));
+  all.push_back(tracker("  300 keypoints in a box", with([](auto& o) { o.keypoints_per_box = 300; })));
+  all.push_back(tracker("  corners 12 px apart", with([](auto& o) { o.corner_distance = 12; })));
+  all.push_back(tracker("  window 11", with([](auto& o) { o.window = 11; })));
+  all.push_back(tracker("  window 21", with([](auto& o) { o.window = 21; })));
+  all.push_back(tracker("  3 levels", with([](auto& o) { o.levels = 3; })));
+  all.push_back(tracker("  10 iterations", with([](auto& o) { o.iterations = 10; })));
+  all.push_back(tracker("  tracked back as well", with([](auto& o) { o.backward = true; })));
+  return all;
+}
+
+double moving_share(const cv::Mat& labels, const cfp::Box<float>& box) {
+  if (labels.empty()) return std::numeric_limits<double>::quiet_NaN();
+  const cv::Rect inside =
+      cv::Rect(int(box.x1), int(box.y1), int(std::ceil(box.width())), int(std::ceil(box.height()))) & cv::Rect({0, 0}, labels.size());
+  const int moving = cv::countNonZero(labels(inside) == 1), still = cv::countNonZero(labels(inside) == 2);
+  return moving + still > 0 ? double(moving) / (moving + still) : 0;
+}
+
+void judge(std::vector<Candidate>& all, const std::vector<Image>& images, const cfp::PinholeCamera<float>& camera) {
+  const cfp::FirstStageOptions options;
+  cfp::FirstStageWorkspace<float> work;
+  for (std::size_t k = 0; k < images.size(); ++k) {
+    for (std::size_t turn = 0; turn < all.size(); ++turn) {
+      Candidate& c = all[(turn + k) % all.size()];
+      Pairs pairs;
+      const double start = processor_ms();
+      if (k == 0) {
+        static const Image nothing;
+        if (c.name.find("corners") == std::string::npos) c.track({}, nothing, images[0], pairs);
+        continue;
+      }
+      c.track(images[k - 1].gray, images[k - 1], images[k], pairs);
+      const double tracked = processor_ms();
+      std::vector<cfp::ObjectBox<float>> boxes;
+      for (const Person& person : images[k].people) boxes.push_back({person.box, true, true});
+      std::vector<cfp::ObjectProbability> objects(boxes.size());
+      cfp::FirstStageInput<float> in;
+      in.boxes = boxes;
+      in.flow_previous = cfp::view(pairs.first);
+      in.flow_current = cfp::view(pairs.second);
+      cfp::FirstStageOutput<float> out;
+      out.objects = objects;
+      const cfp::FirstStageResult result = cfp::first_stage(in, camera, out, options, work);
+      const double end = processor_ms();
+      c.flow_ms.push_back(tracked - start);
+      c.object_ms.push_back(end - tracked);
+      c.total_ms.push_back(end - start);
+      c.pairs += static_cast<double>(pairs.first.size());
+      ++c.frames;
+      c.no_model += result.flow_model == cfp::FlowModelKind::none ? 1U : 0U;
+      c.homographies += result.flow_model == cfp::FlowModelKind::homography ? 1U : 0U;
+      for (std::size_t b = 0; b < boxes.size(); ++b) {
+        const double share = images[k].people[b].moving_share, o = objects[b].static_probability;
+        if (objects[b].status != cfp::Status::ok) ++c.unknown;
+        if (!(share <= 0.02 || share >= 0.5)) {
+          c.partly_sum += o;
+          ++c.partly;
+          continue;
+        }
+        const bool is_static = share <= 0.02;
+        c.score.push_back(static_cast<float>(o));
+        c.is_static.push_back(is_static ? 1 : 0);
+        (is_static ? c.still_sum : c.moving_sum) += o;
+        ++(is_static ? c.still : c.moving);
+        if (o > options.object_threshold) ++(is_static ? c.still_passed : c.moving_passed);
+      }
+    }
+  }
+}
+
+void finish(Image& image, const cv::Mat& bgr, cv::ORB& orb) {
+  cv::cvtColor(bgr, image.gray, cv::COLOR_BGR2GRAY);
+  orb.detect(image.gray, image.keypoints);
+}
+
+void print(const std::vector<Candidate>& all) {
+  std::printf("%-36s %6s | %6s %6s %6s %6s %6s | %7s %7s %7s | %7s %7s | %7s %5s %5s | %4s %4s %4s\n", "", "pairs", "flow", "F, O", "sum",
+              "95 %", "ratio", "AUC", "still>", "moving>", "O still", "moving", "partly", "boxes", "unkn.", "F", "H", "none");
+  for (const Candidate& c : all) {
+    cfp::CalibrationWorkspace workspace;
+    const auto auc =
+        cfp::area_under_curve(cfp::span<const float>(c.score), cfp::span<const char>(c.is_static), cfp::span<const float>(), workspace);
+    const auto mean = [](double sum, std::size_t n) { return n > 0 ? sum / static_cast<double>(n) : 0.0; };
+    std::printf("%-36s %6.0f | %6.2f %6.2f %6.2f %6.2f %6.2f | %7.4f %7.3f %7.3f | %7.3f %7.3f | %7.3f %5zu %5zu | %4zu %4zu %4zu\n",
+                c.name.c_str(), mean(c.pairs, c.frames), quantile(c.flow_ms, 0.5), quantile(c.object_ms, 0.5), quantile(c.total_ms, 0.5),
+                quantile(c.total_ms, 0.95), quantile(c.total_ms, 0.5) / quantile(all[0].total_ms, 0.5), auc.auc,
+                mean(double(c.still_passed), c.still), mean(double(c.moving_passed), c.moving), mean(c.still_sum, c.still),
+                mean(c.moving_sum, c.moving), mean(c.partly_sum, c.partly), c.still + c.moving + c.partly, c.unknown,
+                c.frames - c.no_model - c.homographies, c.homographies, c.no_model);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::vector<std::string> folders;
+  int frames = 60;
+  bool smoke = false;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (word == "--smoke") {
+      smoke = true;
+    } else if (word == "--frames" && i + 1 < argc) {
+      frames = std::max(2, std::atoi(argv[++i]));
+    } else {
+      folders.push_back(word);
+    }
+  }
+  cv::setNumThreads(1);
+  const cv::Ptr<cv::ORB> orb = cv::ORB::create(1000, 1.2F, 8, 15, 0, 2, cv::ORB::HARRIS_SCORE, 31, 10);
+  std::vector<Candidate> all = candidates();
+  std::vector<Image> images;
+  const auto add = [&](const cv::Mat& bgr, const cv::Mat& labels, const std::vector<cfp::Box<float>>& boxes) {
+    Image image;
+    finish(image, bgr, *orb);
+    for (const auto& box : boxes) image.people.push_back({box, moving_share(labels, box)});
+    images.push_back(std::move(image));
+  };
+  for (const std::string& folder : folders) {
+    const cfp_slam::Sequence sequence(folder);
+    std::unique_ptr<cfp_slam::FileDetector> detections;
+    images.clear();
+    for (std::size_t i = 0; i < sequence.size(); ++i) {
+      const cfp_slam::SequenceFrame frame = sequence.load(i);
+      std::vector<cfp::Box<float>> boxes;
+      for (const auto& b : sequence.true_boxes(i)) {
+        if (b.pixels >= 2000 && b.visible_fraction >= 0.3) boxes.push_back(b.box);
+      }
+      if (!frame.usable) continue;
+      if (frame.labels.empty()) {
+        if (!detections)
+          detections =
+              std::make_unique<cfp_slam::FileDetector>((sequence.folder() / "detections.txt").string(), cfp_slam::DetectorOptions{});
+        for (const auto& d : detections->detect(frame.bgr, frame.time_s)) boxes.push_back(d.box);
+      }
+      add(frame.bgr, frame.labels, boxes);
+    }
+    const auto& c = sequence.calibration();
+    judge(all, images, {float(c.fx), float(c.fy), float(c.cx), float(c.cy)});
+  }
+  for (int s = 0; s < 8 && folders.empty(); ++s) {
+    if (smoke && s % 4 != 1) continue;
+    synthetic::SequenceOptions options;
+    options.scenario = static_cast<synthetic::Scenario>(s / 4);
+    options.motion = static_cast<synthetic::Motion>(s % 4);
+    options.seed = 3;
+    options.frames = smoke ? 3 : frames;
+    const synthetic::Sequence sequence(options);
+    synthetic::Renderer renderer;
+    synthetic::RenderedFrame frame;
+    images.clear();
+    for (int k = 0; k < options.frames; ++k) {
+      sequence.render(k, renderer, frame);
+      std::vector<cfp::Box<float>> boxes;
+      for (const auto& person : frame.truth.people) {
+        if (person.pixels >= 2000 && person.visible >= 0.3)
+          boxes.push_back({float(person.box.x1), float(person.box.y1), float(person.box.x2), float(person.box.y2)});
+      }
+      add(frame.color, frame.label, boxes);
+    }
+    const auto& c = sequence.options().camera;
+    judge(all, images, {float(c.fx), float(c.fy), float(c.cx), float(c.cy)});
+  }
+  std::printf("processor ms per frame on one core (medians; ratio of sums to the first line), AUC of O, share with O > 0.9, mean O\n");
+  print(all);
+  return 0;
+}

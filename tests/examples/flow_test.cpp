@@ -1,0 +1,121 @@
+#include "../../examples/slam/flow.hpp"
+
+#include <limits>
+
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "support/catch.hpp"
+
+using namespace cfp_slam;
+
+namespace {
+
+// A smooth random texture.
+cv::Mat texture() {
+  cv::Mat image(300, 400, CV_8UC1);
+  cv::RNG(11).fill(image, cv::RNG::UNIFORM, 0, 256);
+  cv::GaussianBlur(image, image, {0, 0}, 2);
+  cv::normalize(image, image, 0, 255, cv::NORM_MINMAX);
+  return image;
+}
+
+cv::Mat moved(const cv::Mat& image, double dx, double dy) {
+  cv::Mat out;
+  cv::warpAffine(image, out, cv::Matx23d(1, 0, dx, 0, 1, dy), image.size(), cv::INTER_CUBIC, cv::BORDER_REFLECT);
+  return out;
+}
+
+std::vector<cv::KeyPoint> keypoints_of(const cv::Mat& image) {
+  std::vector<cv::KeyPoint> keypoints;
+  cv::ORB::create(2000)->detect(image, keypoints);
+  return keypoints;
+}
+
+bool near(const cv::Point2f& a, const cv::Point2f& b, float distance) { return std::hypot(a.x - b.x, a.y - b.y) <= distance; }
+
+}  // namespace
+
+TEST_CASE("Pairs follow the image, over several frames and with either check", "[flow]") {
+  const cv::Mat image = texture();
+  for (const bool backward : {false, true}) {
+    FlowOptions options;
+    options.backward = backward;
+    FlowTracker tracker(options);
+    const cfp::Box<float> box{100, 80, 220, 240};
+    tracker.track(image, {}, cfp::span<const cfp::Box<float>>());
+    CHECK(tracker.previous().empty());
+    cv::Mat before = image;
+    for (int k = 1; k < 4; ++k) {
+      const cv::Mat now = moved(image, 3.25 * k, -1.5 * k);
+      tracker.track(now, keypoints_of(before), cfp::span<const cfp::Box<float>>(&box, 1));
+      REQUIRE(tracker.previous().size() == tracker.current().size());
+      std::size_t inside = 0, right = 0;
+      for (std::size_t i = 0; i < tracker.previous().size(); ++i) {
+        inside += cfp::contains(box, tracker.previous()[i].x, tracker.previous()[i].y) ? 1U : 0U;
+        right += near(tracker.current()[i] - tracker.previous()[i], {3.25F, -1.5F}, 0.2F) ? 1U : 0U;
+      }
+      CHECK(inside >= 20);
+      CHECK(tracker.previous().size() - inside >= 50);
+      CHECK(right >= tracker.previous().size() * 9 / 10);
+      before = now;
+    }
+  }
+}
+
+TEST_CASE("No region gets more points than it may have", "[flow]") {
+  const cv::Mat image = texture();
+  const std::vector<cv::KeyPoint> keypoints = keypoints_of(image);
+  const std::vector<cfp::Box<float>> boxes = {{10, 10, 150, 290}, {140, 100, 390, 200}, {-50, -50, 20, 20}};
+  for (const int points : {0, 1, 7, 40}) {
+    FlowOptions options;
+    options.corners = 0;
+    options.keypoints_per_box = points;
+    options.keypoints_outside = 3 * points;
+    FlowTracker tracker(options);
+    tracker.track(image, {}, {});
+    tracker.track(image, keypoints, cfp::span<const cfp::Box<float>>(boxes.data(), boxes.size()));
+    std::vector<int> count(boxes.size() + 1, 0);
+    for (const cv::Point2f& p : tracker.previous()) {
+      std::size_t region = 0;
+      while (region < boxes.size() && !cfp::contains(boxes[region], p.x, p.y)) ++region;
+      ++count[region];
+    }
+    for (std::size_t region = 0; region < boxes.size(); ++region) CHECK(count[region] <= points);
+    CHECK(count.back() <= 3 * points);
+    options.keypoints_per_box = options.keypoints_outside = 0;
+    options.corners = points;
+    FlowTracker corners(options);
+    corners.track(image, {}, {});
+    corners.track(image, keypoints, {});
+    CHECK(corners.previous().size() == static_cast<std::size_t>(points));
+  }
+}
+
+TEST_CASE("Nothing to track, broken boxes and changed sizes make no pairs and no fuss", "[flow]") {
+  const float inf = std::numeric_limits<float>::infinity(), nan = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<cfp::Box<float>> boxes = {{nan, 0, 1, 1},   {0, 0, inf, inf},   {5, 5, 4, 4},
+                                              {-9, -9, -1, -1}, {1, 1, 1.5F, 1.5F}, {-1e30F, -1e30F, 1e30F, 1e30F}};
+  const cfp::span<const cfp::Box<float>> view(boxes.data(), boxes.size());
+  std::vector<cv::KeyPoint> odd = {{nan, 3, 1}, {inf, 3, 1}, {-5, 3, 1}, {3, 1e30F, 1}, {50, 50, 1}};
+  const cv::Mat image = texture();
+  FlowTracker tracker;
+  tracker.track(cv::Mat(), odd, view);
+  tracker.track(image, odd, view);
+  CHECK(tracker.previous().empty());
+  tracker.track(image, odd, view);
+  for (const cv::Point2f& p : tracker.current()) CHECK((p.x >= 0 && p.x < 400 && p.y >= 0 && p.y < 300));
+  tracker.track(image(cv::Rect(0, 0, 200, 100)).clone(), odd, view);
+  CHECK(tracker.previous().empty());
+  for (const cv::Size size : {cv::Size(1, 1), cv::Size(20, 10), cv::Size(40, 30)}) {
+    const cv::Mat flat(size, CV_8UC1, cv::Scalar(7));
+    tracker.track(flat, odd, view);
+    CHECK(tracker.previous().empty());
+    tracker.track(flat, odd, view);
+    CHECK(tracker.previous().size() == tracker.current().size());
+  }
+  tracker.track(image, odd, view);
+  tracker.reset();
+  tracker.track(image, keypoints_of(image), {});
+  CHECK(tracker.previous().empty());
+}
