@@ -42,12 +42,13 @@ class FlowTracker {
   void track(const cv::Mat& gray, const std::vector<cv::KeyPoint>& keypoints, cfp::span<const cfp::Box<float>> boxes) {
     std::swap(previous_pyramid_, pyramid_);
     const bool first = gray.empty() || previous_pyramid_.empty() || previous_pyramid_[0].size() != gray.size();
-    pyramid_.clear();
     from_.clear();
     to_.clear();
+    if (gray.empty()) return reset();
     const cv::Size window(options_.window, options_.window);
-    if (gray.empty()) return;
-    const int top = cv::buildOpticalFlowPyramid(gray, pyramid_, window, options_.levels - 1, true);
+    // A copy of the image (the last argument): the caller may overwrite it before the next call.
+    const int top =
+        cv::buildOpticalFlowPyramid(gray, pyramid_, window, options_.levels - 1, true, cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);
     if (first) return;
     choose(keypoints, boxes, gray.size());
     if (from_.empty()) return;

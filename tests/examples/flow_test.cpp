@@ -119,3 +119,21 @@ TEST_CASE("Nothing to track, broken boxes and changed sizes make no pairs and no
   tracker.track(image, keypoints_of(image), {});
   CHECK(tracker.previous().empty());
 }
+
+TEST_CASE("The caller's image may be overwritten between the calls", "[flow]") {
+  const cv::Mat image = texture(), next = moved(image, 2, 1);
+  // A part with room around it is what OpenCV would keep without a copy.
+  const auto part = [](cv::Mat& buffer, const cv::Mat& content) {
+    cv::Mat inner = buffer(cv::Rect(50, 50, 400, 300));
+    content.copyTo(inner);
+    return inner;
+  };
+  cv::Mat first = cv::Mat::zeros(400, 500, CV_8UC1), second = first.clone(), reused = first.clone();
+  FlowTracker own, shared;
+  own.track(part(first, image), {}, {});
+  own.track(part(second, next), {}, {});
+  shared.track(part(reused, image), {}, {});
+  shared.track(part(reused, next), {}, {});
+  REQUIRE(own.current().size() > 100);
+  CHECK((own.previous() == shared.previous() && own.current() == shared.current()));
+}
