@@ -1,5 +1,6 @@
 // A thin RGB-D SLAM system around cfp: see README.md beside this file.
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -43,6 +44,10 @@ cfp::Variant variant_of(const std::string& name) {
     if (name == cfp::to_string(static_cast<cfp::Variant>(v))) return static_cast<cfp::Variant>(v);
   }
   throw std::runtime_error("no variant '" + name + "': cfp, cfp-minus, no-mdc, no-dbscan, no-ksp, only-boxes, plain");
+}
+
+std::size_t frames_of(const cfp_slam::Sequence& sequence, const Arguments& arguments) {
+  return arguments.frames > 0 ? std::min(arguments.frames, sequence.size()) : sequence.size();
 }
 
 // `auto` takes the recording's own detections.txt, or OpenCV's people detector where there is none.
@@ -100,8 +105,9 @@ void print_summary(const RunRecord& run) {
   const auto ms = [&](cfp_slam::Module m) { return std::pair{s.median_ms[static_cast<std::size_t>(m)], s.p95_ms[static_cast<std::size_t>(m)]}; };
   std::printf("%-11s", s.variant.c_str());
   if (s.expected > 0 && s.matched > 0) {
-    std::printf(" ATE %.4f m RMSE (median %.4f, max %.4f), RPE %.4f m/s %.3f deg/s, %zu of %zu poses", s.ate_rmse_m, s.ate_median_m, s.ate_max_m, s.rpe_rmse_m,
-                s.rpe_rmse_deg, s.matched, s.expected);
+    std::printf(" ATE %.4f m RMSE (median %.4f, max %.4f)", s.ate_rmse_m, s.ate_median_m, s.ate_max_m);
+    if (std::isfinite(s.rpe_rmse_m)) std::printf(", RPE %.4f m/s %.3f deg/s", s.rpe_rmse_m, s.rpe_rmse_deg);  // not for clips below a second
+    std::printf(", %zu of %zu poses", s.matched, s.expected);
   } else {
     std::printf(" no true trajectory, %zu of %zu frames with a pose", s.tracked + s.relocalised, s.frames);
   }
@@ -114,7 +120,7 @@ RunRecord run_one(const cfp_slam::Sequence& sequence, const Arguments& arguments
   cfp_slam::RunOptions options = run_options(arguments, variant, seed);
   options.pictures = pictures;
   options.picture_folder = picture_folder;
-  cfp_slam::Progress progress(sequence.name() + " " + variant, options.max_frames > 0 ? std::min(options.max_frames, sequence.size()) : sequence.size());
+  cfp_slam::Progress progress(sequence.name() + " " + variant, frames_of(sequence, arguments));
   return cfp_slam::run_slam(sequence, *detector, options, [&](std::size_t done) { progress(done); });
 }
 
@@ -176,9 +182,13 @@ void tables_command(const Arguments& arguments) {
   std::vector<cfp_slam::RunSummary> runs = fs::exists(journal) ? cfp_slam::read_summaries(journal) : std::vector<cfp_slam::RunSummary>{};
   for (const fs::path& folder : recordings(arguments.folders)) {
     const cfp_slam::Sequence sequence(folder);
+    const std::size_t frames = frames_of(sequence, arguments);
+    const std::string detector = detector_for(folder, arguments)->name();
     for (std::uint64_t seed = 1; seed <= arguments.seeds; ++seed) {
       for (const std::string& variant : arguments.variants) {
-        const auto same = [&](const cfp_slam::RunSummary& r) { return r.sequence == sequence.name() && r.variant == variant && r.seed == seed; };
+        const auto same = [&](const cfp_slam::RunSummary& r) {
+          return r.sequence == sequence.name() && r.variant == variant && r.seed == seed && r.frames == frames && r.detector == detector;
+        };
         if (std::any_of(runs.begin(), runs.end(), same)) continue;
         const RunRecord run = run_one(sequence, arguments, variant, seed, 0, {});
         std::printf("%s seed %llu ", sequence.name().c_str(), static_cast<unsigned long long>(seed));
