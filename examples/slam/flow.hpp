@@ -27,8 +27,8 @@ struct FlowOptions {
   int levels = 4;                // of the pyramid, >= 1
   int iterations = 20;           // per level
   double precision = 0.02;       // an update below this ends the iterations, px
-  // Track back as well, and drop pairs that return further than max_backward_px from where they came. Off: it takes as long again,
-  // and what it drops lies mostly on moving limbs, which is what O looks for.
+  // Track back as well, and drop pairs that return further than max_backward_px from where they came. Off: it doubles the time,
+  // tells moving from still people no better, and O of one who moves an arm rises, as the pairs on the arm are those it drops.
   bool backward = false;
   float max_backward_px = 0.5F;
 };
