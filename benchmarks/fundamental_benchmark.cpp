@@ -3,14 +3,13 @@
 // Accuracy: the median Sampson distance of the exact true pairs under the estimate; its median and worst over the problems.
 // Arguments: [problems, default 40] [repetitions, default 5].
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
-#include <functional>
 #include <memory>
-#include <string>
+#include <numeric>
 #include <vector>
 
+#include "support/interleaved.hpp"
 #include "support/two_view_scene.hpp"
 #include "cfp/geometry/fundamental_ransac.hpp"
 
@@ -22,18 +21,7 @@ namespace {
 
 using Scene = cfp_test::TwoViewScene<double>;
 
-struct Method {
-  std::string name;
-  std::function<cfp::Matrix3<double>(const Scene&, double& iterations)> estimate;
-  std::vector<double> times_us, errors_px;
-  double iterations = 0;
-};
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
+using Method = cfp_benchmark::InterleavedMethod<Scene, cfp::Matrix3<double>>;
 
 Method ours(const char* name, double threshold_px, std::size_t max_iterations) {
   auto workspace = std::make_shared<cfp::FundamentalRansacWorkspace>();
@@ -48,8 +36,7 @@ Method ours(const char* name, double threshold_px, std::size_t max_iterations) {
             return result.F;
           },
           {},
-          {},
-          0};
+          {}};
 }
 
 #ifdef CFP_HAVE_OPENCV
@@ -71,8 +58,7 @@ Method opencv(const char* name, int method, double threshold_px) {
             return F;
           },
           {},
-          {},
-          0};
+          {}};
 }
 #endif
 
@@ -103,23 +89,16 @@ int main(int argc, char* argv[]) {
       methods.push_back(opencv("cv FM_RANSAC 1 px", cv::FM_RANSAC, 1));
       methods.push_back(opencv("cv FM_RANSAC 0.1 px", cv::FM_RANSAC, 0.1));
 #endif
-      for (int repetition = 0; repetition < repetitions; ++repetition) {
-        for (const Scene& scene : scenes) {
-          for (Method& method : methods) {
-            const auto start = std::chrono::steady_clock::now();
-            double iterations = 0;
-            const cfp::Matrix3<double> F = method.estimate(scene, iterations);
-            method.times_us.push_back(std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - start).count());
-            if (repetition > 0) continue;
-            const double error = cfp_test::median_sampson_of_truth<double>(scene, F);
-            method.errors_px.push_back(error >= 0 ? error : 1e3);  // no F
-            method.iterations += iterations / problems;
-          }
-        }
-      }
-      for (const Method& method : methods) {
-        std::printf("%-22s %5zu %3.0f%% %10.4f %10.4f %10.1f %6.0f\n", method.name.c_str(), pairs, 100 * outliers, median(method.errors_px),
-                    *std::max_element(method.errors_px.begin(), method.errors_px.end()), median(method.times_us), method.iterations);
+      std::vector<std::vector<double>> errors_px(methods.size());
+      cfp_benchmark::run_interleaved(scenes, repetitions, methods, [&](std::size_t m, const Scene& scene, const cfp::Matrix3<double>& F) {
+        const double error = cfp_test::median_sampson_of_truth<double>(scene, F);
+        errors_px[m].push_back(error >= 0 ? error : 1e3);  // no F
+      });
+      for (std::size_t m = 0; m < methods.size(); ++m) {
+        const Method& method = methods[m];
+        const double mean_iterations = std::accumulate(method.iterations.begin(), method.iterations.end(), 0.0) / problems;
+        std::printf("%-22s %5zu %3.0f%% %10.4f %10.4f %10.1f %6.0f\n", method.name.c_str(), pairs, 100 * outliers, cfp_benchmark::median(errors_px[m]),
+                    cfp_benchmark::largest(errors_px[m]), cfp_benchmark::median(method.times_us), mean_iterations);
       }
     }
   }

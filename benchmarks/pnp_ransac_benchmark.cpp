@@ -3,14 +3,12 @@
 // Weights: inliers uniform in [0.5, 1], mismatches in [0, 0.5], and a weak variant where they are only [0, 1] against [0, 0.7].
 // Arguments: [problems, default 40] [repetitions, default 5].
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
-#include <functional>
 #include <memory>
-#include <string>
 #include <vector>
 
+#include "support/interleaved.hpp"
 #include "support/absolute_pose_scene.hpp"
 #include "cfp/optimization/pnp_ransac.hpp"
 
@@ -23,17 +21,7 @@ namespace {
 using Scene = cfp_test::AbsolutePoseScene<double>;
 const cfp::PinholeCamera<double> camera{535.4, 539.2, 320.1, 247.6};
 
-struct Method {
-  std::string name;
-  std::function<cfp::SE3<double>(const Scene&, double& iterations)> estimate;
-  std::vector<double> times_us, translation_m, rotation_rad, iterations;
-};
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
+using Method = cfp_benchmark::InterleavedMethod<Scene, cfp::SE3<double>>;
 
 Method ours(const char* name, cfp::Sampling sampling, bool weighted) {
   auto workspace = std::make_shared<cfp::PnpRansacWorkspace>();
@@ -47,8 +35,6 @@ Method ours(const char* name, cfp::Sampling sampling, bool weighted) {
             iterations = static_cast<double>(result.iterations);
             return result.T_cam_world;
           },
-          {},
-          {},
           {},
           {}};
 }
@@ -70,8 +56,6 @@ Method opencv(const char* name, int flags) {
             T.translation = cfp::Vector3<double>(translation[0], translation[1], translation[2]);
             return T;
           },
-          {},
-          {},
           {},
           {}};
 }
@@ -109,26 +93,18 @@ int main(int argc, char* argv[]) {
           methods.push_back(opencv("cv iterative (EPnP)", cv::SOLVEPNP_ITERATIVE));
         }
 #endif
-        for (int repetition = 0; repetition < repetitions; ++repetition) {
-          for (const Scene& scene : scenes) {
-            for (Method& method : methods) {
-              const auto start = std::chrono::steady_clock::now();
-              double iterations = 0;
-              const cfp::SE3<double> T = method.estimate(scene, iterations);
-              method.times_us.push_back(std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - start).count());
-              if (repetition > 0) continue;
-              const auto error = cfp_test::pose_distance(T, scene.T_cam_world);
-              method.translation_m.push_back(error[0]);
-              method.rotation_rad.push_back(error[1]);
-              method.iterations.push_back(iterations);
-            }
-          }
-        }
-        for (const Method& method : methods) {
-          std::printf("%-24s %5zu %3.0f%% %8s %10.3f %10.3f %10.4f %10.1f %6.0f\n", method.name.c_str(), points, 100 * outliers,
-                      weak ? "weak" : "good", 1000 * median(method.translation_m),
-                      1000 * *std::max_element(method.translation_m.begin(), method.translation_m.end()),
-                      180 / cfp::pi<double> * median(method.rotation_rad), median(method.times_us), median(method.iterations));
+        std::vector<std::vector<double>> translation_m(methods.size()), rotation_rad(methods.size());
+        cfp_benchmark::run_interleaved(scenes, repetitions, methods, [&](std::size_t m, const Scene& scene, const cfp::SE3<double>& T) {
+          const auto error = cfp_test::pose_distance(T, scene.T_cam_world);
+          translation_m[m].push_back(error[0]);
+          rotation_rad[m].push_back(error[1]);
+        });
+        for (std::size_t m = 0; m < methods.size(); ++m) {
+          const Method& method = methods[m];
+          std::printf("%-24s %5zu %3.0f%% %8s %10.3f %10.3f %10.4f %10.1f %6.0f\n", method.name.c_str(), points, 100 * outliers, weak ? "weak" : "good",
+                      1000 * cfp_benchmark::median(translation_m[m]), 1000 * cfp_benchmark::largest(translation_m[m]),
+                      180 / cfp::pi<double> * cfp_benchmark::median(rotation_rad[m]), cfp_benchmark::median(method.times_us),
+                      cfp_benchmark::median(method.iterations));
         }
       }
     }

@@ -114,7 +114,8 @@ enum class PoseStop : std::uint8_t {
 
 /// The caller's arrays, parallel, of n observations; nothing is kept. Optional spans are empty or of length n.
 /// An observation counts when point, pixel, weight and sigma are finite, the weight within [1e-30, 1e30], sigma within
-/// [1e-6, 1e6] px, the pixel within 1e7 px and the point within 1e9 m of the camera; others are skipped and counted.
+/// [1e-6, 1e6] px, the pixel within 1e7 px of the principal point and the point within 1e9 m of the camera (sums of absolute
+/// coordinates); others are skipped and counted.
 template <typename Scalar>
 struct PoseObservations {
   PointSpan<Scalar, 3> points;            ///< X, world frame, m
