@@ -1,8 +1,8 @@
 // What the detectors of the SLAM example find on a real recording, against two lists of boxes made elsewhere (NanoDet-m 320's own
 // program; YOLOv5x on the first ten frames): recall and precision of persons at IoU >= 0.5 over the score threshold, time per
-// frame. The default thresholds of examples/slam/network_detector.hpp rest on it.
+// frame. The default thresholds of examples/slam/detection/network_detector.hpp rest on it.
 //   cfp_detector_study [--pictures FOLDER]
-#include "../../examples/slam/detector.hpp"
+#include "../../examples/slam/detection/detector.hpp"
 
 #include <chrono>
 #include <cstdio>

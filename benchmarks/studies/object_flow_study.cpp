@@ -19,9 +19,9 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
-#include "../../examples/slam/flow.hpp"
-#include "../../examples/slam/sequence.hpp"
-#include "../../examples/slam/simple_detectors.hpp"
+#include "../../examples/slam/loop/flow.hpp"
+#include "../../examples/slam/input/sequence.hpp"
+#include "../../examples/slam/detection/simple_detectors.hpp"
 #include "../../examples/synthetic/sequence.hpp"
 #include "cfp/evaluation/calibration.hpp"
 #include "cfp/interop/opencv.hpp"

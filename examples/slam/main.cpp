@@ -14,14 +14,14 @@
 #include <opencv2/core.hpp>
 
 #include "../support/tum.hpp"
-#include "detector.hpp"
-#include "picture.hpp"
-#include "profile.hpp"
+#include "detection/detector.hpp"
+#include "report/picture.hpp"
+#include "report/profile.hpp"
 #include "progress.hpp"
-#include "report.hpp"
-#include "run.hpp"
-#include "summary_file.hpp"
-#include "tables.hpp"
+#include "report/report.hpp"
+#include "loop/run.hpp"
+#include "report/summary_file.hpp"
+#include "report/tables.hpp"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "../../examples/slam/detector.hpp"
+#include "../../examples/slam/detection/detector.hpp"
 
 #include <future>
 

@@ -1,4 +1,4 @@
-#include "../../examples/slam/flow.hpp"
+#include "../../examples/slam/loop/flow.hpp"
 
 #include <limits>
 

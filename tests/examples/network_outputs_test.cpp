@@ -1,5 +1,5 @@
 // The decoders against tensors made backwards from known boxes.
-#include "../../examples/slam/network_outputs.hpp"
+#include "../../examples/slam/detection/network_outputs.hpp"
 
 #include <cstring>
 #include <limits>

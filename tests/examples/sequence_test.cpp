@@ -1,4 +1,4 @@
-#include "../../examples/slam/sequence.hpp"
+#include "../../examples/slam/input/sequence.hpp"
 
 #include <sys/stat.h>
 

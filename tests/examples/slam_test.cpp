@@ -1,8 +1,8 @@
-#include "../../examples/slam/run.hpp"
+#include "../../examples/slam/loop/run.hpp"
 
 #include <opencv2/imgcodecs.hpp>
 
-#include "../../examples/slam/simple_detectors.hpp"
+#include "../../examples/slam/detection/simple_detectors.hpp"
 #include "../../examples/synthetic/writer.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"

@@ -1,8 +1,8 @@
-#include "../../examples/slam/summary_file.hpp"
+#include "../../examples/slam/report/summary_file.hpp"
 
 #include <limits>
 
-#include "../../examples/slam/experiment.hpp"
+#include "../../examples/slam/report/experiment.hpp"
 #include "support/catch.hpp"
 #include "support/fake_runs.hpp"
 

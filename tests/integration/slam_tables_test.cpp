@@ -1,4 +1,4 @@
-#include "../../examples/slam/tables.hpp"
+#include "../../examples/slam/report/tables.hpp"
 
 #include <fstream>
 #include <iterator>

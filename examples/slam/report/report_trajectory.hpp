@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "html.hpp"
-#include "record.hpp"
+#include "../record.hpp"
 #include "series.hpp"
 #include "statistics.hpp"
 #include "summary.hpp"

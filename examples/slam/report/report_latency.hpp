@@ -10,7 +10,7 @@
 
 #include "html.hpp"
 #include "published.hpp"
-#include "record.hpp"
+#include "../record.hpp"
 #include "series.hpp"
 #include "summary.hpp"
 #include "svg.hpp"

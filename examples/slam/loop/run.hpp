@@ -4,10 +4,10 @@
 #include <cstddef>
 #include <functional>
 
-#include "detector_types.hpp"
+#include "../detection/detector_types.hpp"
 #include "options.hpp"
-#include "record.hpp"
-#include "sequence.hpp"
+#include "../record.hpp"
+#include "../input/sequence.hpp"
 
 namespace cfp_slam {
 

@@ -14,7 +14,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "../support/tum.hpp"
+#include "../../support/tum.hpp"
 #include "cfp/geometry/box.hpp"
 #include "cfp/geometry/radial_tangential_camera.hpp"
 

@@ -11,7 +11,7 @@
 #include "cfp/core/span.hpp"
 #include "cfp/evaluation/trajectory_error.hpp"
 #include "html.hpp"
-#include "record.hpp"
+#include "../record.hpp"
 #include "statistics.hpp"
 #include "style.hpp"
 #include "summary.hpp"

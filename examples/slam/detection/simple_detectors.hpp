@@ -13,7 +13,7 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/objdetect.hpp>
 
-#include "../support/detections_file.hpp"
+#include "../../support/detections_file.hpp"
 #include "detector_types.hpp"
 
 namespace cfp_slam {

@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "record.hpp"
+#include "../record.hpp"
 #include "summary.hpp"
 
 namespace cfp_slam {

@@ -11,7 +11,7 @@
 
 #include "html.hpp"
 #include "page.hpp"
-#include "record.hpp"
+#include "../record.hpp"
 #include "report_latency.hpp"
 #include "report_probability.hpp"
 #include "report_trajectory.hpp"

@@ -12,7 +12,7 @@
 #include "cfp/core/span.hpp"
 #include "cfp/evaluation/calibration.hpp"
 #include "html.hpp"
-#include "record.hpp"
+#include "../record.hpp"
 #include "series.hpp"
 #include "summary.hpp"
 #include "svg.hpp"

@@ -8,7 +8,7 @@
 
 #include "cfp/pipeline/static_probability_pipeline.hpp"
 #include "frame.hpp"
-#include "record.hpp"
+#include "../record.hpp"
 
 namespace cfp_slam {
 

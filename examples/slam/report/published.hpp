@@ -9,7 +9,7 @@
 #include <limits>
 #include <string_view>
 
-#include "record.hpp"
+#include "../record.hpp"
 
 namespace cfp_slam {
 

@@ -10,7 +10,7 @@
 
 #include "cfp/core/span.hpp"
 #include "cfp/evaluation/calibration.hpp"
-#include "record.hpp"
+#include "../record.hpp"
 #include "statistics.hpp"
 
 namespace cfp_slam {

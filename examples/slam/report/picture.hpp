@@ -10,7 +10,7 @@
 
 #include "html.hpp"
 #include "page.hpp"
-#include "record.hpp"
+#include "../record.hpp"
 #include "report_trajectory.hpp"
 #include "series.hpp"
 #include "style.hpp"

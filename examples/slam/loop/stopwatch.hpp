@@ -4,7 +4,7 @@
 #include <array>
 #include <chrono>
 
-#include "record.hpp"
+#include "../record.hpp"
 
 namespace cfp_slam {
 

@@ -12,12 +12,12 @@
 
 #include "cfp/geometry/radial_tangential_camera.hpp"
 #include "cfp/interop/opencv.hpp"
-#include "detector_types.hpp"
+#include "../detection/detector_types.hpp"
 #include "features.hpp"
 #include "flow.hpp"
 #include "options.hpp"
-#include "record.hpp"
-#include "sequence.hpp"
+#include "../record.hpp"
+#include "../input/sequence.hpp"
 #include "tracking.hpp"
 
 namespace cfp_slam {

@@ -11,7 +11,7 @@
 
 #include "cfp/core/span.hpp"
 #include "cfp/pipeline/object_box.hpp"
-#include "record.hpp"
+#include "../record.hpp"
 
 namespace cfp_slam {
 

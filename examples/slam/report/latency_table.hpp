@@ -9,7 +9,7 @@
 #include "experiment.hpp"
 #include "html.hpp"
 #include "published.hpp"
-#include "record.hpp"
+#include "../record.hpp"
 #include "statistics.hpp"
 #include "summary.hpp"
 #include "table.hpp"

@@ -24,7 +24,7 @@
 #include "mapping.hpp"
 #include "matching.hpp"
 #include "options.hpp"
-#include "record.hpp"
+#include "../record.hpp"
 #include "relocalization.hpp"
 #include "stopwatch.hpp"
 
