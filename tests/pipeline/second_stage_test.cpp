@@ -134,6 +134,26 @@ TEST_CASE("Disabled, the second stage keeps K and still updates M and the weight
   for (std::size_t i = 0; i < run.k.size(); ++i) CHECK(run.m[i] == cfp::updated_map_point(1.0, before[i], options.map_point));
 }
 
+TEST_CASE("M as a prior changes K of what it has seen inside boxes, and neither M nor a weight", "[pipeline]") {
+  SecondStageRun<double> printed(make_dynamic_scene<double>({}, 14)), prior(make_dynamic_scene<double>({}, 14));
+  cfp::SecondStageOptions options;
+  for (std::size_t i = 0; i < prior.m.size(); ++i) prior.m[i] = printed.m[i] = i % 5 == 0 ? -1 : (prior.scene.is_static[i] ? 0.9 : 0.1);
+  const std::vector<double> m = prior.m;
+  printed.second(options);
+  options.map_point_prior = true;
+  prior.second(options);
+  CHECK(prior.m == printed.m);
+  CHECK(prior.weight == printed.weight);
+  std::size_t changed = 0;
+  for (std::size_t i = 0; i < m.size(); ++i) {
+    const bool applies = prior.label[i] != KeypointLabel::outside && prior.scene.match[i] >= 0 && m[i] >= 0;
+    CHECK(prior.k[i] == (applies ? cfp::posterior_probability(printed.k[i], m[i], options.map_point) : printed.k[i]));
+    changed += prior.k[i] != printed.k[i] ? 1U : 0U;
+  }
+  CHECK(changed > 50);
+  CHECK(ranked_rightly(prior) > ranked_rightly(printed));
+}
+
 TEST_CASE("Keypoints outside all boxes keep K = 1", "[pipeline]") {
   SecondStageRun<float> run(make_dynamic_scene<float>({}, 15));
   run.second({});

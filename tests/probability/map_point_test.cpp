@@ -73,6 +73,28 @@ TEMPLATE_TEST_CASE("Map points and weights keep their range for hostile input", 
   }
 }
 
+TEMPLATE_TEST_CASE("K with M as its prior is Bayes' rule on the odds", "[probability]", float, double) {
+  using S = TestType;
+  const cfp::MapPointOptions options;
+  const auto posterior = [&](double k, double m) { return static_cast<double>(cfp::posterior_probability(S(k), S(m), options)); };
+  for (double k = 0.05; k < 1; k += 0.05) {
+    for (double m = 0.05; m < 1; m += 0.05) {
+      const double odds = k / (1 - k) * (m / (1 - m));
+      CHECK(posterior(k, m) == Approx(odds / (1 + odds)).epsilon(1e-5));
+    }
+    CHECK(posterior(k, 0.5) == Approx(k).epsilon(1e-5));
+    CHECK(posterior(0, k) == 0);  // a rule, no measurement
+  }
+  CHECK(posterior(1, 0) == Approx(0.5).epsilon(1e-5));  // both at the bound
+  CHECK(posterior(std::numeric_limits<double>::quiet_NaN(), 0.5) == 0);
+  for (const double bad : {-1.0, 2.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    CHECK(posterior(bad, 0.3) >= 0);
+    CHECK(posterior(bad, 0.3) <= 1);
+    CHECK(posterior(0.3, bad) >= 0);
+    CHECK(posterior(0.3, bad) <= 1);
+  }
+}
+
 TEST_CASE("Map-point options outside their range are named", "[probability]") {
   cfp::MapPointOptions options;
   CHECK(cfp::invalid_field(options) == nullptr);

@@ -1,6 +1,7 @@
 // Watches the model at work on one frame and notes what report and tables want to know.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -66,22 +67,30 @@ class Recorder {
     }
   }
 
-  // Keypoints inside boxes with a match, so that both stages are judged on the same ones. Parts of people that happen to be still have no
-  // side to be on: they are static for the pose of this frame and on a moving thing; they are left out.
+  // Keypoints inside boxes with a match, so that both stages are judged on the same ones. Two kinds have no side to be on and are
+  // left out: parts of people that happen to be still, and corners whose patch shows a person and the room, which move with the outline.
   void note_samples(const cfp::FrameResult<float>& known, const Frame& frame) {
     const auto add = [](LabelledSamples& samples, float probability, bool is_static) {
       samples.probability.push_back(probability);
       samples.is_static.push_back(is_static ? char(1) : char(0));
     };
     for (std::size_t i = 0; i < frame.size(); ++i) {
-      const cv::Point pixel(cvRound(frame.keypoints[i].pt.x), cvRound(frame.keypoints[i].pt.y));
-      if (known.label[i] == cfp::KeypointLabel::outside || !(frame.map_point_probability[i] >= 0) || !pixel.inside({0, 0, labels_.cols, labels_.rows})) continue;
-      const auto label = static_cast<PixelLabel>(labels_.at<unsigned char>(pixel));
+      if (known.label[i] == cfp::KeypointLabel::outside || !(frame.map_point_probability[i] >= 0)) continue;
+      const PixelLabel label = label_of_patch(frame.keypoints[i]);
       if (label == PixelLabel::still_part) continue;
       add(run_.first_stage, first_[i], label == PixelLabel::still);
       add(run_.second_stage, known.static_probability[i], label == PixelLabel::still);
       add(run_.map_point, frame.map_point_probability[i], label == PixelLabel::still);
     }
+  }
+
+  // The label that all pixels of the corner's circle (radius 3 at its level) share; still_part where they differ.
+  [[nodiscard]] PixelLabel label_of_patch(const cv::KeyPoint& keypoint) const {
+    const int radius = static_cast<int>(std::ceil(3 * keypoint.size / 31)), x = cvRound(keypoint.pt.x), y = cvRound(keypoint.pt.y);
+    const cv::Rect patch = cv::Rect(x - radius, y - radius, 2 * radius + 1, 2 * radius + 1) & cv::Rect(0, 0, labels_.cols, labels_.rows);
+    if (patch.empty()) return PixelLabel::still_part;
+    const unsigned char first = labels_.at<unsigned char>(patch.tl());
+    return cv::countNonZero(labels_(patch) != first) == 0 ? static_cast<PixelLabel>(first) : PixelLabel::still_part;
   }
 
   RunRecord& run_;

@@ -19,6 +19,7 @@ cfp::PipelineOptions pipeline_options(const RunOptions& run, const Sequence& seq
   options.tracker.image_width = sequence.calibration().width;
   options.tracker.image_height = sequence.calibration().height;
   options.first.flow.ransac.seed = run.seed;
+  options.second.map_point_prior = true;  // this loop keeps M
   options.classes.clear();
   if (const int person = detector.class_of("person"); person >= 0) options.classes.push_back({person, true});
   return options;

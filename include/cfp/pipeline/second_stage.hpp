@@ -64,7 +64,7 @@ struct SecondStageResult {
 template <typename Scalar>
 struct SecondStageWorkspace {
   std::vector<std::array<Scalar, 2>> previous, undistorted_previous, undistorted_current;
-  std::vector<Scalar> depths, projection, epipolar, samples, scratch;
+  std::vector<Scalar> depths, projection, epipolar, samples, scratch, posterior;
 };
 
 namespace detail {
@@ -147,7 +147,7 @@ void update_map_points(const SecondStageOutput<Scalar>& out, const MapPointOptio
 /// K of every keypoint inside a box after the second stage, M of every map point, and the weights. In order: distances d^T
 /// (reprojection_distances) and d^F (epipolar_distances under F = K^-T [t]x R K^-1, skipped for |t| <= t_Th) of all matched
 /// keypoints; a sigmoid for each from the keypoints outside all boxes; second_stage_probability for the keypoints inside;
-/// M and weights by MapPointOptions. When neither sigmoid has enough samples, K of the first stage stays. The camera is any
+/// M and weights by MapPointOptions; then, when map_point_prior is set, K with M as its prior. When neither sigmoid has enough samples, K of the first stage stays. The camera is any
 /// type with the interface of PinholeCamera<Scalar>; d^F is measured in its undistorted image. Sizes must agree; a match index out of range counts as no match; a pose that is not finite makes both
 /// constraints unavailable. K, M and weights are in [0, 1] for any data. O(keypoints); after warm-up allocates nothing.
 template <typename Scalar, typename Camera>
@@ -185,6 +185,7 @@ SecondStageResult second_stage(const SecondStageInput<Scalar>& in, const Camera&
   result.epipolar_threshold_px = static_cast<double>(epipolar.threshold_px);
   result.epipolar_confidence = static_cast<double>(cf);
 
+  work.posterior.assign(out.static_probability.begin(), out.static_probability.end());
   const bool has_projection = projection.status != Status::not_enough_data, has_epipolar = epipolar.status != Status::not_enough_data;
   if (has_projection || has_epipolar) {
     for (std::size_t i = 0; i < n; ++i) {
@@ -200,11 +201,14 @@ SecondStageResult second_stage(const SecondStageInput<Scalar>& in, const Camera&
       keypoint.foreground = in.label[i] == KeypointLabel::foreground;
       keypoint.matched = is_finite(work.previous[i][0]) && is_finite(work.previous[i][1]);
       keypoint.box_associated = in.boxes[box].associated;
-      out.static_probability[i] = second_stage_probability(keypoint, static_cast<Scalar>(options.object_threshold));
+      const Scalar k = second_stage_probability(keypoint, static_cast<Scalar>(options.object_threshold));
+      out.static_probability[i] = k;
+      work.posterior[i] = keypoint.matched && m >= Scalar(0) ? posterior_probability(k, m, options.map_point) : k;
       ++result.updated;
     }
   }
   detail::update_map_points(out, options.map_point, result);
+  if (options.map_point_prior) std::copy(work.posterior.begin(), work.posterior.end(), out.static_probability.begin());
   return result;
 }
 

@@ -66,6 +66,19 @@ template <typename Scalar>
   return m;
 }
 
+/// Bayes' rule with M as the prior of a keypoint and K as what this frame's geometry says: odds = odds(K) odds(M), both kept in
+/// [evidence_limit, 1 - evidence_limit]. In [0, 1], increasing in both; M = 1/2 gives K. K = 0 stays 0: that is a rule
+/// (a false match, for example), not a measurement. NaN counts as 0. Not in the paper.
+template <typename Scalar>
+[[nodiscard]] constexpr Scalar posterior_probability(Scalar keypoint_probability, Scalar map_point_probability, const MapPointOptions& options) noexcept {
+  const Scalar limit = static_cast<Scalar>(options.evidence_limit);
+  const auto bounded = [limit](Scalar p) { return p < limit ? limit : (p > Scalar(1) - limit ? Scalar(1) - limit : p); };
+  const Scalar raw = clamp_probability(keypoint_probability);
+  if (!(raw > Scalar(0))) return Scalar(0);
+  const Scalar k = bounded(raw), m = bounded(clamp_probability(map_point_probability));
+  return k * m / (k * m + (Scalar(1) - k) * (Scalar(1) - m));
+}
+
 /// M < 0.3: the host should delete the map point.
 template <typename Scalar>
 [[nodiscard]] constexpr bool is_deletable(Scalar map_point_probability, const MapPointOptions& options) noexcept {
