@@ -6,7 +6,9 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <memory>
 #include <string>
@@ -81,6 +83,49 @@ std::vector<Method<Camera>> methods(bool all_of_ceres, double function_tolerance
   return list;
 }
 
+/// Processor time of this thread, ms: other work of a shared machine does not count.
+double processor_ms() {
+#ifdef CLOCK_THREAD_CPUTIME_ID
+  timespec t;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
+#else
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now().time_since_epoch()).count();
+#endif
+}
+
+/// An executor that runs every task on this thread and adds up what a thread of its own for each would have saved.
+struct CriticalPath {
+  double saved_ms = 0;
+
+  template <typename Task>
+  void operator()(int count, const Task& task) {
+    double sum = 0, longest = 0;
+    for (int i = 0; i < count; ++i) {
+      const double start = processor_ms();
+      task(i);
+      const double time = processor_ms() - start;
+      sum += time, longest = (std::max)(longest, time);
+    }
+    saved_ms += sum - longest;
+  }
+};
+
+/// What two threads would gain on two idle cores: processor time of everything over that of the longest chain.
+void critical_path(const std::vector<cfp_test::BaScene>& scenes, int repetitions) {
+  cfp::WeightedBaWorkspace workspace;
+  std::vector<double> total, gain;
+  for (int r = 0; r < repetitions; ++r) {
+    cfp_test::BaScene scene = scenes[static_cast<std::size_t>(r) % scenes.size()];
+    CriticalPath executor;
+    const double start = processor_ms();
+    cfp::adjust_bundle(scene.problem(), cfp::WeightedBaOptions{}, workspace, executor);
+    total.push_back(processor_ms() - start);
+    gain.push_back(total.back() / (total.back() - executor.saved_ms));
+  }
+  std::printf("processor time %.3f ms; its longest chain with two threads is %.2f times shorter\n", median(total), median(gain));
+}
+
 void local_ba(int poses, int points, int repetitions) {
   cfp_test::BaSceneOptions scene_options;
   scene_options.poses = poses;
@@ -107,11 +152,23 @@ void local_ba(int poses, int points, int repetitions) {
   for (std::size_t m = 0; m < list.size(); ++m) {
     std::printf("%-32s %10.3f %7.2fx %14.4f %6d %12.3f\n", list[m].name.c_str(), median(times[m]), median(ratios[m]), costs[m], iterations[m], 1e3 * errors[m]);
   }
+  critical_path(scenes, repetitions);
+}
+
+/// The largest resident set of this process so far, MB; 0 where the system does not say.
+double peak_memory_mb() {
+  std::ifstream status("/proc/self/status");
+  std::string word;
+  while (status >> word) {
+    double kb = 0;
+    if (word == "VmHWM:" && status >> kb) return kb / 1024;
+  }
+  return 0;
 }
 
 void scaling(int repetitions) {
   std::printf("\nGrowth, 100 points per pose, up to 6 views per point, 2 poses fixed, one thread; ms per step are without construction\n");
-  std::printf("%6s %8s %13s %10s %13s %12s %8s %14s\n", "poses", "points", "observations", "total ms", "ms per step", "two threads", "steps", "factor blocks");
+  std::printf("%6s %8s %13s %10s %13s %12s %8s %14s %8s\n", "poses", "points", "observations", "total ms", "ms per step", "two threads", "steps", "factor blocks", "peak MB");
   std::vector<double> x, y;
   cfp::TwoThreads second_thread;
   for (const int poses : {31, 62, 125, 250, 500}) {
@@ -134,8 +191,8 @@ void scaling(int repetitions) {
       total_two.push_back(milliseconds([&] { result = cfp::adjust_bundle(scene.problem(), cfp::WeightedBaOptions{}, workspace, second_thread); }));
     }
     const double step = (median(total) - median(one)) / (result.iterations - 1);
-    std::printf("%6d %8d %13zu %10.2f %13.3f %12.2f %8d %14zu\n", poses, scene_options.points, start.pose.size(), median(total), step, median(total_two),
-                result.iterations, result.factor_blocks);
+    std::printf("%6d %8d %13zu %10.2f %13.3f %12.2f %8d %14zu %8.0f\n", poses, scene_options.points, start.pose.size(), median(total), step, median(total_two),
+                result.iterations, result.factor_blocks, peak_memory_mb());
     x.push_back(std::log(static_cast<double>(start.pose.size())));
     y.push_back(std::log(median(total)));
   }
