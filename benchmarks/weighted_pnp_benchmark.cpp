@@ -201,7 +201,7 @@ void contaminated(int people) {
     std::vector<std::array<double, 3>> points(n);  // the map: keypoints of the previous frame at their measured depths
     std::vector<double> labels(n), m(n, 1.0);
     for (std::size_t i = 0; i < n; ++i) {
-      cfp::Vector3<double> ray;
+      cfp::Vector3<double> ray = cfp::Vector3<double>::Zero();
       (void)scene.camera.unproject({scene.previous_keypoints[i][0], scene.previous_keypoints[i][1]}, ray);
       for (std::size_t c = 0; c < 3; ++c) points[i][c] = ray[static_cast<int>(c)] * scene.previous_depths[i];
       labels[i] = scene.is_static[i] != 0 && scene.match[i] >= 0 ? 1 : 0;
