@@ -178,7 +178,8 @@ void select_many(Scalar* values, std::size_t n, std::array<std::size_t, Count> r
         std::uint8_t only[Counts::buckets] = {};
         only[bucket[i]] = 1;
         const std::size_t size = counts.copy_marked(values, kept, only, values + kept);
-        results[i] = select_one(values + kept, size, within[i], value_range(values + kept, size));
+        Scalar* const room = values + kept;
+        results[i] = size <= few<Scalar> ? select_from_few(room, size, within[i]) : select_one(room, size, within[i], value_range(room, size));
       }
       return;
     }

@@ -95,7 +95,11 @@ template <typename Scalar>
   // the three selected need one.
   const bool monotone = options.score == ObjectScore::survival || options.degrees_of_freedom <= 2;
   const span<Scalar> values = scratch.subspan(0, n);
-  std::transform(values.begin(), values.end(), values.begin(), [&](Scalar d) { return monotone ? -d : object_score(d, options); });
+  if (monotone) {
+    for (Scalar& value : values) value = -value;
+  } else {
+    for (Scalar& value : values) value = object_score(value, options);
+  }
   double sum = 0;
   for (const Scalar value : select_quantiles(values, options.positions)) {
     sum += static_cast<double>(monotone ? object_score(value, options) : value);
