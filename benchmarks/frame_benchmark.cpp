@@ -31,8 +31,8 @@ struct Frame {
       flow_previous.push_back(s.previous_keypoints[at]);
       flow_current.push_back(s.keypoints[at]);
     }
-    const cfp::PinholeCamera<double> camera{static_cast<double>(s.camera.fx), static_cast<double>(s.camera.fy), static_cast<double>(s.camera.cx),
-                                            static_cast<double>(s.camera.cy)};
+    const cfp::PinholeCamera<double> camera{static_cast<double>(s.camera.fx), static_cast<double>(s.camera.fy),
+                                            static_cast<double>(s.camera.cx), static_cast<double>(s.camera.cy)};
     F = cfp::fundamental_from_pose(camera, s.T_cur_prev).template cast<Scalar>();
   }
   void first_stage(const cfp::FirstStageOptions& options, bool F_given) {
@@ -95,7 +95,8 @@ void frame(benchmark::State& state) {
   }
   state.counters["keypoints"] = keypoints;
   cfp::CalibrationWorkspace workspace;
-  state.counters["auc"] = cfp::area_under_curve(cfp::span<const double>(k), cfp::span<const char>(is_static), cfp::span<const double>(), workspace).auc;
+  state.counters["auc"] =
+      cfp::area_under_curve(cfp::span<const double>(k), cfp::span<const char>(is_static), cfp::span<const double>(), workspace).auc;
 }
 
 }  // namespace

@@ -104,22 +104,25 @@ double sorted_sigmoid(const std::vector<double>& distance, std::vector<double>& 
   for (const double d : distance) {
     if (d < threshold) sum += d, ++below;
   }
-  for (std::size_t i = 0; i < distance.size(); ++i) probability[i] = 1 / (1 + std::exp((distance[i] - threshold) * 5 / (threshold - minimum)));
+  for (std::size_t i = 0; i < distance.size(); ++i)
+    probability[i] = 1 / (1 + std::exp((distance[i] - threshold) * 5 / (threshold - minimum)));
   return 1 - sum / (below * threshold);
 }
 
 template <bool combined>
 void stage_two_first_thought(const Matches<double>& in, const cfp::SE3<double>& T, const cfp::Matrix3<double>& F, Buffers<double>& b) {
   for (std::size_t i = 0; i < in.prev.size(); ++i) {
-    const cfp::Vector3<double> p((in.prev[i].x() - camera.cx) / camera.fx * in.depth[i], (in.prev[i].y() - camera.cy) / camera.fy * in.depth[i],
-                                 in.depth[i]);
+    const cfp::Vector3<double> p((in.prev[i].x() - camera.cx) / camera.fx * in.depth[i],
+                                 (in.prev[i].y() - camera.cy) / camera.fy * in.depth[i], in.depth[i]);
     const cfp::Vector3<double> q = T.rotation * p + T.translation;
-    b.projection[i] = (cfp::Vector2<double>(camera.fx * q.x() / q.z() + camera.cx, camera.fy * q.y() / q.z() + camera.cy) - in.cur[i]).norm();
+    b.projection[i] =
+        (cfp::Vector2<double>(camera.fx * q.x() / q.z() + camera.cx, camera.fy * q.y() / q.z() + camera.cy) - in.cur[i]).norm();
     const cfp::Vector3<double> line = F * in.prev[i].homogeneous();
     b.epipolar[i] = std::abs(line.dot(in.cur[i].homogeneous())) / line.head<2>().norm();
   }
   const double cs = 1 / (1 + std::exp(-static_cast<double>(pose_inliers) + 0.5 * 20));
-  const double ct = cs * sorted_sigmoid(b.projection, b.scratch, b.k_projection), cf = cs * sorted_sigmoid(b.epipolar, b.scratch, b.k_epipolar);
+  const double ct = cs * sorted_sigmoid(b.projection, b.scratch, b.k_projection),
+               cf = cs * sorted_sigmoid(b.epipolar, b.scratch, b.k_epipolar);
   benchmark::DoNotOptimize(ct + cf);
   if (!combined) return;
   for (std::size_t i = 0; i < b.k.size(); ++i) b.k[i] = (b.k_projection[i] * ct + b.k_epipolar[i] * cf) / (ct + cf);

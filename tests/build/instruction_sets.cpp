@@ -72,7 +72,8 @@ void run(Results& results) {
   results.add(k, 1);
   cfp::chi_squared_survival(span<const Scalar>(drawn), 2, span<Scalar>(k));
   results.add(k, 1);
-  results.add(cfp::object_probability(span<const Scalar>(drawn), span<Scalar>(scratch), cfp::ObjectProbabilityOptions{}).static_probability, 1);
+  results.add(cfp::object_probability(span<const Scalar>(drawn), span<Scalar>(scratch), cfp::ObjectProbabilityOptions{}).static_probability,
+              1);
   for (const double q : {0.1, 0.5, 0.95}) {
     scratch = drawn;
     results.add(cfp::order_statistic(span<Scalar>(scratch), cfp::quantile_rank(q, n) - 1), 0);

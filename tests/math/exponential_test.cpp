@@ -59,7 +59,8 @@ TEMPLATE_TEST_CASE("The exponential of a chunk is exact at the ends and never ou
   CHECK(one(std::nextafter(lowest, -limits::infinity())) == 0);
 }
 
-TEMPLATE_TEST_CASE("The exponential of a chunk never decreases where the argument grows by more than its rounding", "[math]", float, double) {
+TEMPLATE_TEST_CASE("The exponential of a chunk never decreases where the argument grows by more than its rounding", "[math]", float,
+                   double) {
   TestType previous = 0;
   for (TestType x = TestType(-40); x <= 0; x += TestType(0.00390625)) {
     const TestType e = one(x);

@@ -49,9 +49,11 @@ struct CostRange {
 /// Copies a row of costs, forbidden ones as infinity, padded to `stride` with infinity. Returns the least and the largest one, which
 /// is infinite when a pair of the row is forbidden.
 template <typename Scalar>
-CostRange copy_costs(const Scalar* source, std::size_t step, std::size_t size, CostLimits limits, double* row, std::size_t stride) noexcept {
+CostRange copy_costs(const Scalar* source, std::size_t step, std::size_t size, CostLimits limits, double* row,
+                     std::size_t stride) noexcept {
   const double high = limits.high;  // a local: the stores might alias a member
-  double least[assignment_lanes] = {infinity, infinity, infinity, infinity}, most[assignment_lanes] = {-infinity, -infinity, -infinity, -infinity};
+  double least[assignment_lanes] = {infinity, infinity, infinity, infinity},
+         most[assignment_lanes] = {-infinity, -infinity, -infinity, -infinity};
   std::size_t j = 0;
   if (step == 1) {
     for (; j + assignment_lanes <= size; j += assignment_lanes) {
@@ -69,7 +71,8 @@ CostRange copy_costs(const Scalar* source, std::size_t step, std::size_t size, C
     most[0] = larger(row[j], most[0]);
   }
   std::fill(row + size, row + stride, infinity);
-  const CostRange range{smaller(smaller(least[0], least[1]), smaller(least[2], least[3])), larger(larger(most[0], most[1]), larger(most[2], most[3]))};
+  const CostRange range{smaller(smaller(least[0], least[1]), smaller(least[2], least[3])),
+                        larger(larger(most[0], most[1]), larger(most[2], most[3]))};
   if (range.least >= limits.low) return range;
   for (j = 0; j < size; ++j) row[j] = limits(row[j]);  // rare: something below the range
   return {RowView(row, static_cast<Eigen::Index>(stride)).minCoeff(), infinity};

@@ -37,7 +37,8 @@ std::size_t copy_distances(span<const Scalar> from, span<Scalar> to) noexcept {
     std::uint8_t keep[detail::chunk_size];
     detail::load_chunk(from, first, count, d);
     for (std::size_t i = 0; i < detail::chunk_size; ++i)
-      keep[i] = static_cast<std::uint8_t>(static_cast<int>(d.data()[i] >= Scalar(0)) & static_cast<int>(d.data()[i] <= (std::numeric_limits<Scalar>::max)()));
+      keep[i] = static_cast<std::uint8_t>(static_cast<int>(d.data()[i] >= Scalar(0)) &
+                                          static_cast<int>(d.data()[i] <= (std::numeric_limits<Scalar>::max)()));
     std::size_t kept_here = 0;
     for (std::size_t i = 0; i < detail::chunk_size; ++i) kept_here += keep[i];
     if (kept_here == detail::chunk_size && count == detail::chunk_size) {  // mostly none is missing, or there are gaps in every chunk

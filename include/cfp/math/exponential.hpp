@@ -46,10 +46,12 @@ template <typename Scalar>
   using E = Exponential<Scalar>;
   using P = Packet<Scalar>;
   Chunk<Scalar> clamped, n, power, e;
-  map_chunk(clamped, [](const P& v) { return select(v >= P(E::lowest), v, P(E::lowest)); }, x);
+  map_chunk(
+      clamped, [](const P& v) { return select(v >= P(E::lowest), v, P(E::lowest)); }, x);
   for (std::size_t i = 0; i < chunk_size; ++i) {  // x = n log(2) + r, n the nearest whole number (rounded to 0, but x <= 0), and 2^n
     const std::int32_t exponent = static_cast<std::int32_t>(clamped.data()[i] * Scalar(1.4426950408889634074) - Scalar(0.5));
-    const typename E::Bits bits = static_cast<typename E::Bits>(static_cast<std::uint32_t>(exponent + E::exponent_bias)) << E::mantissa_bits;
+    const typename E::Bits bits = static_cast<typename E::Bits>(static_cast<std::uint32_t>(exponent + E::exponent_bias))
+                                  << E::mantissa_bits;
     std::memcpy(power.data() + i, &bits, sizeof(bits));
     n.data()[i] = static_cast<Scalar>(exponent);
   }

@@ -50,7 +50,8 @@ template <typename Scalar>
 [[nodiscard]] Scalar order_statistic(span<Scalar> scratch, std::size_t rank0) noexcept {
   CFP_ASSERT(rank0 < scratch.size());
   if (scratch.empty()) return Scalar(0);
-  return detail::select_one(scratch.data(), scratch.size(), (std::min)(rank0, scratch.size() - 1), detail::value_range(scratch.data(), scratch.size()));
+  const std::size_t n = scratch.size();
+  return detail::select_one(scratch.data(), n, (std::min)(rank0, n - 1), detail::value_range(scratch.data(), n));
 }
 
 /// The values at the quantile ranks of `quantiles` (ascending), as {0.1, 0.2, 0.3}, with one pass over the data for all.

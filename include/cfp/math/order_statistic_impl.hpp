@@ -179,7 +179,8 @@ void select_many(Scalar* values, std::size_t n, std::array<std::size_t, Count> r
         only[bucket[i]] = 1;
         const std::size_t size = counts.copy_marked(values, kept, only, values + kept);
         Scalar* const room = values + kept;
-        results[i] = size <= few<Scalar> ? select_from_few(room, size, within[i]) : select_one(room, size, within[i], value_range(room, size));
+        results[i] =
+            size <= few<Scalar> ? select_from_few(room, size, within[i]) : select_one(room, size, within[i], value_range(room, size));
       }
       return;
     }
