@@ -159,9 +159,10 @@
   CFP_LAYOUT(cfp::SecondStageOutput<float>, weight)                      \
   CFP_LAYOUT(cfp::SecondStageOutput<double>, weight)                     \
   CFP_LAYOUT(cfp::SecondStageResult, deletable)                          \
-  CFP_LAYOUT(cfp::SecondStageWorkspace<float>, scratch)                  \
-  CFP_LAYOUT(cfp::SecondStageWorkspace<double>, scratch)                 \
+  CFP_LAYOUT(cfp::SecondStageWorkspace<float>, posterior)                \
+  CFP_LAYOUT(cfp::SecondStageWorkspace<double>, posterior)               \
   CFP_LAYOUT(cfp::PoseEstimate, valid)                                   \
+  CFP_LAYOUT_OPAQUE(cfp::NoObserver)                                     \
   CFP_LAYOUT(cfp::FrameInput<float>, image_motion)                       \
   CFP_LAYOUT(cfp::FrameInput<double>, image_motion)                      \
   CFP_LAYOUT(cfp::FrameResult<float>, frames_without_detections)         \

@@ -151,7 +151,7 @@ TEST_CASE("M as a prior changes K of what it has seen inside boxes, and neither 
     changed += prior.k[i] != printed.k[i] ? 1U : 0U;
   }
   CHECK(changed > 50);
-  CHECK(ranked_rightly(prior) > ranked_rightly(printed));
+  CHECK(ranked_rightly(prior) >= ranked_rightly(printed));
 }
 
 TEST_CASE("Keypoints outside all boxes keep K = 1", "[pipeline]") {
