@@ -1,12 +1,11 @@
 #include "../../examples/synthetic/writer.hpp"
 
-#include <unistd.h>
-
 #include <iterator>
 #include <map>
 #include <set>
 
 #include "support/catch.hpp"
+#include "support/temporary_folder.hpp"
 
 using namespace synthetic;
 
@@ -47,12 +46,6 @@ Vector3d world_point(const Sequence& sequence, int frame, double x, double y, do
   const ImageCamera& c = sequence.options().camera;
   return sequence.T_stage_cam(frame) * Vector3d(depth * (x - c.cx) / c.fx, depth * (y - c.cy) / c.fy, depth);
 }
-
-struct TemporaryFolder {
-  TemporaryFolder() : path(std::filesystem::temp_directory_path() / ("cfp_synthetic_test_" + std::to_string(::getpid()))) {}
-  ~TemporaryFolder() { std::filesystem::remove_all(path); }
-  std::filesystem::path path;
-};
 
 std::map<std::string, std::string> files_of(const std::filesystem::path& folder) {
   std::map<std::string, std::string> files;
@@ -261,7 +254,7 @@ TEST_CASE("A written folder is the same from one thread and from three, and read
   auto options = small(Scenario::walking, Motion::rpy);
   options.frames = 7;
   options.blur_samples = 2;
-  const TemporaryFolder folder;
+  const cfp_test::TemporaryFolder folder;
   const Sequence sequence(options);
   write_sequence(sequence, folder.path / "one", 1, [](int) {});
   int calls = 0;
@@ -287,7 +280,7 @@ TEST_CASE("People put into a recording leave the rest of it alone and are hidden
   // The recording is a rendered room in which nobody walks yet.
   auto options = small(Scenario::sitting, Motion::xyz);
   options.frames = 4;
-  const TemporaryFolder folder;
+  const cfp_test::TemporaryFolder folder;
   write_sequence(Sequence(options), folder.path, 1, [](int) {});
   const auto recording = std::make_shared<Recording>(read_recording(folder.path, 1.35));
   REQUIRE(recording->views.size() == 4);
@@ -329,7 +322,7 @@ TEST_CASE("People put into a recording leave the rest of it alone and are hidden
 TEST_CASE("A recording with a missing or wrong file is refused with its name", "[synthetic]") {
   auto options = small(Scenario::walking, Motion::fixed);
   options.frames = 2;
-  const TemporaryFolder folder;
+  const cfp_test::TemporaryFolder folder;
   write_sequence(Sequence(options), folder.path, 1, [](int) {});
   const auto recording = std::make_shared<Recording>(read_recording(folder.path, 1.35));
   cv::imwrite(recording->views[1].depth.string(), cv::Mat(10, 10, CV_16U, cv::Scalar(0)));
