@@ -154,6 +154,28 @@ TEST_CASE("M as a prior changes K of what it has seen inside boxes, and neither 
   CHECK(ranked_rightly(prior) >= ranked_rightly(printed));
 }
 
+TEST_CASE("With M as a prior, a match that no constraint can judge keeps M", "[pipeline]") {
+  SecondStageRun<double> run(make_dynamic_scene<double>({}, 15));
+  cfp::SecondStageOptions options;
+  options.map_point_prior = true;
+  options.min_translation_m = 1e6;  // no epipolar constraint
+  std::size_t silent = 0;
+  for (std::size_t i = 0; i < run.m.size(); ++i) {
+    run.m[i] = 0.7;
+    const bool inside = run.label[i] != KeypointLabel::outside && run.scene.match[i] >= 0;
+    if (inside && i % 2 == 0) run.scene.previous_depths[static_cast<std::size_t>(run.scene.match[i])] = 0;  // and no projection
+    silent += inside && i % 2 == 0 ? 1U : 0U;
+  }
+  run.boxes[1].associated = false;
+  run.second(options);
+  REQUIRE(silent > 20);
+  for (std::size_t i = 0; i < run.m.size(); ++i) {
+    if (run.label[i] == KeypointLabel::outside || run.scene.match[i] < 0 || i % 2 != 0) continue;
+    const bool came_from_nowhere = run.ruling_box[i] == 1 && run.label[i] == KeypointLabel::foreground;
+    CHECK(run.k[i] == Approx(came_from_nowhere ? 0 : 0.7));
+  }
+}
+
 TEST_CASE("Keypoints outside all boxes keep K = 1", "[pipeline]") {
   SecondStageRun<float> run(make_dynamic_scene<float>({}, 15));
   run.second({});

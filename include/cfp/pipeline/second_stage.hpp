@@ -203,7 +203,9 @@ SecondStageResult second_stage(const SecondStageInput<Scalar>& in, const Camera&
       keypoint.box_associated = in.boxes[box].associated;
       const Scalar k = second_stage_probability(keypoint, static_cast<Scalar>(options.object_threshold));
       out.static_probability[i] = k;
-      work.posterior[i] = keypoint.matched && m >= Scalar(0) ? posterior_probability(k, m, options.map_point) : k;
+      // Where neither constraint had anything to say, K stands for a lack of evidence; only an object that came from nowhere is a rule.
+      const bool silent = !keypoint.projection.available && !keypoint.epipolar.available && (keypoint.box_associated || !keypoint.foreground);
+      work.posterior[i] = keypoint.matched && m >= Scalar(0) ? posterior_probability(silent ? Scalar(0.5) : k, m, options.map_point) : k;
       ++result.updated;
     }
   }
