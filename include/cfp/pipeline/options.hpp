@@ -37,7 +37,7 @@ struct SecondStageOptions {
   /// Not in the paper, whose K forgets everything between frames: by construction of D_Th, every fifth static point then fails
   /// either constraint. true: the K that is returned is posterior_probability(K, M before this frame) for keypoints in boxes with a match, M where neither
   /// constraint is available; the update of M and the weights go on with K itself, so that no evidence counts twice. In rendered sequences (cfp_slam tables)
-  /// the AUC of K rises from 0.73-0.90 to 0.95-0.99. For hosts that keep M from frame to frame; where M is 1 for want of a
+  /// the AUC of K rises from 0.73-0.90 to 0.95-0.98. For hosts that keep M from frame to frame; where M is 1 for want of a
   /// history, it would drown the geometry.
   bool map_point_prior = false;
   ConstraintOptions projection;
