@@ -1,4 +1,4 @@
-#include "cfp/cfp.hpp"
+#include "cfp/geometry/box.hpp"
 
 int main() {
   const cfp::Box<float> detected{0, 0, 10, 10}, predicted{0, 0, 10, 10};
