@@ -115,13 +115,13 @@ void print_summary(const RunRecord& run) {
   std::printf("; lost %zu, relocalised %zu, skipped %zu; tracking %.1f ms (95 %%: %.1f)\n", s.lost, s.relocalised, s.skipped, median, p95);
 }
 
-RunRecord run_one(const cfp_slam::Sequence& sequence, const Arguments& arguments, const std::string& variant, std::uint64_t seed, std::size_t pictures, const fs::path& picture_folder) {
-  const auto detector = detector_for(sequence.folder(), arguments);
+RunRecord run_one(const cfp_slam::Sequence& sequence, cfp_slam::Detector& detector, const Arguments& arguments, const std::string& variant, std::uint64_t seed, std::size_t pictures,
+                  const fs::path& picture_folder) {
   cfp_slam::RunOptions options = run_options(arguments, variant, seed);
   options.pictures = pictures;
   options.picture_folder = picture_folder;
   cfp_slam::Progress progress(sequence.name() + " " + variant, frames_of(sequence, arguments));
-  return cfp_slam::run_slam(sequence, *detector, options, [&](std::size_t done) { progress(done); });
+  return cfp_slam::run_slam(sequence, detector, options, [&](std::size_t done) { progress(done); });
 }
 
 // Every variant on every folder; trajectory, frames and pictures of each, and one report.
@@ -132,9 +132,10 @@ void run_command(const Arguments& arguments) {
     const cfp_slam::Sequence sequence(folder);
     for (const std::string& note : sequence.notes()) std::fprintf(stderr, "%s\n", note.c_str());
     std::printf("%s: %zu frames%s\n", sequence.name().c_str(), sequence.size(), sequence.truth().empty() ? "" : (", truth: " + sequence.truth_file()).c_str());
+    const auto detector = detector_for(folder, arguments);
     for (const std::string& variant : arguments.variants) {
       const std::string base = sequence.name() + "_" + variant;
-      runs.push_back(run_one(sequence, arguments, variant, arguments.seed, arguments.pictures, arguments.write_pictures ? arguments.out / base : fs::path()));
+      runs.push_back(run_one(sequence, *detector, arguments, variant, arguments.seed, arguments.pictures, arguments.write_pictures ? arguments.out / base : fs::path()));
       const RunRecord& run = runs.back();
       for (const auto& frame : run.frames) {
         if (frame.outcome == cfp_slam::Outcome::skipped) std::fprintf(stderr, "skipped: %s\n", frame.note.c_str());
@@ -183,14 +184,14 @@ void tables_command(const Arguments& arguments) {
   for (const fs::path& folder : recordings(arguments.folders)) {
     const cfp_slam::Sequence sequence(folder);
     const std::size_t frames = frames_of(sequence, arguments);
-    const std::string detector = detector_for(folder, arguments)->name();
+    const auto detector = detector_for(folder, arguments);
     for (std::uint64_t seed = 1; seed <= arguments.seeds; ++seed) {
       for (const std::string& variant : arguments.variants) {
         const auto same = [&](const cfp_slam::RunSummary& r) {
-          return r.sequence == sequence.name() && r.variant == variant && r.seed == seed && r.frames == frames && r.detector == detector;
+          return r.sequence == sequence.name() && r.variant == variant && r.seed == seed && r.frames == frames && r.detector == detector->name();
         };
         if (std::any_of(runs.begin(), runs.end(), same)) continue;
-        const RunRecord run = run_one(sequence, arguments, variant, seed, 0, {});
+        const RunRecord run = run_one(sequence, *detector, arguments, variant, seed, 0, {});
         std::printf("%s seed %llu ", sequence.name().c_str(), static_cast<unsigned long long>(seed));
         print_summary(run);
         std::fflush(stdout);

@@ -19,8 +19,8 @@ namespace cfp_slam {
 class LocalBundle {
  public:
   // Copies the problem around keyframe `newest` out of the map.
-  LocalBundle(const Map& map, int newest, const cfp::PinholeCamera<float>& camera, const std::vector<float>& sigmas, const LocalBundleOptions& options)
-      : options_(options), camera_{camera.fx, camera.fy, camera.cx, camera.cy} {
+  LocalBundle(const Map& map, int newest, const cfp::PinholeCamera<float>& camera, const std::vector<float>& sigmas, double baseline_fx, const LocalBundleOptions& options)
+      : options_(options), baseline_fx_(baseline_fx), camera_{camera.fx, camera.fy, camera.cx, camera.cy} {
     choose_keyframes(map, newest);
     for (std::size_t k = 0; k < keyframes_.size(); ++k) {
       const Frame& frame = map.keyframe(keyframes_[k]).frame;
@@ -40,7 +40,7 @@ class LocalBundle {
     problem.cameras = {&camera_, 1};
     problem.observations = {pose_index_, point_index_, pixels_, u_right_, sigma_, weight_};
     problem.fixed_poses = fixed_;
-    problem.baseline_fx = options_.baseline_fx;
+    problem.baseline_fx = baseline_fx_;
     cfp::WeightedBaOptions options;
     options.levenberg_marquardt.max_iterations = options_.max_iterations;
     squared_errors_.resize(pose_index_.size());
@@ -95,12 +95,13 @@ class LocalBundle {
     point_index_.push_back(point);
     pixels_.push_back(frame.pixels[i]);
     const float z = frame.depths_m[i];
-    u_right_.push_back(z > 0 ? frame.pixels[i][0] - static_cast<float>(options_.baseline_fx) / z : -1.0F);
+    u_right_.push_back(z > 0 ? frame.pixels[i][0] - static_cast<float>(baseline_fx_) / z : -1.0F);
     sigma_.push_back(sigmas[static_cast<std::size_t>(frame.keypoints[i].octave)]);
     weight_.push_back(frame.static_probability[i] * map.point(frame.map_point[i]).static_probability);
   }
 
   LocalBundleOptions options_;
+  double baseline_fx_;
   cfp::PinholeCamera<double> camera_;
   std::vector<int> keyframes_, points_;  // indices into the map
   std::vector<char> fixed_;

@@ -35,7 +35,6 @@ struct LocalBundleOptions {
   std::size_t free_keyframes = 10;   // adjusted, the newest among them
   std::size_t fixed_keyframes = 10;  // see the same points and hold the gauge
   int max_iterations = 10;
-  double baseline_fx = 40;
 };
 
 struct TrackingOptions {

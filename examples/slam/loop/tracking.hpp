@@ -370,7 +370,7 @@ class Tracking {
   }
 
   void start_bundle() {
-    bundle_ = std::make_unique<LocalBundle>(map_, reference_, pinhole_, mapping_.sigmas(), options_.bundle);
+    bundle_ = std::make_unique<LocalBundle>(map_, reference_, pinhole_, mapping_.sigmas(), options_.baseline_fx, options_.bundle);
     frames_since_bundle_ = 0;
     if (options_.threads) {
       bundle_thread_ = std::async(std::launch::async, [bundle = bundle_.get()] { bundle->solve(); });
