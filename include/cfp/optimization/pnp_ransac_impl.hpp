@@ -10,12 +10,12 @@
 #include <limits>
 #include <vector>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include "cfp/core/random.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/geometry/p3p.hpp"
+#include "cfp/math/normal_equations.hpp"
 #include "cfp/math/sampling.hpp"
 #include "cfp/math/se3.hpp"
 #include "cfp/optimization/pnp_ransac_types.hpp"
@@ -152,7 +152,7 @@ inline void refine_pose(const MatchArrays& m, double scale, int iterations, SE3<
       const double weight = w * s * s;
       for (int c = 0; c < 6; ++c) {
         g[c] += weight * (u * ju[c] + v * jv[c]);
-        for (int r = c; r < 6; ++r) H(r, c) += weight * (ju[r] * ju[c] + jv[r] * jv[c]);
+        for (int r = c; r < 6; ++r) H(c, r) += weight * (ju[r] * ju[c] + jv[r] * jv[c]);
       }
     }
     if (!(cost < best)) return;
@@ -160,9 +160,8 @@ inline void refine_pose(const MatchArrays& m, double scale, int iterations, SE3<
     best = cost;
     T = current;
     if (settled || iteration == iterations) return;
-    H.diagonal() *= 1 + 1e-9;
-    const Vector6<double> step = -H.selfadjointView<Eigen::Lower>().ldlt().solve(g);
-    if (!step.allFinite()) return;
+    Vector6<double> step;
+    if (!solve_normal_equations<6>(H, g, 1e-9, 1e-12, step)) return;
     current = se3_exp<double>(step) * current;
     current.rotation = normalized_rotation(current.rotation);
   }

@@ -1,0 +1,96 @@
+#include "cfp/math/normal_equations.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Cholesky>
+
+#include "cfp/core/random.hpp"
+#include "support/catch.hpp"
+
+using cfp::solve_normal_equations;
+
+namespace {
+
+template <int N>
+Eigen::Matrix<double, N, N> random_hessian(cfp::Random& random, double decades) {
+  Eigen::Matrix<double, N, N> J;
+  for (int i = 0; i < N * N; ++i) J.data()[i] = random.normal();
+  for (int i = 0; i < N; ++i) J.col(i) *= std::pow(10.0, random.uniform(-decades, decades));
+  return J.transpose() * J;
+}
+
+template <int N>
+void agrees_with_eigen() {
+  cfp::Random random(5, "normal equations");
+  for (int trial = 0; trial < 200; ++trial) {
+    const Eigen::Matrix<double, N, N> H = random_hessian<N>(random, 0);
+    Eigen::Matrix<double, N, 1> g, step;
+    for (int i = 0; i < N; ++i) g[i] = random.normal();
+    const double damping = trial % 2 == 0 ? 0 : random.uniform(0, 1);
+    Eigen::Matrix<double, N, N> damped = H;
+    damped.diagonal() *= 1 + damping;
+    REQUIRE(solve_normal_equations<N>(H, g, damping, 0, step));
+    const Eigen::Matrix<double, N, 1> residual = damped * step + g;
+    CHECK(residual.norm() <= 1e-9 * (damped.norm() * step.norm() + g.norm()));
+    CHECK((step + damped.ldlt().solve(g)).norm() <= 1e-6 * step.norm());
+  }
+}
+
+}  // namespace
+
+TEST_CASE("The step solves the damped normal equations", "[math]") {
+  agrees_with_eigen<1>();
+  agrees_with_eigen<3>();
+  agrees_with_eigen<6>();
+  agrees_with_eigen<8>();
+}
+
+TEST_CASE("Units of the unknowns do not matter to the step", "[math]") {
+  cfp::Random random(6, "normal equations");
+  for (int trial = 0; trial < 100; ++trial) {
+    const Eigen::Matrix<double, 6, 6> H = random_hessian<6>(random, 0);
+    Eigen::Matrix<double, 6, 1> g, unit, step, scaled;
+    for (int i = 0; i < 6; ++i) g[i] = random.normal(), unit[i] = std::ldexp(1.0, static_cast<int>(random.index(80)) - 40);
+    REQUIRE(solve_normal_equations<6>(H, g, 0.1, 0, step));
+    const Eigen::Matrix<double, 6, 6> other = unit.asDiagonal() * H * unit.asDiagonal();
+    REQUIRE(solve_normal_equations<6>(other, unit.cwiseProduct(g), 0.1, 0, scaled));
+    CHECK((unit.cwiseProduct(scaled) - step).norm() <= 1e-9 * step.norm());
+  }
+}
+
+TEST_CASE("Only the upper triangle is read", "[math]") {
+  cfp::Random random(7, "normal equations");
+  const Eigen::Matrix<double, 6, 6> H = random_hessian<6>(random, 0);
+  Eigen::Matrix<double, 6, 6> upper = H;
+  upper.triangularView<Eigen::StrictlyLower>().setConstant(std::numeric_limits<double>::quiet_NaN());
+  const Eigen::Matrix<double, 6, 1> g = Eigen::Matrix<double, 6, 1>::Ones();
+  Eigen::Matrix<double, 6, 1> a, b;
+  REQUIRE(solve_normal_equations<6>(H, g, 0, 0, a));
+  REQUIRE(solve_normal_equations<6>(upper, g, 0, 0, b));
+  CHECK(a == b);
+}
+
+TEST_CASE("An undetermined, indefinite or non-finite system has no step", "[math]") {
+  Eigen::Matrix3d H = Eigen::Matrix3d::Identity();
+  const Eigen::Vector3d g(1, 2, 3);
+  Eigen::Vector3d step;
+  CHECK(solve_normal_equations<3>(H, g, 0, 0.5, step));
+  H(1, 1) = 0;
+  CHECK_FALSE(solve_normal_equations<3>(H, g, 0, 0, step));
+  H(1, 1) = -1;
+  CHECK_FALSE(solve_normal_equations<3>(H, g, 0, 0, step));
+  H = Eigen::Matrix3d::Ones();
+  CHECK_FALSE(solve_normal_equations<3>(H, g, 0, 1e-12, step));
+  CHECK(solve_normal_equations<3>(H, g, 1e-3, 1e-12, step));
+  H = Eigen::Matrix3d::Identity();
+  H(0, 1) = H(1, 0) = 0.99;  // pivot 1 - 0.99^2 = 0.0199
+  CHECK(solve_normal_equations<3>(H, g, 0, 0.0198, step));
+  CHECK_FALSE(solve_normal_equations<3>(H, g, 0, 0.02, step));
+  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    H = Eigen::Matrix3d::Identity();
+    H(2, 2) = bad;
+    CHECK_FALSE(solve_normal_equations<3>(H, g, 0, 0, step));
+    CHECK_FALSE(solve_normal_equations<3>(Eigen::Matrix3d::Identity(), Eigen::Vector3d(0, bad, 0), 0, 0, step));
+  }
+}
