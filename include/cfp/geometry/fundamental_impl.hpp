@@ -78,8 +78,11 @@ std::size_t scale_pixels(const PointSpan<Scalar, 2>& prev, const PointSpan<Scala
   for (std::size_t i = 0; i < prev.size(); ++i) {
     const double w = pair_weight(prev, cur, weights, i) / largest;
     if (!(w > 0)) continue;
-    spread[0] += w * std::hypot(static_cast<double>(prev(i, 0)) - scale[0].x, static_cast<double>(prev(i, 1)) - scale[0].y);
-    spread[1] += w * std::hypot(static_cast<double>(cur(i, 0)) - scale[1].x, static_cast<double>(cur(i, 1)) - scale[1].y);
+    for (int k = 0; k < 2; ++k) {
+      const PointSpan<Scalar, 2>& points = k == 0 ? prev : cur;
+      const double dx = static_cast<double>(points(i, 0)) - scale[k].x, dy = static_cast<double>(points(i, 1)) - scale[k].y;
+      spread[k] += w * std::sqrt(dx * dx + dy * dy);
+    }
   }
   for (int k = 0; k < 2; ++k) scale[k].factor = spread[k] > 1e-9 * sum ? std::sqrt(2.0) * sum / spread[k] : 0;
   scale_prev = scale[0];

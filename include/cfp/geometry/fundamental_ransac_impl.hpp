@@ -7,13 +7,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 #include <Eigen/SVD>
 
 #include "cfp/geometry/camera.hpp"
-#include "cfp/geometry/fundamental_kernels_impl.hpp"
+#include "cfp/geometry/fundamental_pairs_impl.hpp"
+#include "cfp/geometry/fundamental_refine_impl.hpp"
 #include "cfp/geometry/fundamental_ransac_types.hpp"
 #include "cfp/geometry/homography_impl.hpp"
 #include "cfp/math/sampling.hpp"
@@ -30,32 +32,35 @@ struct FundamentalSearch {
   const PairArrays& pairs;
   const FundamentalRansacOptions& options;
   MinimalSampler& sampler;
-  std::vector<std::uint32_t>& list;  // scratch, as long as the pairs
-  double limit;                      // squared Sampson threshold
+  std::vector<std::uint32_t>& list;   // scratch, as long as the pairs
+  std::vector<double>& distances_sq;  // scratch, of sampson_distances_sq
+  double limit;                       // squared Sampson threshold
   Random random;
   std::size_t iterations = 0;
   bool confident = false;
-  double noise_limit = limit;  // squared Sampson distance that 95 % of the true pairs stay below, as measured; at most limit
+  double noise_variance = limit / 3.84;  // of the Sampson distances of true pairs, as measured
 
+  // Squared Sampson distance that 95 % of the true pairs stay below.
+  [[nodiscard]] double noise_limit() const noexcept { return (std::min)(limit, 3.84 * noise_variance); }
   // Transfer distances have two degrees of freedom and the noise of both images: 95 % of chi-squared is there at 3 times the
   // squared threshold that holds 95 % of the Sampson distances.
   [[nodiscard]] double transfer_limit() const noexcept { return 3 * limit; }
-  [[nodiscard]] double transfer_noise_limit() const noexcept { return 3 * noise_limit; }
+  [[nodiscard]] double transfer_noise_limit() const noexcept { return 3 * noise_limit(); }
 
-  // Scales of the refinement loss in squared thresholds: wide in the search; the final one is the flat optimum of
-  // cfp_fundamental_scale_study.
-  static constexpr double search_scale = 4, final_scale = 2.5;
+  // Scales of the refinement's loss: wide in the search, in squared thresholds; the final one in variances of the measured noise. 2.25
+  // standard deviations lose least over three kinds of noise (cfp_fundamental_scale_study).
+  static constexpr double search_scale = 4, final_scale = 2.25 * 2.25;
 
   void local_optimization(FundamentalCandidate& candidate) const noexcept {
-    const float* in[5] = {pairs.fast_array(0), pairs.fast_array(1), pairs.fast_array(2), pairs.fast_array(3), pairs.fast_array(4)};
-    FundamentalCandidate refined = candidate;
-    refine_scaled<float>(pairs, in, search_scale * limit, 5, 1e-3, refined.F);
-    refined.cost = msac_cost(pairs, refined.F, limit, candidate.cost);
-    if (refined.cost < candidate.cost) candidate = refined;
+    FactoredF refined(candidate.F);
+    refine_fundamental(pairs.thinned_columns(), search_scale * limit, 4, 1e-3, refined);
+    const double cost = msac_cost(pairs.fast_columns(), refined.matrix(), limit, candidate.cost);
+    if (cost < candidate.cost) candidate = {refined.matrix(), cost};
   }
 
-  [[nodiscard]] std::size_t iterations_needed(const Matrix3<double>& F) const noexcept {
-    const auto is_inlier = [&](std::size_t i) { return scaled_sampson_sq(pairs, F, i) <= limit; };
+  [[nodiscard]] std::size_t iterations_needed(const Matrix3<double>& F) noexcept {
+    sampson_distances_sq(pairs, F, distances_sq);
+    const auto is_inlier = [&](std::size_t i) { return distances_sq[i] <= limit; };
     if (sampler.sampling() == Sampling::progressive) {
       return progressive_ransac_iterations(sampler.order(), is_inlier, 7, options.confidence, options.max_iterations);
     }
@@ -66,50 +71,127 @@ struct FundamentalSearch {
                              options.max_iterations);
   }
 
+  // Calls visit(F) for every F of seven pairs that leaves them all in front of both cameras.
+  template <typename Visit>
+  void solve_sample(const std::uint32_t (&sample)[7], Visit&& visit) const {
+    double p[7][2], q[7][2];
+    for (int k = 0; k < 7; ++k) {
+      for (std::size_t c = 0; c < 2; ++c) p[k][c] = pairs.array(c)[sample[k]], q[k][c] = pairs.array(2 + c)[sample[k]];
+    }
+    Matrix3<double> solutions[3];
+    const int count = solve_seven_point(p, q, solutions);
+    for (int k = 0; k < count; ++k) {
+      if (is_oriented(solutions[k], p, q)) visit(solutions[k]);
+    }
+  }
+
   FundamentalCandidate run() noexcept {
-    FundamentalCandidate best, best_sample;
-    best_sample.cost = pairs.total_weight;
+    FundamentalCandidate best;
+    double best_sample_cost = pairs.total_weight;
     std::size_t needed = options.max_iterations;
     while (iterations < (std::max)(needed, options.min_iterations)) {
       ++iterations;
       std::uint32_t sample[7] = {};
       sampler.draw(random, sample);
-      double p[7][2], q[7][2];
-      for (int k = 0; k < 7; ++k) {
-        for (std::size_t c = 0; c < 2; ++c) p[k][c] = pairs.array(c)[sample[k]], q[k][c] = pairs.array(2 + c)[sample[k]];
-      }
-      Matrix3<double> solutions[3];
-      const int count = solve_seven_point(p, q, solutions);
-      for (int k = 0; k < count; ++k) {
-        if (!is_oriented(solutions[k], p, q)) continue;
-        const double cost = msac_cost(pairs, solutions[k], limit, best_sample.cost);
-        if (!(cost < best_sample.cost)) continue;
-        best_sample = {solutions[k], cost};
-        FundamentalCandidate refined = best_sample;
+      solve_sample(sample, [&](const Matrix3<double>& F) {
+        const double cost = msac_cost(pairs.fast_columns(), F, limit, best_sample_cost);
+        if (!(cost < best_sample_cost)) return;
+        best_sample_cost = cost;
+        FundamentalCandidate refined{F, cost};
         local_optimization(refined);
-        if (!(refined.cost < best.cost)) continue;
+        if (!(refined.cost < best.cost)) return;
         best = refined;
         needed = iterations_needed(best.F);
-      }
+      });
     }
     confident = needed < options.max_iterations;
     return best;
   }
 
-  void polish(FundamentalCandidate& candidate) const noexcept {
-    const double* in[5] = {pairs.array(0), pairs.array(1), pairs.array(2), pairs.array(3), pairs.array(4)};
-    refine_scaled<double>(pairs, in, final_scale * limit, 15, 1e-5, candidate.F);
+  // A short baseline gives the cost several minima, often within a hundredth of each other, and chance decides into which of them the
+  // first good sample leads. Samples of F's own inliers are nearly all good: the best of them are refined, too, and the lowest cost
+  // under the measured noise wins. What it brings: cfp_fundamental_scale_study.
+  void explore(FactoredF& F) noexcept {
+    constexpr int samples = 16, starts = 2;
+    FundamentalCandidate best[starts];
+    collect_inliers(F.matrix());
+    const std::uint32_t n = static_cast<std::uint32_t>(list.size());
+    if (n < 8) return;
+    for (int k = 0; k < samples; ++k) {
+      std::uint32_t sample[7];
+      for (std::uint32_t j = 0; j < 7; ++j) {
+        std::swap(list[j], list[j + random.index(n - j)]);
+        sample[j] = list[j];
+      }
+      solve_sample(sample, [&](const Matrix3<double>& start) {
+        const double cost = msac_cost(pairs.thinned_columns(), start, limit, best[starts - 1].cost);
+        int at = starts;
+        for (; at > 0 && cost < best[at - 1].cost; --at) {
+          if (at < starts) best[at] = best[at - 1];
+        }
+        if (at < starts) best[at] = {start, cost};
+      });
+    }
+    const double scale = final_scale * noise_variance;
+    double lowest = refine_fundamental(pairs.fast_columns(), scale, 3, 1e-3, F);
+    for (const FundamentalCandidate& start : best) {
+      if (!is_finite(start.cost)) break;
+      FactoredF other(start.F);
+      refine_fundamental(pairs.thinned_columns(), search_scale * limit, 3, 1e-3, other);
+      const double cost = refine_fundamental(pairs.fast_columns(), scale, 3, 1e-3, other, lowest);
+      if (cost < lowest) lowest = cost, F = other;
+    }
+  }
+
+  void polish(Matrix3<double>& F) noexcept {
+    FactoredF factored(F);
+    measure_noise(factored.matrix());
+    // Where the search ran out of samples its F may be a poor one, which inner samples mend step by step.
+    for (int round = 0; round < (confident ? 1 : 4); ++round) {
+      explore(factored);
+      measure_noise(factored.matrix());
+    }
+    refine_fundamental(pairs.exact_columns(), final_scale * noise_variance, 15, 1e-5, factored);
+    F = factored.matrix();
+    measure_noise(F);
+  }
+
+  void collect_inliers(const Matrix3<double>& F) noexcept {
+    sampson_distances_sq(pairs, F, distances_sq);
+    list.clear();
+    for (std::size_t i = 0; i < pairs.size; ++i) {
+      if (distances_sq[i] <= limit) list.push_back(static_cast<std::uint32_t>(i));
+    }
+  }
+
+  // The threshold is the caller's tolerance, not the noise, which the spread of F's own residuals shows: a truncated variance iterated to
+  // its fixed point. 0.911 is the variance that a normal distribution keeps within 2.5 sigma. Floor: 0.01 px. The refinement needs
+  // it for its loss, and whether a homography suffices must not be judged by a threshold above the parallax of a video.
+  void measure_noise(const Matrix3<double>& F) noexcept {
+    sampson_distances_sq(pairs, F, distances_sq);
+    const double floor = 1e-4 * pairs.factor * pairs.factor;
+    noise_variance = limit / 3.84;
+    for (int step = 0; step < 10; ++step) {
+      const double farthest = (std::min)(limit, 6.25 * noise_variance);
+      double sum = 0, weight = 0;
+      for (std::size_t i = 0; i < pairs.size; ++i) {
+        if (!(distances_sq[i] <= farthest)) continue;
+        sum += pairs.weights()[i] * distances_sq[i];
+        weight += pairs.weights()[i];
+      }
+      if (!(weight > 0)) break;
+      const double next = (std::max)(sum / weight / 0.911, floor);
+      const bool settled = std::abs(next - noise_variance) < 1e-3 * next;
+      noise_variance = next;
+      if (settled) break;
+    }
   }
 
   // The homography that explains most of the inliers of F, refined on all pairs. False when none explains `share` of them, by weight.
   bool dominant_homography(const Matrix3<double>& F, double share, Matrix3<double>& H) noexcept {
-    list.clear();
+    collect_inliers(F);
     double inlier_weight = 0;
-    for (std::size_t i = 0; i < pairs.size; ++i) {
-      if (!(scaled_sampson_sq(pairs, F, i) <= limit)) continue;
-      list.push_back(static_cast<std::uint32_t>(i));
-      inlier_weight += pairs.weights()[i];
-    }
+    for (const std::uint32_t i : list) inlier_weight += pairs.weights()[i];
     if (list.size() < 4) return false;
     constexpr int samples = 16;  // 99.8 % to hit a plane with 70 % of the inliers
     double best = std::numeric_limits<double>::infinity();
@@ -150,50 +232,32 @@ struct FundamentalSearch {
       const Matrix3<double> F = hat(epipole) * H;
       const double norm = F.norm();
       if (!(norm > 1e-12 * H.norm()) || !is_finite(norm)) continue;
-      const double cost = msac_cost(pairs, F / norm, limit, best.cost);
+      const double cost = msac_cost(pairs.thinned_columns(), F / norm, limit, best.cost);
       if (cost < best.cost) best = {F / norm, cost};
     }
     if (!is_finite(best.cost)) return;
+    best.cost = msac_cost(pairs.fast_columns(), best.F, limit, std::numeric_limits<double>::infinity());
     local_optimization(best);
     if (best.cost < candidate.cost) candidate = best;
   }
 
-  // The threshold is the caller's tolerance, not the noise, and a video's parallax may be smaller than it: whether a homography
-  // suffices is judged by the spread of F's own residuals, a truncated variance iterated to its fixed point. 0.911 is the variance
-  // that a normal distribution keeps within 2.5 sigma, 3.84 the 95 % quantile of chi-squared. Floor: 0.01 px.
-  void measure_noise(const Matrix3<double>& F) noexcept {
-    const double floor = 1e-4 * pairs.factor * pairs.factor;
-    double variance = limit / 3.84;
-    for (int step = 0; step < 10; ++step) {
-      double sum = 0, weight = 0;
-      for (std::size_t i = 0; i < pairs.size; ++i) {
-        const double d2 = scaled_sampson_sq(pairs, F, i);
-        if (!(d2 <= (std::min)(limit, 6.25 * variance))) continue;
-        sum += pairs.weights()[i] * d2;
-        weight += pairs.weights()[i];
-      }
-      if (!(weight > 0)) break;
-      variance = (std::max)(sum / weight / 0.911, floor);
-    }
-    noise_limit = (std::min)(limit, 3.84 * variance);
-  }
-
-  [[nodiscard]] bool has_parallax(const Matrix3<double>& H, const Matrix3<double>& F) const noexcept {
-    return has_pairs_off_plane(H, F) || varies_along_lines(H, F);
+  // Of the F whose noise was measured last.
+  [[nodiscard]] bool has_parallax(const Matrix3<double>& H) const noexcept {
+    return has_pairs_off_plane(H) || varies_along_lines(H);
   }
 
   // Whether F explains clearly more of the pairs off the plane than lines in random directions through H p would: those catch a
   // pair at distance d with probability 2/pi asin(sqrt(2) T / d), T the Sampson threshold (noise of both images). Two pairs
   // fix the epipole; six standard deviations make up for the best epipole having been searched.
-  [[nodiscard]] bool has_pairs_off_plane(const Matrix3<double>& H, const Matrix3<double>& F) const noexcept {
+  [[nodiscard]] bool has_pairs_off_plane(const Matrix3<double>& H) const noexcept {
     double expected = 2, variance = 1, found = 0;
     for (std::size_t i = 0; i < pairs.size; ++i) {
       const double d2 = transfer_sq(pairs, H, i);
       if (!(d2 > transfer_noise_limit())) continue;
-      const double chance = 2 / pi<double> * std::asin(std::sqrt((std::min)(1.0, 2 * noise_limit / d2)));
+      const double chance = 2 / pi<double> * std::asin(std::sqrt((std::min)(1.0, 2 * noise_limit() / d2)));
       expected += chance;
       variance += chance * (1 - chance);
-      found += scaled_sampson_sq(pairs, F, i) <= noise_limit ? 1 : 0;
+      found += distances_sq[i] <= noise_limit() ? 1 : 0;
     }
     return found >= expected + 6 * std::sqrt(variance);
   }
@@ -202,11 +266,11 @@ struct FundamentalSearch {
   // H alone their sums have an F distribution around n / (n - 7) (F has 7 parameters) with deviation sqrt(4/n); six of them. Finds the small
   // parallax of a slow camera before a far wall, which no single pair shows. Pairs far off H are left to the test above:
   // mismatches would otherwise outweigh everything.
-  [[nodiscard]] bool varies_along_lines(const Matrix3<double>& H, const Matrix3<double>& F) const noexcept {
-    const double farthest = 16 * noise_limit / 3.84;
+  [[nodiscard]] bool varies_along_lines(const Matrix3<double>& H) const noexcept {
+    const double farthest = 16 * noise_limit() / 3.84;
     double across = 0, along = 0, n = 0;
     for (std::size_t i = 0; i < pairs.size; ++i) {
-      const double sum = transfer_sq(pairs, H, i) / 2, across_sq = scaled_sampson_sq(pairs, F, i);
+      const double sum = transfer_sq(pairs, H, i) / 2, across_sq = distances_sq[i];
       if (!(sum <= farthest && across_sq <= farthest)) continue;
       across += across_sq;
       along += sum - across_sq;

@@ -7,11 +7,13 @@
 #include <cstdint>
 #include <limits>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/LU>
 
-#include "cfp/geometry/fundamental_kernels_impl.hpp"
+#include "cfp/core/packet.hpp"
+#include "cfp/geometry/fundamental_pairs_impl.hpp"
+#include "cfp/geometry/fundamental_refine_impl.hpp"
+#include "cfp/math/normal_equations.hpp"
 
 namespace cfp::detail {
 
@@ -25,22 +27,22 @@ namespace cfp::detail {
 
 // Sum of w min(d^2 / limit, 1), d the transfer distance.
 [[nodiscard]] inline double transfer_cost(const PairArrays& pairs, const Matrix3<double>& H, double limit) noexcept {
+  using P = Packet<float>;
   const Matrix3<float> h = H.cast<float>();
-  const float *px = pairs.fast_array(0), *py = pairs.fast_array(1), *qx = pairs.fast_array(2), *qy = pairs.fast_array(3),
-              *w = pairs.fast_array(4);
-  const float limit_f = static_cast<float>(limit);
+  const PairColumns<float> in = pairs.fast_columns();
+  const P most(static_cast<float>(limit)), tiny(1e-30F);
+  const auto row = [&h](int r, const P& x, const P& y) { return multiply_add(P(h(r, 0)), x, multiply_add(P(h(r, 1)), y, P(h(r, 2)))); };
   double sum = 0;
-  for (std::size_t block = 0; block < pairs.padded_size(); block += PairArrays::padding) {
-    Lane<float> cost = Lane<float>::Zero();
-    for (std::size_t i = block; i < block + PairArrays::padding; i += Lane<float>::SizeAtCompileTime) {
-      const Lane<float> p0 = load_lane(px + i), p1 = load_lane(py + i), q0 = load_lane(qx + i), q1 = load_lane(qy + i);
+  for (std::size_t block = 0; block < in.size; block += PairArrays::padding) {
+    P cost(0.0F);
+    for (std::size_t i = block; i < block + PairArrays::padding; i += static_cast<std::size_t>(lanes_of<P>)) {
+      const P x = cfp::load<P>(in.px + i), y = cfp::load<P>(in.py + i);
       // Multiplied out by z, so that a point mapped to infinity is an outlier and not a NaN.
-      const Lane<float> z = h(2, 0) * p0 + h(2, 1) * p1 + h(2, 2);
-      const Lane<float> dx = h(0, 0) * p0 + h(0, 1) * p1 + h(0, 2) - q0 * z;
-      const Lane<float> dy = h(1, 0) * p0 + h(1, 1) * p1 + h(1, 2) - q1 * z;
-      cost += load_lane(w + i) * ((dx * dx + dy * dy) / (z * z + 1e-30F)).min(limit_f);
+      const P z = row(2, x, y), dx = row(0, x, y) - cfp::load<P>(in.qx + i) * z, dy = row(1, x, y) - cfp::load<P>(in.qy + i) * z;
+      const P d2 = multiply_add(dx, dx, dy * dy) / multiply_add(z, z, tiny);
+      cost = multiply_add(cfp::load<P>(in.weight + i), select(d2 < most, d2, most), cost);
     }
-    sum += static_cast<double>(cost.sum());
+    sum += static_cast<double>(reduce_add(cost));
   }
   return sum / limit;
 }
@@ -66,35 +68,58 @@ namespace cfp::detail {
   return H.allFinite() && std::abs(H.determinant()) > 1e-9 * H.norm() * H.norm() * H.norm();
 }
 
-// Least squares on the transfer distance (Gauss-Newton with h22 fixed: points are centred, so it is not near zero) with the
-// weights of the Geman-McClure loss of scale `limit`. H stays as it was when its cost does not fall.
+// Normal equations of the transfer distance at h, h22 = 1, weighted by the Geman-McClure loss of scale `limit`. With W = w / z^2 and the
+// point mapped to (u, v), every entry is a sum of W, W u, W v or W (u^2 + v^2) times 1, x, y or their products.
+inline void homography_system(const PairColumns<double>& in, const Matrix3<double>& h, double limit, Eigen::Matrix<double, 8, 8>& A,
+                              Eigen::Matrix<double, 8, 1>& g) noexcept {
+  using P = Packet<double>;
+  const P one(1.0), inverse_limit(1 / limit), most(9.0), zero(0.0);
+  const auto row = [&h](int r, const P& x, const P& y) { return multiply_add(P(h(r, 0)), x, multiply_add(P(h(r, 1)), y, P(h(r, 2)))); };
+  enum { w, wu, wv, wuv, g0 = 4 * 6, count = g0 + 8 };
+  P sum[count];
+  for (P& value : sum) value = zero;
+  for (std::size_t i = 0; i < in.size; i += static_cast<std::size_t>(lanes_of<P>)) {
+    const P x = cfp::load<P>(in.px + i), y = cfp::load<P>(in.py + i), inverse = reciprocal(row(2, x, y));
+    const P u = row(0, x, y) * inverse, v = row(1, x, y) * inverse;
+    const P du = u - cfp::load<P>(in.qx + i), dv = v - cfp::load<P>(in.qy + i);
+    const P distance = multiply_add(du, du, dv * dv) * inverse_limit, share = reciprocal(distance + one);
+    // Beyond 9 the weight is below a hundredth; a point at infinity has NaN there and is left out, too.
+    const P weight = select(distance < most, cfp::load<P>(in.weight + i) * share * share * inverse, zero);
+    const P W = select(distance < most, weight * inverse, zero), U = select(distance < most, u, zero), V = select(distance < most, v, zero);
+    const P products[6] = {x * x, x * y, x, y * y, y, one}, factors[4] = {W, W * U, W * V, W * multiply_add(U, U, V * V)};
+    for (int f = 0; f < 4; ++f) {
+      for (int k = 0; k < 6; ++k) sum[6 * f + k] = multiply_add(factors[f], products[k], sum[6 * f + k]);
+    }
+    const P eu = select(distance < most, weight * du, zero), ev = select(distance < most, weight * dv, zero);
+    const P across = multiply_add(U, eu, V * ev);
+    const P gradient[8] = {eu * x, eu * y, eu, ev * x, ev * y, ev, -across * x, -across * y};
+    for (int k = 0; k < 8; ++k) sum[g0 + k] += gradient[k];
+  }
+  constexpr int product[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+  const auto total = [&sum](int index) { return reduce_add(sum[index]); };
+  A.setZero();
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) A(r, c) = A(3 + r, 3 + c) = total(6 * w + product[r][c]);
+    for (int c = 0; c < 2; ++c) {
+      A(r, 6 + c) = A(6 + c, r) = -total(6 * wu + product[r][c]);
+      A(3 + r, 6 + c) = A(6 + c, 3 + r) = -total(6 * wv + product[r][c]);
+      if (r < 2) A(6 + r, 6 + c) = total(6 * wuv + product[r][c]);
+    }
+  }
+  for (int k = 0; k < 8; ++k) g[k] = total(g0 + k);
+}
+
+// Gauss-Newton on the robust transfer distance (h22 fixed: points are centred, so it is not near zero). H stays as it was when its
+// cost does not fall.
 inline void refine_homography(const PairArrays& pairs, double limit, int iterations, Matrix3<double>& H) noexcept {
   double cost = transfer_cost(pairs, H, limit);
   for (int iteration = 0; iteration < iterations; ++iteration) {
     Matrix3<double> h = H / H(2, 2);
     if (!h.allFinite()) return;
-    Eigen::Matrix<double, 8, 8> A = Eigen::Matrix<double, 8, 8>::Zero();
-    Eigen::Matrix<double, 8, 1> g = Eigen::Matrix<double, 8, 1>::Zero();
-    for (std::size_t i = 0; i < pairs.size; ++i) {
-      const Vector3<double> p(pairs.array(0)[i], pairs.array(1)[i], 1);
-      const Vector3<double> mapped = h * p;
-      const double inverse = 1 / mapped.z();
-      const double u = mapped.x() * inverse, v = mapped.y() * inverse;
-      const double dx = u - pairs.array(2)[i], dy = v - pairs.array(3)[i];
-      const double x = (dx * dx + dy * dy) / limit;
-      if (!(x < 9)) continue;  // weight below a hundredth
-      const double w = pairs.weights()[i] / ((1 + x) * (1 + x));
-      Eigen::Matrix<double, 8, 1> ju = Eigen::Matrix<double, 8, 1>::Zero(), jv = Eigen::Matrix<double, 8, 1>::Zero();
-      ju.head<3>() = p * inverse;
-      ju.tail<2>() = -u * inverse * p.head<2>();
-      jv.segment<3>(3) = p * inverse;
-      jv.tail<2>() = -v * inverse * p.head<2>();
-      A += ju.lazyProduct((w * ju).transpose()) + jv.lazyProduct((w * jv).transpose());
-      g += w * (dx * ju + dy * jv);
-    }
-    A.diagonal() *= 1 + 1e-9;
-    const Eigen::Matrix<double, 8, 1> step = -A.ldlt().solve(g);
-    if (!step.allFinite()) return;
+    Eigen::Matrix<double, 8, 8> A;
+    Eigen::Matrix<double, 8, 1> g, step;
+    homography_system(pairs.exact_columns(), h, limit, A, g);
+    if (!solve_normal_equations<8>(A, g, 1e-9, 1e-12, step)) return;
     h.row(0) += step.segment<3>(0).transpose();
     h.row(1) += step.segment<3>(3).transpose();
     h.row(2).head<2>() += step.segment<2>(6).transpose();
