@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <type_traits>
+#include <vector>
 
 #include "cfp/core/chunk.hpp"
 #include "cfp/geometry/camera.hpp"
@@ -24,27 +25,69 @@ template <typename Scalar>
 struct PoseColumns {
   Scalar *x = nullptr, *y = nullptr, *z = nullptr;        // point relative to the start position, world axes, m
   Scalar *u = nullptr, *v = nullptr, *u_right = nullptr;  // px; pinhole: (pixel - centre) / focal length
-  Scalar* information = nullptr;                          // 1 / sigma^2; pinhole: fx^2 / sigma^2; pinhole: fx^2 / sigma^2
+  Scalar* information = nullptr;                          // 1 / sigma^2; pinhole: fx^2 / sigma^2
   Scalar* weight = nullptr;                               // w / mean w
   Scalar* active = nullptr;                               // weight, or 0 for an outlier left out
   Scalar* error = nullptr;                                // s; negative: behind the camera, |s| as last seen in front
   std::uint32_t* index = nullptr;                         // of the caller's observation
   std::size_t mono = 0, stereo_begin = 0, stereo_end = 0;
+  std::size_t lanes = 1;  // of the padding
   double mean_weight = 1, baseline_fx = 0;
 
-  /// Divides the workspace up; the columns begin at cache lines.
-  void reserve(WeightedPnPWorkspace<Scalar>& workspace, std::size_t slots) {
+  /// Divides the memory up; the columns begin at cache lines.
+  void reserve(std::vector<Scalar>& memory, std::size_t slots) {
     constexpr std::size_t line = 64 / sizeof(Scalar);
     const std::size_t stride = (slots + line - 1) / line * line + line;  // an odd line: columns of 2^k points share no cache set
-    if (workspace.columns.size() < 10 * stride + line) workspace.columns.resize(10 * stride + line);
-    if (workspace.indices.size() < slots + 1) workspace.indices.resize(slots + 1);
-    const std::size_t misaligned = reinterpret_cast<std::uintptr_t>(workspace.columns.data()) / sizeof(Scalar) % line;
-    Scalar* next = workspace.columns.data() + (line - misaligned) % line;
+    if (memory.size() < 10 * stride + line) memory.resize(10 * stride + line);
+    const std::size_t misaligned = reinterpret_cast<std::uintptr_t>(memory.data()) / sizeof(Scalar) % line;
+    Scalar* next = memory.data() + (line - misaligned) % line;
     for (Scalar** column : {&x, &y, &z, &u, &v, &u_right, &information, &weight, &active, &error}) {
       *column = next;
       next += stride;
     }
-    index = workspace.indices.data();
+  }
+
+  /// The observations of `from` in this arithmetic, in the same slots.
+  template <typename From>
+  void copy(const PoseColumns<From>& from, std::vector<Scalar>& memory) {
+    mono = from.mono, stereo_begin = from.stereo_begin, stereo_end = from.stereo_end, lanes = from.lanes;
+    mean_weight = from.mean_weight, baseline_fx = from.baseline_fx;
+    reserve(memory, 2 * stereo_begin);
+    copy_column(from.x, x), copy_column(from.y, y), copy_column(from.z, z);
+    copy_column(from.u, u), copy_column(from.v, v), copy_column(from.information, information);
+    copy_column(from.weight, weight);
+    for (std::size_t i = stereo_begin, end = padded(stereo_end); i < end; ++i) u_right[i] = static_cast<Scalar>(from.u_right[i]);
+    forget_passes();
+  }
+  /// A column of other columns.
+  template <typename From>
+  void copy_column(const From* values, Scalar* to) const noexcept {
+    for_each_slot([&](std::size_t i) { to[i] = static_cast<Scalar>(values[i]); });
+  }
+  /// The errors of other columns, as far as float reaches.
+  template <typename From>
+  void copy_errors(const PoseColumns<From>& from) const noexcept {
+    for_each_slot([&](std::size_t i) { error[i] = static_cast<Scalar>((std::min)((std::max)(from.error[i], From(-1e30)), From(1e30))); });
+  }
+  /// Whether float resolves 0.1 sigma (mean square, pinhole): as 1e-6 of the focal length or more, 16 units in its last place.
+  [[nodiscard]] bool suit_float() const noexcept {
+    double sum = 0, sum_sq = 0;
+    add_sums(information, 0, mono, sum, sum_sq);
+    add_sums(information, stereo_begin, stereo_end, sum, sum_sq);
+    return sum <= 1e10 * static_cast<double>(mono + stereo_end - stereo_begin);
+  }
+  /// Back to before the first pass.
+  void forget_passes() const noexcept {
+    for_each_slot([&](std::size_t i) {
+      active[i] = weight[i];
+      error[i] = Scalar(0);
+    });
+  }
+  /// Calls visit(i) for the slots of all observations and of their padding.
+  template <typename Visit>
+  void for_each_slot(Visit&& visit) const noexcept {
+    for (std::size_t i = 0, end = padded(mono); i < end; ++i) visit(i);
+    for (std::size_t i = stereo_begin, end = padded(stereo_end); i < end; ++i) visit(i);
   }
 
   /// Calls visit(begin, end, chi2 threshold) for the pixels and for the pixels with a depth.
@@ -58,10 +101,13 @@ struct PoseColumns {
   /// which compilers vectorise; where all observations of a chunk are of one kind they are written without being sorted.
   template <typename Input, typename Camera>
   void load(const PoseObservations<Input>& observations, const Camera& camera, const Vector3<double>& centre, WeightConvention convention,
-            std::size_t lanes, WeightedPnPWorkspace<Scalar>& workspace, WeightedPnPResult& result) {
+            std::size_t padding, WeightedPnPWorkspace<Scalar>& workspace, WeightedPnPResult& result) {
     const std::size_t n = observations.points.size();
-    stereo_begin = (n + lanes - 1) / lanes * lanes;
-    reserve(workspace, 2 * stereo_begin);
+    lanes = padding;
+    stereo_begin = padded(n);
+    reserve(workspace.columns, 2 * stereo_begin);
+    if (workspace.indices.size() < 2 * stereo_begin + 1) workspace.indices.resize(2 * stereo_begin + 1);
+    index = workspace.indices.data();
     double fu = 1, fv = 1, cu = 0, cv = 0;
     if constexpr (is_pinhole<Camera>::value) {
       fu = 1 / static_cast<double>(camera.fx), fv = 1 / static_cast<double>(camera.fy);
@@ -87,7 +133,6 @@ struct PoseColumns {
       // Conditions as numbers, 1 or 0; a sum with NaN or infinity is not below its bound.
       double usable[chunk_size], has_right[chunk_size];
       const double pixel_bound = 1e7 * (std::min)(fu, fv);
-      std::size_t usable_count = 0, right_count = 0;
       for (std::size_t k = 0; k < count; ++k) {
         usable[k] = (std::abs(dx[k]) + std::abs(dy[k]) + std::abs(dz[k]) <= 1e9 ? 1.0 : 0.0) * (std::abs(pu[k]) + std::abs(pv[k]) <= pixel_bound ? 1.0 : 0.0) *
                     (w[k] >= 1e-30 ? 1.0 : 0.0) * (w[k] <= 1e30 ? 1.0 : 0.0) * (inverse_sq[k] >= 1e-12 ? 1.0 : 0.0) * (inverse_sq[k] <= 1e12 ? 1.0 : 0.0);
@@ -107,23 +152,26 @@ struct PoseColumns {
           right[k] = (right[k] - cu) * fu;
         }
       }
-      std::size_t slots[chunk_size];
-      const std::size_t pixels_before = pixel_slot, depths_before = depth_slot, nowhere = 2 * stereo_begin;
-      for (std::size_t k = 0; k < count; ++k) {
-        const bool use = usable[k] > 0, stereo = has_right[k] > 0;
-        slots[k] = use ? (stereo ? depth_slot : pixel_slot) : nowhere;
-        pixel_slot += use && !stereo ? 1U : 0U;
-        depth_slot += use && stereo ? 1U : 0U;
-      }
-      usable_count = pixel_slot - pixels_before + depth_slot - depths_before, right_count = depth_slot - depths_before;
-      for (std::size_t k = 0; usable_count < count && k < count; ++k) {
-        if (!(usable[k] > 0)) ++(w[k] >= 0 && w[k] < 1e-30 ? result.zero_weight : result.invalid);
-      }
+      const std::size_t usable_count = count_of(usable, count), right_count = count_of(has_right, count);
       const bool in_order = usable_count == count && (right_count == 0 || right_count == count);
+      std::size_t& next = right_count > 0 ? depth_slot : pixel_slot;  // in order: of all
+      const std::size_t first_slot = next, nowhere = 2 * stereo_begin;
+      std::size_t slots[chunk_size];
+      if (in_order) {
+        next += count;
+      } else {
+        for (std::size_t k = 0; k < count; ++k) {
+          const bool use = usable[k] > 0, stereo = has_right[k] > 0;
+          slots[k] = use ? (stereo ? depth_slot : pixel_slot) : nowhere;
+          pixel_slot += use && !stereo ? 1U : 0U;
+          depth_slot += use && stereo ? 1U : 0U;
+          if (!use) ++(w[k] >= 0 && w[k] < 1e-30 ? result.zero_weight : result.invalid);
+        }
+      }
       const auto put = [&](auto* column, auto&& value) {
         using T = std::remove_pointer_t<decltype(column)>;
         if (in_order) {
-          for (std::size_t k = 0; k < count; ++k) column[slots[0] + k] = static_cast<T>(value(k));
+          for (std::size_t k = 0; k < count; ++k) column[first_slot + k] = static_cast<T>(value(k));
         } else {
           for (std::size_t k = 0; k < count; ++k) column[slots[k]] = static_cast<T>(value(k));
         }
@@ -144,15 +192,16 @@ struct PoseColumns {
     result.used = static_cast<int>(mono) + result.used_stereo;
     if (result.used == 0) return;
     double sum = 0, sum_sq = 0;
-    add_weights(0, mono, sum, sum_sq);
-    add_weights(stereo_begin, stereo_end, sum, sum_sq);
+    add_sums(weight, 0, mono, sum, sum_sq);
+    add_sums(weight, stereo_begin, stereo_end, sum, sum_sq);
     result.effective = sum / sum_sq * sum;
     mean_weight = scaled ? 1 : sum / result.used;
-    finish(0, mono, lanes, scaled);
-    finish(stereo_begin, stereo_end, lanes, scaled);
+    finish(0, mono, scaled);
+    finish(stereo_begin, stereo_end, scaled);
   }
 
  private:
+  [[nodiscard]] std::size_t padded(std::size_t end) const noexcept { return (end + lanes - 1) / lanes * lanes; }
   /// (coordinate - offset) scale of `count` points.
   template <typename Input, int Dim>
   static void copy_coordinate(const PointSpan<Input, Dim>& points, int c, std::size_t first, std::size_t count, double offset, double scale, double* to) noexcept {
@@ -169,24 +218,36 @@ struct PoseColumns {
     for (std::size_t k = 0; k < count; ++k) to[k] = values.empty() ? 1.0 : static_cast<double>(values.data()[first + k]);
   }
 
-  void add_weights(std::size_t begin, std::size_t end, double& sum, double& sum_sq) const noexcept {
-    double s[4] = {}, q[4] = {};  // four chains of additions
-    const auto add = [&](std::size_t chain, double w) { s[chain] += w, q[chain] += w * w; };
-    for (; begin + 4 <= end; begin += 4) {
-      for (std::size_t chain = 0; chain < 4; ++chain) add(chain, static_cast<double>(weight[begin + chain]));
+  static double total(const double (&s)[8]) noexcept { return ((s[0] + s[1]) + (s[2] + s[3])) + ((s[4] + s[5]) + (s[6] + s[7])); }
+  /// How many of the numbers are 1, the others being 0.
+  static std::size_t count_of(const double* numbers, std::size_t count) noexcept {
+    double sums[8] = {};  // eight chains of additions, for the vectoriser
+    std::size_t k = 0;
+    for (; k + 8 <= count; k += 8) {
+      for (std::size_t chain = 0; chain < 8; ++chain) sums[chain] += numbers[k + chain];
     }
-    for (std::size_t chain = 0; begin < end; ++begin, ++chain) add(chain, static_cast<double>(weight[begin]));
-    sum += (s[0] + s[1]) + (s[2] + s[3]);
-    sum_sq += (q[0] + q[1]) + (q[2] + q[3]);
+    for (; k < count; ++k) sums[0] += numbers[k];
+    return static_cast<std::size_t>(total(sums));
   }
 
-  void finish(std::size_t begin, std::size_t end, std::size_t lanes, bool scaled) noexcept {
+  static void add_sums(const Scalar* column, std::size_t begin, std::size_t end, double& sum, double& sum_sq) noexcept {
+    double s[8] = {}, q[8] = {};
+    const auto add = [&](std::size_t chain, double value) { s[chain] += value, q[chain] += value * value; };
+    for (; begin + 8 <= end; begin += 8) {
+      for (std::size_t chain = 0; chain < 8; ++chain) add(chain, static_cast<double>(column[begin + chain]));
+    }
+    for (std::size_t chain = 0; begin < end; ++begin, ++chain) add(chain, static_cast<double>(column[begin]));
+    sum += total(s);
+    sum_sq += total(q);
+  }
+
+  void finish(std::size_t begin, std::size_t end, bool scaled) noexcept {
     const Scalar normal = static_cast<Scalar>(1 / mean_weight);
     for (std::size_t i = begin; i < end; ++i) {
       active[i] = weight[i] = scaled ? Scalar(1) : weight[i] * normal;
       error[i] = Scalar(0);
     }
-    for (; end % lanes != 0; ++end) {
+    for (const std::size_t last = padded(end); end < last; ++end) {
       x[end] = y[end] = z[end] = u[end] = v[end] = u_right[end] = weight[end] = active[end] = error[end] = Scalar(0);
       information[end] = Scalar(1);
     }

@@ -28,6 +28,7 @@ struct PoseSystem {
   Matrix6<double> H = Matrix6<double>::Zero();  // upper triangle: sum of W J^T J
   Vector6<double> g = Vector6<double>::Zero();  // sum of W J^T r; the gradient of the cost is 2 g
   double cost = 0;
+  bool draft = false;  // summed from float on the way to a result in double: weighted_pnp_impl.hpp
 };
 
 /// A point that goes behind the camera keeps the error it last had in front: otherwise a step that hides points would pay.

@@ -1,5 +1,5 @@
 /// @file weighted_pnp_impl.hpp
-/// The machinery of weighted_pnp.hpp: loading, damped Gauss-Newton, rounds.
+/// The machinery of weighted_pnp.hpp: rounds, damped Gauss-Newton, drafts in float.
 #pragma once
 
 #include <algorithm>
@@ -8,47 +8,11 @@
 #include <limits>
 #include <type_traits>
 
-#include "cfp/optimization/pose_columns.hpp"
-#include "cfp/optimization/pose_system.hpp"
+#include "cfp/optimization/pose_passes.hpp"
+#include "cfp/optimization/pose_step.hpp"
 #include "cfp/optimization/weighted_pnp_types.hpp"
 
 namespace cfp::detail {
-
-/// Solves (H + damping diag H) step = -g by Cholesky (L D L^T) of the matrix scaled to a unit diagonal; H: upper triangle.
-/// False for an H that is not positive definite, or whose smallest pivot, 1 - (multiple correlation)^2, is below `tolerance`.
-inline bool solve_pose_step(const Matrix6<double>& H, const Vector6<double>& g, double damping, double tolerance, Vector6<double>& step) noexcept {
-  double scale[6], L[6][6], pivot[6], inverse[6];
-  for (int i = 0; i < 6; ++i) {
-    if (!(H(i, i) > 0) || !is_finite(H(i, i))) return false;
-    scale[i] = 1 / std::sqrt(H(i, i));
-  }
-  for (int j = 0; j < 6; ++j) {
-    double d = 1 + damping;
-    for (int k = 0; k < j; ++k) d -= L[j][k] * L[j][k] * pivot[k];
-    if (!(d > tolerance)) return false;
-    pivot[j] = d;
-    inverse[j] = 1 / d;
-    for (int i = j + 1; i < 6; ++i) {
-      double sum = H(j, i) * scale[j] * scale[i];
-      for (int k = 0; k < j; ++k) sum -= L[i][k] * L[j][k] * pivot[k];
-      L[i][j] = sum * inverse[j];
-    }
-  }
-  for (int i = 0; i < 6; ++i) {
-    step[i] = -g[i] * scale[i];
-    for (int k = 0; k < i; ++k) step[i] -= L[i][k] * step[k];
-  }
-  for (int i = 5; i >= 0; --i) {
-    step[i] *= inverse[i];
-    for (int k = i + 1; k < 6; ++k) step[i] -= L[k][i] * step[k];
-  }
-  bool finite = true;
-  for (int i = 0; i < 6; ++i) {
-    step[i] *= scale[i];
-    finite = finite && is_finite(step[i]);
-  }
-  return finite;
-}
 
 inline bool is_rigid_motion(const SE3<double>& T) noexcept {
   bool finite = true;
@@ -58,12 +22,6 @@ inline bool is_rigid_motion(const SE3<double>& T) noexcept {
   }
   // A float rotation from a host is off by 1e-7 or, after many products, more; a scaled or mirrored matrix is a mistake.
   return finite && (T.rotation.transpose() * T.rotation - Matrix3<double>::Identity()).cwiseAbs().maxCoeff() < 1e-2 && T.rotation.determinant() > 0;
-}
-
-/// Calls visit(i) for every whole packet from begin on until end is covered: the columns are padded.
-template <typename P, typename Visit>
-void for_each_packet(std::size_t begin, std::size_t end, Visit&& visit) noexcept {
-  for (std::size_t i = begin; i < end; i += static_cast<std::size_t>(lanes_of<P>)) visit(i);
 }
 
 template <typename Camera>
@@ -76,125 +34,123 @@ bool is_usable_camera(const Camera& camera) noexcept {
 }
 
 /// One refinement: the loaded observations and the pose, which is kept relative to the start position (see refine_pose).
+///
+/// In double, a pinhole camera's passes on the way are drafts, made in float on a copy of the columns: twice the points per register.
+/// A pose is evaluated in draft while the step that leads to it promises to move pixels by more than 0.1 sigma on average; float
+/// knows a pixel to 3e-5 px (6e-8 of the focal length). From then on the round continues in double. So it does when a draft refuses a step.
+/// What is returned, or chooses inliers, is evaluated in double, and a draft that ends without a pose (degenerate or not finite in
+/// float, too few inliers) is forgotten: the rounds are run again in double alone.
 template <typename P, typename Camera>
 class PoseRefinement {
   using Scalar = scalar_of<P>;
+  static constexpr bool has_draft = std::is_same<Scalar, double>::value && (lanes_of<P> > 1) && is_pinhole<Camera>::value;
+  using DraftP = std::conditional_t<has_draft, Packet<float>, P>;
 
  public:
   PoseRefinement(const Camera& camera, const SE3<double>& start, const WeightedPnPOptions& options) noexcept
-      : camera_(camera), options_(options), centre_(start.rotation.transpose() * -start.translation) {
+      : options_(options), passes_{camera, options, {}}, drafts_{camera, options, {}}, centre_(start.rotation.transpose() * -start.translation) {
     start_.rotation = start.rotation;
   }
 
   template <typename Input>
   void load(const PoseObservations<Input>& observations, WeightedPnPWorkspace<Scalar>& workspace, WeightedPnPResult& result) {
-    columns_.load(observations, camera_, centre_, options_.convention, static_cast<std::size_t>(lanes_of<P>), workspace, result);
+    constexpr std::size_t lanes = static_cast<std::size_t>(lanes_of<P> > lanes_of<DraftP> ? lanes_of<P> : lanes_of<DraftP>);
+    passes_.columns.load(observations, passes_.camera, centre_, options_.convention, lanes, workspace, result);
+    if constexpr (has_draft) {
+      drafts_suit_ = passes_.columns.suit_float();
+      if (drafts_suit_) drafts_.columns.copy(passes_.columns, workspace.draft);
+    }
   }
 
   /// Runs the rounds; writes pose, information, cost, chi2, counts and reason. The mask of inliers: mark_inliers.
   void run(WeightedPnPResult& result) noexcept {
-    pose_ = start_;
-    for (std::size_t r = 0; r < options_.round_count; ++r) {
-      const PoseRound& round = options_.rounds[r];
-      const bool subset = r > 0 && (round.inliers_only || options_.rounds[r - 1].inliers_only);
-      const bool changed = subset && activate(round.inliers_only);
-      if (r > 0 && !changed && round == options_.rounds[r - 1]) continue;
-      if (round.from_start) pose_ = start_;
-      ++result.rounds;
-      solve(round, result);
-      if (!is_refined(result.reason)) return;
-      result.inliers = count_inliers(result.chi2);
-      if (result.inliers < options_.min_observations) {
-        result.reason = PoseStop::not_enough_inliers;
-        return;
-      }
+    run_rounds(drafts_suit_, result);
+    if (drafts_suit_ && !is_refined(result.reason)) {
+      passes_.columns.forget_passes();
+      run_rounds(false, result);
     }
+    if (!is_refined(result.reason)) return;
     result.T_cam_world = {pose_.rotation, pose_.translation - pose_.rotation * centre_};
     for (int i = 0; i < 6; ++i) {
-      for (int j = 0; j < 6; ++j) result.information(i, j) = system_.H((std::min)(i, j), (std::max)(i, j)) * columns_.mean_weight;
+      for (int j = 0; j < 6; ++j) result.information(i, j) = system_.H((std::min)(i, j), (std::max)(i, j)) * passes_.columns.mean_weight;
     }
-    result.cost = system_.cost * columns_.mean_weight;
+    result.cost = system_.cost * passes_.columns.mean_weight;
   }
 
-  void mark_inliers(span<char> inliers) const noexcept {
-    columns_.for_each_kind(options_, [&](std::size_t begin, std::size_t end, double chi2_limit) {
-      const Scalar threshold = static_cast<Scalar>(chi2_limit);
-      for (std::size_t i = begin; i < end; ++i) inliers[columns_.index[i]] = columns_.error[i] >= Scalar(0) && columns_.error[i] <= threshold ? char(1) : char(0);
-    });
-  }
+  void mark_inliers(span<char> inliers) const noexcept { passes_.mark_inliers(inliers); }
 
  private:
-  [[nodiscard]] static auto is_inlier(const P& error, const P& threshold) noexcept { return both(error >= P(Scalar(0)), error <= threshold); }
-
-  int count_inliers(double& chi2) const noexcept {
-    constexpr std::size_t block = 64 * static_cast<std::size_t>(lanes_of<P>);
-    const P zero(Scalar(0)), one(Scalar(1));
-    double count = 0, sum = 0;
-    columns_.for_each_kind(options_, [&](std::size_t begin, std::size_t end, double chi2_limit) {
-      const P threshold(static_cast<Scalar>(chi2_limit));
-      for (; begin < end; begin += block) {
-        P block_count = zero, block_sum = zero;
-        for_each_packet<P>(begin, (std::min)(end, begin + block), [&](std::size_t i) {
-          const P error = cfp::load<P>(columns_.error + i), weight = cfp::load<P>(columns_.weight + i);
-          const auto inlier = both(is_inlier(error, threshold), weight > zero);  // weight 0: padding
-          block_count += select(inlier, one, zero);
-          block_sum += select(inlier, weight * error, zero);
-        });
-        count += static_cast<double>(reduce_add(block_count));
-        sum += static_cast<double>(reduce_add(block_sum));
+  /// The rounds, beginning in draft or in double alone; afterwards system_ is of pose_ and in double, unless there is a reason against it.
+  void run_rounds(bool draft, WeightedPnPResult& result) noexcept {
+    const PoseRound* done = &options_.rounds[0];  // the last one that was run
+    pose_ = start_;
+    next_is_draft_ = draft;
+    result.rounds = 0;
+    for (std::size_t r = 0; r < options_.round_count; ++r) {
+      const PoseRound& round = options_.rounds[r];
+      bool changed = false;
+      if (r > 0 && (round.inliers_only || options_.rounds[r - 1].inliers_only)) {
+        if (round.inliers_only && !settle(*done, result)) return;
+        changed = passes_.activate(round.inliers_only);
+        if (draft && changed) drafts_.columns.copy_column(passes_.columns.active, drafts_.columns.active);
       }
-    });
-    chi2 = sum * columns_.mean_weight;
-    return static_cast<int>(count);
-  }
-  /// Chooses the observations of the next round; whether the choice differs from the last round's.
-  bool activate(bool inliers_only) noexcept {
-    const P zero(Scalar(0));
-    P changed = zero;
-    columns_.for_each_kind(options_, [&](std::size_t begin, std::size_t end, double chi2_limit) {
-      const P threshold(static_cast<Scalar>(chi2_limit));
-      for_each_packet<P>(begin, end, [&](std::size_t i) {
-        using std::abs;
-        const P weight = cfp::load<P>(columns_.weight + i);
-        const P active = inliers_only ? select(is_inlier(cfp::load<P>(columns_.error + i), threshold), weight, zero) : weight;
-        changed += abs(active - cfp::load<P>(columns_.active + i));
-        store(columns_.active + i, active);
-      });
-    });
-    return reduce_add(changed) > Scalar(0);
+      if (r > 0 && !changed && round == options_.rounds[r - 1]) continue;
+      if (round.from_start) {
+        pose_ = start_;
+        if (draft && !next_is_draft_) draft_next();
+      }
+      ++result.rounds;
+      solve(round, result);
+      done = &round;
+      if (!is_refined(result.reason) || !has_enough_inliers(result)) return;
+    }
+    (void)settle(*done, result);
   }
 
-  PoseSystem evaluate(const SE3<double>& T, const PoseRound& round) const noexcept {
-    PoseSystem system;
-    const auto add = [&](std::size_t begin, std::size_t end, double chi2, auto stereo) {
-      constexpr bool is_stereo = decltype(stereo)::value;
-      const double delta = round.scale * std::sqrt(chi2);
-      if constexpr (is_pinhole<Camera>::value) {
-        with_loss<P>(round.loss, P(static_cast<Scalar>(delta)),
-                     [&](const auto& loss) { add_pinhole<P, is_stereo>(columns_, begin, end, camera_, columns_.baseline_fx, T, loss, system); });
-      } else {
-        with_loss<double>(round.loss, delta, [&](const auto& loss) { add_camera<is_stereo>(columns_, begin, end, camera_, columns_.baseline_fx, T, loss, system); });
-      }
-    };
-    if (columns_.mono > 0) add(0, columns_.mono, options_.chi2_mono, std::false_type());
-    if (columns_.stereo_end > columns_.stereo_begin) add(columns_.stereo_begin, columns_.stereo_end, options_.chi2_stereo, std::true_type());
+  /// The pass for T, in the arithmetic that is due.
+  PoseSystem evaluate(const SE3<double>& T, const PoseRound& round, WeightedPnPResult& result) const noexcept {
+    ++result.evaluations;
+    PoseSystem system = next_is_draft_ ? drafts_.evaluate(T, round) : passes_.evaluate(T, round);
+    system.draft = next_is_draft_;
     return system;
+  }
+  void draft_next() noexcept {
+    next_is_draft_ = true;
+    drafts_.columns.copy_errors(passes_.columns);
+  }
+  void double_next() noexcept {
+    next_is_draft_ = false;
+    passes_.columns.copy_errors(drafts_.columns);
+  }
+  bool has_enough_inliers(WeightedPnPResult& result) const noexcept {
+    result.inliers = system_.draft ? drafts_.count_inliers(result.chi2) : passes_.count_inliers(result.chi2);
+    if (result.inliers < options_.min_observations) result.reason = PoseStop::not_enough_inliers;
+    return is_refined(result.reason);
+  }
+  /// Evaluates pose_ in double where that has not been done; false: too few inliers.
+  bool settle(const PoseRound& round, WeightedPnPResult& result) noexcept {
+    if (!system_.draft) return true;
+    if (next_is_draft_) double_next();
+    system_ = evaluate(pose_, round, result);
+    return has_enough_inliers(result);
   }
 
   /// Gauss-Newton from pose_; steps that do not lower the cost are taken back and shortened (Levenberg-Marquardt). H lacks the
   /// curvature of loss and projection, which would make the convergence linear; near the minimum a secant correction learns it
   /// (structured BFGS: Dennis, Schnabel 1983, section 10.3): 10 % to 15 % fewer passes.
   void solve(const PoseRound& round, WeightedPnPResult& result) noexcept {
-    constexpr double degenerate = static_cast<double>(Tolerance<Scalar>::degenerate), rounding = static_cast<double>(std::numeric_limits<Scalar>::epsilon());
+    constexpr double rounding = static_cast<double>(std::numeric_limits<Scalar>::epsilon());
     constexpr double near = 100;  // decrease, so 10 sigma of the pose: further away a difference of gradients says little of the minimum
+    constexpr double draft_rounding = 1e-5;  // of a draft's cost
     const double enough = (std::max)(round.min_decrease, round.min_mean_decrease * result.used);
-    system_ = evaluate(pose_, round);
-    ++result.evaluations;
+    const double draft_ends = 0.01 * result.used;  // decrease, so 0.1 sigma of every pixel
+    system_ = evaluate(pose_, round, result);
     Matrix6<double> correction = Matrix6<double>::Zero();
     double damping = 0;
     bool current = true;  // whether the stored errors belong to pose_
     result.reason = PoseStop::iteration_limit;
     for (int iteration = 0;; ++iteration) {
+      const double degenerate = system_.draft ? static_cast<double>(Tolerance<float>::degenerate) : static_cast<double>(Tolerance<Scalar>::degenerate);
       Vector6<double> step;
       const Matrix6<double> H = system_.H + correction;
       if (!solve_pose_step(H, system_.g, damping, degenerate, step)) {
@@ -206,20 +162,25 @@ class PoseRefinement {
       }
       double decrease = 0;  // of the quadratic model
       for (int i = 0; i < 6; ++i) decrease += -system_.g[i] * step[i] + damping * H(i, i) * step[i] * step[i];
+      if (next_is_draft_ && !(decrease > draft_ends)) double_next();
       if (damping == 0 && !(decrease > (std::max)(enough, rounding * system_.cost))) {
         result.reason = PoseStop::converged;
         break;
       }
       if (iteration == round.max_iterations) break;
       const SE3<double> trial = se3_exp(step) * pose_;
-      const PoseSystem trial_system = evaluate(trial, round);
-      ++result.evaluations;
-      current = trial_system.cost < system_.cost;
+      const PoseSystem trial_system = evaluate(trial, round, result);
+      current = trial_system.cost < system_.cost * (system_.draft ? 1 + draft_rounding : 1);
       if (current) {
-        if (damping == 0 && decrease < near) correct(trial_system.H, trial_system.g - system_.g, step, correction);
+        if (damping == 0 && decrease < near) learn_curvature(trial_system.H, trial_system.g - system_.g, step, correction);
         pose_ = trial;
         system_ = trial_system;
         damping = damping > 1e-4 ? damping * 0.1 : 0;
+      } else if (system_.draft) {  // whether the step fails is for double to say
+        if (next_is_draft_) double_next();
+        system_ = evaluate(pose_, round, result);
+        current = true;
+        correction.setZero();
       } else if (damping < 1e8) {
         correction.setZero();
         damping = damping > 0 ? damping * 10 : 1e-3;
@@ -228,30 +189,16 @@ class PoseRefinement {
         break;
       }
     }
-    if (!current) {
-      system_ = evaluate(pose_, round);
-      ++result.evaluations;
-    }
+    if (!current) system_ = evaluate(pose_, round, result);
   }
 
-  /// Lets H + correction map the last step to the change of the gradient that it brought; both stay symmetric and positive.
-  static void correct(const Matrix6<double>& H, const Vector6<double>& change, const Vector6<double>& step, Matrix6<double>& correction) noexcept {
-    const Matrix6<double> model = H + correction;
-    Vector6<double> expected;
-    expected.noalias() = model.selfadjointView<Eigen::Upper>() * step;
-    const double curvature = step.dot(expected), seen = step.dot(change);
-    if (!(seen > 0.1 * curvature)) return;
-    for (int i = 0; i < 6; ++i) {
-      for (int j = i; j < 6; ++j) correction(i, j) += change[i] * change[j] / seen - expected[i] * expected[j] / curvature;
-    }
-  }
-
-  const Camera& camera_;
   const WeightedPnPOptions& options_;
-  PoseColumns<Scalar> columns_;
+  PosePasses<P, Camera> passes_;
+  PosePasses<DraftP, Camera> drafts_;
+  bool drafts_suit_ = false, next_is_draft_ = false;
   Vector3<double> centre_;
   SE3<double> start_, pose_;  // about the start position: p = R (X - centre) + t
-  PoseSystem system_;
+  PoseSystem system_;         // at pose_
 };
 
 /// refine_pose with the packet type named: P = Scalar is the scalar path.

@@ -142,7 +142,7 @@ struct WeightedPnPResult {
   int invalid = 0;       ///< skipped: not finite, negative weight or out of range
   int inliers = 0;       ///< s within the threshold and in front of the camera, at the returned pose
   int rounds = 0;        ///< rounds run
-  int evaluations = 0;   ///< passes over the data
+  int evaluations = 0;   ///< passes over the data, those in float included
   PoseStop reason = PoseStop::not_enough_data;
 };
 
@@ -150,6 +150,7 @@ struct WeightedPnPResult {
 template <typename Scalar>
 struct WeightedPnPWorkspace {
   std::vector<Scalar> columns;
+  std::vector<float> draft;  ///< the columns once more, for early passes: in double only
   std::vector<std::uint32_t> indices;
 };
 
