@@ -160,7 +160,7 @@ TEST_CASE("Weighted PnP, drafts: what double refuses is refused for the same rea
     for (std::size_t i = 0; i < scene.points.size(); ++i) {
       const double t = -1 + 2 * static_cast<double>(i) / static_cast<double>(scene.points.size());
       const cfp::Vector3<double> p = cfp::Vector3<double>(t, 0.3 * t, 3) + thickness * cfp_test::random_direction(random), X = scene.truth.inverse() * p;
-      cfp::Vector2<double> pixel;
+      cfp::Vector2<double> pixel = cfp::Vector2<double>::Zero();
       scene.camera.project(p, pixel);
       scene.points[i] = {X[0], X[1], X[2]};
       scene.pixels[i] = {pixel[0], pixel[1]};
@@ -205,7 +205,7 @@ TEST_CASE("Weighted PnP, drafts: any order of rounds ends in double", "[optimiza
     double chi2 = 0;
     int inliers = 0;
     for (std::size_t i = 0; i < scene.points.size(); ++i) {
-      cfp::Vector2<double> pixel;
+      cfp::Vector2<double> pixel = cfp::Vector2<double>::Zero();
       const bool front = scene.camera.project(result.T_cam_world * cfp::Vector3<double>(scene.points[i][0], scene.points[i][1], scene.points[i][2]), pixel);
       const double s = (pixel - cfp::Vector2<double>(scene.pixels[i][0], scene.pixels[i][1])).squaredNorm();
       const bool inlier = front && s <= options.chi2_mono;

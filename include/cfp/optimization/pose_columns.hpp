@@ -131,12 +131,11 @@ struct PoseColumns {
         for (std::size_t k = 0; k < count; ++k) inverse_sq[k] = inverse_sq[k] > 0 ? 1 / (inverse_sq[k] * inverse_sq[k]) : 0;
       }
       // Conditions as numbers, 1 or 0; a sum with NaN or infinity is not below its bound.
-      double usable[chunk_size], has_right[chunk_size];
+      double usable[chunk_size] = {}, has_right[chunk_size] = {};
       const double pixel_bound = 1e7 * (std::min)(fu, fv);
       for (std::size_t k = 0; k < count; ++k) {
         usable[k] = (std::abs(dx[k]) + std::abs(dy[k]) + std::abs(dz[k]) <= 1e9 ? 1.0 : 0.0) * (std::abs(pu[k]) + std::abs(pv[k]) <= pixel_bound ? 1.0 : 0.0) *
                     (w[k] >= 1e-30 ? 1.0 : 0.0) * (w[k] <= 1e30 ? 1.0 : 0.0) * (inverse_sq[k] >= 1e-12 ? 1.0 : 0.0) * (inverse_sq[k] <= 1e12 ? 1.0 : 0.0);
-        has_right[k] = 0;
       }
       if (has_depths) {
         copy_or(observations.depths, first, count, right);
