@@ -27,7 +27,8 @@ struct PoseColumns {
   Scalar *u = nullptr, *v = nullptr, *u_right = nullptr;  // px; pinhole: (pixel - centre) / focal length
   Scalar* information = nullptr;                          // 1 / sigma^2; pinhole: fx^2 / sigma^2
   Scalar* weight = nullptr;                               // w / mean w
-  Scalar* active = nullptr;                               // weight, or 0 for an outlier left out
+  Scalar* kept = nullptr;                                 // weight, or 0 for an outlier left out
+  Scalar* active = nullptr;                               // what counts: weight, or kept
   Scalar* error = nullptr;                                // s; negative: behind the camera, |s| as last seen in front
   std::uint32_t* index = nullptr;                         // of the caller's observation
   std::size_t mono = 0, stereo_begin = 0, stereo_end = 0;
@@ -41,7 +42,7 @@ struct PoseColumns {
     if (memory.size() < 10 * stride + line) memory.resize(10 * stride + line);
     const std::size_t misaligned = reinterpret_cast<std::uintptr_t>(memory.data()) / sizeof(Scalar) % line;
     Scalar* next = memory.data() + (line - misaligned) % line;
-    for (Scalar** column : {&x, &y, &z, &u, &v, &u_right, &information, &weight, &active, &error}) {
+    for (Scalar** column : {&x, &y, &z, &u, &v, &u_right, &information, &weight, &kept, &error}) {
       *column = next;
       next += stride;
     }
@@ -77,11 +78,9 @@ struct PoseColumns {
     return sum <= 1e10 * static_cast<double>(mono + stereo_end - stereo_begin);
   }
   /// Back to before the first pass.
-  void forget_passes() const noexcept {
-    for_each_slot([&](std::size_t i) {
-      active[i] = weight[i];
-      error[i] = Scalar(0);
-    });
+  void forget_passes() noexcept {
+    active = weight;
+    for_each_slot([&](std::size_t i) { error[i] = Scalar(0); });
   }
   /// Calls visit(i) for the slots of all observations and of their padding.
   template <typename Visit>
@@ -197,6 +196,7 @@ struct PoseColumns {
     mean_weight = scaled ? 1 : sum / result.used;
     finish(0, mono, scaled);
     finish(stereo_begin, stereo_end, scaled);
+    forget_passes();
   }
 
  private:
@@ -242,12 +242,9 @@ struct PoseColumns {
 
   void finish(std::size_t begin, std::size_t end, bool scaled) noexcept {
     const Scalar normal = static_cast<Scalar>(1 / mean_weight);
-    for (std::size_t i = begin; i < end; ++i) {
-      active[i] = weight[i] = scaled ? Scalar(1) : weight[i] * normal;
-      error[i] = Scalar(0);
-    }
+    for (std::size_t i = begin; i < end; ++i) weight[i] = scaled ? Scalar(1) : weight[i] * normal;
     for (const std::size_t last = padded(end); end < last; ++end) {
-      x[end] = y[end] = z[end] = u[end] = v[end] = u_right[end] = weight[end] = active[end] = error[end] = Scalar(0);
+      x[end] = y[end] = z[end] = u[end] = v[end] = u_right[end] = weight[end] = kept[end] = Scalar(0);
       information[end] = Scalar(1);
     }
   }

@@ -47,7 +47,8 @@ struct PosePasses {
   }
 
   /// Chooses the observations of the next round; whether the choice differs from the last round's.
-  bool activate(bool inliers_only) const noexcept {
+  bool activate(bool inliers_only) noexcept {
+    Scalar* const next = inliers_only ? columns.kept : columns.weight;
     const P zero(Scalar(0));
     P changed = zero;
     columns.for_each_kind(options, [&](std::size_t begin, std::size_t end, double chi2_limit) {
@@ -57,9 +58,10 @@ struct PosePasses {
         const P weight = cfp::load<P>(columns.weight + i);
         const P active = inliers_only ? select(is_inlier(cfp::load<P>(columns.error + i), threshold), weight, zero) : weight;
         changed += abs(active - cfp::load<P>(columns.active + i));
-        store(columns.active + i, active);
+        store(next + i, active);
       });
     });
+    columns.active = next;
     return reduce_add(changed) > Scalar(0);
   }
 

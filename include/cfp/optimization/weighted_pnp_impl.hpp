@@ -92,7 +92,10 @@ class PoseRefinement {
       if (r > 0 && (round.inliers_only || options_.rounds[r - 1].inliers_only)) {
         if (round.inliers_only && !settle(*done, result)) return;
         changed = passes_.activate(round.inliers_only);
-        if (draft && changed) drafts_.columns.copy_column(passes_.columns.active, drafts_.columns.active);
+        if (draft && changed) {
+          drafts_.columns.active = round.inliers_only ? drafts_.columns.kept : drafts_.columns.weight;
+          if (round.inliers_only) drafts_.columns.copy_column(passes_.columns.kept, drafts_.columns.kept);
+        }
       }
       if (r > 0 && !changed && round == options_.rounds[r - 1]) continue;
       if (round.from_start) {
