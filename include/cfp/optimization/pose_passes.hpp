@@ -88,8 +88,9 @@ struct PosePasses {
     return static_cast<int>(count);
   }
 
-  /// 1 for an inlier by the stored errors; others are left as they are, or 0 where all observations are in order.
+  /// 1 for an inlier by the stored errors, else 0; observations that were skipped are left as they are.
   void mark_inliers(span<char> inliers) const noexcept {
+    // Every observation, of one kind, in a slot of its own: then the slots are in the caller's order.
     const bool in_order = columns.mono == inliers.size() || columns.stereo_end - columns.stereo_begin == inliers.size();
     columns.for_each_kind(options, [&](std::size_t begin, std::size_t end, double chi2_limit) {
       const Scalar* const error = columns.error + begin;

@@ -21,8 +21,8 @@ namespace cfp {
 /// In double, a pinhole camera's passes on the way are drafts in float, two points for one: those whose step promised to move pixels by
 /// more than 0.1 sigma on average, all but the last one or two of the default rounds. Pose, information, cost, chi2 and inliers come
 /// from double, and only double arithmetic alone refuses a pose. Against double alone that saves 15 % to 34 % of the default rounds'
-/// time from 300 points on (ORB-SLAM2's schedule: 7 % to 20 %); the pose differs by 1e-4 of its sigma in the median, at most by what min_decrease leaves open, and rounds that run to
-/// their minimum end in the same one (tests/optimization/weighted_pnp_draft_test.cpp).
+/// time from 300 points on (ORB-SLAM2's schedule: 7 % to 20 %); the pose differs by 1e-4 of its sigma in the median, at most by what
+/// min_decrease leaves open, and rounds that run to their minimum end in the same one (weighted_pnp_draft_test.cpp).
 /// Points behind the camera (z below Tolerance::min_depth, or more than 89.4 degrees off the axis of a pinhole camera) count
 /// for nothing and are no inliers. `inliers` (empty, or length n): 1 for an inlier, else 0; all 0 when the pose is untouched.
 /// Same input, same bits. Allocates only when the workspace grows. O(n) per evaluation; a pinhole camera takes the packet path
