@@ -59,7 +59,6 @@
 #include "cfp/optimization/pnp_ransac_types.hpp"
 #include "cfp/optimization/pose_columns.hpp"
 #include "cfp/optimization/pose_passes.hpp"
-#include "cfp/optimization/pose_step.hpp"
 #include "cfp/optimization/pose_system.hpp"
 #include "cfp/optimization/robust_loss.hpp"
 #include "cfp/optimization/weighted_ba.hpp"

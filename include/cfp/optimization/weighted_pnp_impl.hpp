@@ -8,8 +8,8 @@
 #include <limits>
 #include <type_traits>
 
+#include "cfp/math/normal_equations.hpp"
 #include "cfp/optimization/pose_passes.hpp"
-#include "cfp/optimization/pose_step.hpp"
 #include "cfp/optimization/weighted_pnp_types.hpp"
 
 namespace cfp::detail {
@@ -30,6 +30,18 @@ bool is_usable_camera(const Camera& camera) noexcept {
     return camera.fx >= 1e-3 && camera.fx <= 1e6 && camera.fy >= 1e-3 && camera.fy <= 1e6 && std::abs(camera.cx) <= 1e7 && std::abs(camera.cy) <= 1e7;
   } else {
     return true;
+  }
+}
+
+/// Lets H + correction map the last step to the change of the gradient that it brought; both stay symmetric and positive.
+inline void learn_curvature(const Matrix6<double>& H, const Vector6<double>& change, const Vector6<double>& step, Matrix6<double>& correction) noexcept {
+  const Matrix6<double> model = H + correction;
+  Vector6<double> expected;
+  expected.noalias() = model.selfadjointView<Eigen::Upper>() * step;
+  const double curvature = step.dot(expected), seen = step.dot(change);
+  if (!(seen > 0.1 * curvature)) return;
+  for (int i = 0; i < 6; ++i) {
+    for (int j = i; j < 6; ++j) correction(i, j) += change[i] * change[j] / seen - expected[i] * expected[j] / curvature;
   }
 }
 
@@ -156,8 +168,8 @@ class PoseRefinement {
       const double degenerate = system_.draft ? static_cast<double>(Tolerance<float>::degenerate) : static_cast<double>(Tolerance<Scalar>::degenerate);
       Vector6<double> step;
       const Matrix6<double> H = system_.H + correction;
-      if (!solve_pose_step(H, system_.g, damping, degenerate, step)) {
-        if (!solve_pose_step(system_.H, system_.g, damping, degenerate, step)) {
+      if (!solve_normal_equations<6>(H, system_.g, damping, degenerate, step)) {
+        if (!solve_normal_equations<6>(system_.H, system_.g, damping, degenerate, step)) {
           result.reason = PoseStop::degenerate;
           return;
         }
