@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 
 #include <Eigen/Core>
 
@@ -17,7 +18,8 @@ namespace cfp {
 template <int N>
 [[nodiscard]] bool solve_normal_equations(const Eigen::Matrix<double, N, N>& H, const Eigen::Matrix<double, N, 1>& g, double damping,
                                           double tolerance, Eigen::Matrix<double, N, 1>& step) noexcept {
-  double scale[N], L[N][N], pivot[N], inverse[N];
+  constexpr std::size_t n = static_cast<std::size_t>(N);
+  double scale[n], L[n][n], pivot[n], inverse[n];
   for (int i = 0; i < N; ++i) {
     if (!(H(i, i) > 0) || !is_finite(H(i, i))) return false;
     scale[i] = 1 / std::sqrt(H(i, i));
