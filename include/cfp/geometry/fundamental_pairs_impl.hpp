@@ -139,14 +139,20 @@ inline void sampson_distances_sq(const PairArrays& pairs, const Matrix3<double>&
   }
 }
 
-// Both points of every pair of a sample must lie on the same side of the cameras: Chum, Werner, Matas: "Epipolar geometry
-// estimation via RANSAC benefits from the oriented epipolar constraint", ICPR 2004.
-[[nodiscard]] inline bool is_oriented(const Matrix3<double>& F, const double (&p)[7][2], const double (&q)[7][2]) noexcept {
+// The epipole of the current image, F^T e = 0, unnormalised: F's columns span the plane across it.
+[[nodiscard]] inline Vector3<double> epipole_of(const Matrix3<double>& F) noexcept {
   Vector3<double> epipole = F.col(0).cross(F.col(1));
   for (int c = 0; c < 2; ++c) {
     const Vector3<double> other = F.col(c).cross(F.col(2));
     if (other.squaredNorm() > epipole.squaredNorm()) epipole = other;
   }
+  return epipole;
+}
+
+// Both points of every pair of a sample must lie on the same side of the cameras: Chum, Werner, Matas: "Epipolar geometry
+// estimation via RANSAC benefits from the oriented epipolar constraint", ICPR 2004.
+[[nodiscard]] inline bool is_oriented(const Matrix3<double>& F, const double (&p)[7][2], const double (&q)[7][2]) noexcept {
+  const Vector3<double> epipole = epipole_of(F);
   int positive = 0;
   for (int i = 0; i < 7; ++i) {
     const Vector3<double> line = F * Vector3<double>(p[i][0], p[i][1], 1);

@@ -12,7 +12,6 @@
 
 #include "cfp/core/packet.hpp"
 #include "cfp/geometry/fundamental_pairs_impl.hpp"
-#include "cfp/geometry/fundamental_refine_impl.hpp"
 #include "cfp/math/normal_equations.hpp"
 
 namespace cfp::detail {
@@ -51,8 +50,7 @@ namespace cfp::detail {
 // collinear points or a degenerate F.
 [[nodiscard]] inline bool homography_from_fundamental(const PairArrays& pairs, const Matrix3<double>& F, const std::uint32_t (&sample)[3],
                                                       Matrix3<double>& H) noexcept {
-  const FactoredF factors(F);
-  const Vector3<double> e = factors.U.col(2);
+  const Vector3<double> e = epipole_of(F).normalized();
   const Matrix3<double> A = hat(e) * F;
   Matrix3<double> M;
   Vector3<double> b;
