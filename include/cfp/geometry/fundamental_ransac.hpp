@@ -11,6 +11,7 @@
 
 #include "cfp/core/span.hpp"
 #include "cfp/geometry/camera.hpp"
+#include "cfp/geometry/fundamental_degeneracy_impl.hpp"
 #include "cfp/geometry/fundamental_ransac_impl.hpp"
 #include "cfp/geometry/fundamental_ransac_types.hpp"
 #include "cfp/math/sampling.hpp"
@@ -66,18 +67,19 @@ FundamentalResult<Scalar> fundamental_ransac(PointSpan<Scalar, 2> prev, PointSpa
     return result;
   }
   Matrix3<double> H;
-  const bool has_homography = search.dominant_homography(best.F, 0.5, H);
-  if (has_homography) search.complete_from_plane(H, best);
+  detail::HomographyCheck plane{search};
+  const bool has_homography = plane.dominant_homography(best.F, 0.5, H);
+  if (has_homography) plane.complete_from_plane(H, best);
   search.polish(best.F);
-  const bool explained_by_homography = has_homography && !search.has_parallax(H);
+  const bool explained_by_homography = has_homography && !plane.has_parallax(H);
   if (explained_by_homography) {
     PinholeCamera<double> intrinsics;
     if (camera != nullptr) intrinsics = {double(camera->fx), double(camera->fy), double(camera->cx), double(camera->cy)};
-    result.reason = search.classify(camera != nullptr ? &intrinsics : nullptr, H);
+    result.reason = plane.classify(camera != nullptr ? &intrinsics : nullptr, H);
   } else {
     result.reason = search.confident ? FundamentalReason::ok : FundamentalReason::iteration_limit;
   }
-  const double limit = explained_by_homography ? search.transfer_limit() : search.limit;
+  const double limit = explained_by_homography ? plane.transfer_limit() : search.limit;
   double weight = 0;
   for (std::size_t i = 0; i < pairs.size; ++i) {
     const double distance_sq = explained_by_homography ? detail::transfer_sq(pairs, H, i) : search.distances_sq[i];
