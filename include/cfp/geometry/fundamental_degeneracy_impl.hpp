@@ -28,9 +28,10 @@ struct HomographyCheck {
   [[nodiscard]] double transfer_limit() const noexcept { return 3 * search.limit; }
   [[nodiscard]] double transfer_noise_limit() const noexcept { return 3 * search.noise_limit(); }
 
-  // The homography that explains most of the inliers of F, refined on all pairs. False when none explains `share` of them, by weight.
+  // The homography that explains most of the inliers of F, the search's result, refined on all pairs. False when none explains `share`
+  // of them, by weight.
   bool dominant_homography(const Matrix3<double>& F, double share, Matrix3<double>& H) noexcept {
-    search.collect_inliers(F);
+    search.collect_inliers();
     double inlier_weight = 0;
     for (const std::uint32_t i : search.list) inlier_weight += pairs.weights()[i];
     if (search.list.size() < 4) return false;

@@ -35,7 +35,7 @@ struct FundamentalRansacWorkspace {
 /// there is no F and `reason` says why. The result is refined under a Geman-McClure loss of 2.25 standard deviations of the noise that
 /// the pairs themselves show, from several starts, as a short baseline gives the cost several minima. Cost per sample about 1 us plus
 /// 0.3 us per 200 pairs, and some 100 us at the end. Sources: Chum, Matas, Kittler: "Locally optimized RANSAC", DAGM 2003; Torr and
-/// Zisserman: "MLESAC", CVIU 2000, for the score; DEGENSAC (see fundamental_ransac_impl.hpp).
+/// Zisserman: "MLESAC", CVIU 2000, for the score; DEGENSAC (see fundamental_degeneracy_impl.hpp).
 template <typename Scalar>
 FundamentalResult<Scalar> fundamental_ransac(PointSpan<Scalar, 2> prev, PointSpan<Scalar, 2> cur, span<const Scalar> weights,
                                              span<char> inlier_mask, const FundamentalRansacOptions& options,

@@ -13,8 +13,8 @@
 #include <Eigen/Core>
 
 #include "cfp/geometry/fundamental_pairs_impl.hpp"
-#include "cfp/geometry/fundamental_refine_impl.hpp"
 #include "cfp/geometry/fundamental_ransac_types.hpp"
+#include "cfp/geometry/fundamental_refine_impl.hpp"
 #include "cfp/math/sampling.hpp"
 
 namespace cfp::detail {
@@ -30,7 +30,7 @@ struct FundamentalSearch {
   const FundamentalRansacOptions& options;
   MinimalSampler& sampler;
   std::vector<std::uint32_t>& list;   // scratch, as long as the pairs
-  std::vector<double>& distances_sq;  // scratch, of sampson_distances_sq
+  std::vector<double>& distances_sq;  // Sampson, of the F that was counted or measured last
   double limit;                       // squared Sampson threshold
   Random random;
   std::size_t iterations = 0;
@@ -102,11 +102,11 @@ struct FundamentalSearch {
 
   // A short baseline gives the cost several minima, often within a hundredth of each other, and chance decides into which of them the
   // first good sample leads. Samples of F's own inliers are nearly all good: the best of them are refined, too, and the lowest cost
-  // under the measured noise wins. What it brings: cfp_fundamental_scale_study.
+  // under the measured noise wins. What it brings: cfp_fundamental_scale_study. F is the one whose noise was measured last.
   void explore(FactoredF& F) noexcept {
     constexpr int samples = 16, starts = 2;
     FundamentalCandidate best[starts];
-    collect_inliers(F.matrix());
+    collect_inliers();
     const std::uint32_t n = static_cast<std::uint32_t>(list.size());
     if (n < 8) return;
     for (int k = 0; k < samples; ++k) {
@@ -117,11 +117,9 @@ struct FundamentalSearch {
       }
       solve_sample(sample, [&](const Matrix3<double>& start) {
         const double cost = msac_cost(pairs.thinned_columns(), start, limit, best[starts - 1].cost);
-        int at = starts;
-        for (; at > 0 && cost < best[at - 1].cost; --at) {
-          if (at < starts) best[at] = best[at - 1];
-        }
-        if (at < starts) best[at] = {start, cost};
+        if (!(cost < best[starts - 1].cost)) return;
+        best[starts - 1] = {start, cost};
+        for (int at = starts - 1; at > 0 && best[at].cost < best[at - 1].cost; --at) std::swap(best[at], best[at - 1]);
       });
     }
     const double scale = final_scale * noise_variance;
@@ -148,8 +146,8 @@ struct FundamentalSearch {
     measure_noise(F);
   }
 
-  void collect_inliers(const Matrix3<double>& F) noexcept {
-    sampson_distances_sq(pairs, F, distances_sq);
+  // Into `list`, by distances_sq.
+  void collect_inliers() noexcept {
     list.clear();
     for (std::size_t i = 0; i < pairs.size; ++i) {
       if (distances_sq[i] <= limit) list.push_back(static_cast<std::uint32_t>(i));

@@ -82,13 +82,15 @@ inline void homography_system(const PairColumns<double>& in, const Matrix3<doubl
     const P du = u - cfp::load<P>(in.qx + i), dv = v - cfp::load<P>(in.qy + i);
     const P distance = multiply_add(du, du, dv * dv) * inverse_limit, share = reciprocal(distance + one);
     // Beyond 9 the weight is below a hundredth; a point at infinity has NaN there and is left out, too.
-    const P weight = select(distance < most, cfp::load<P>(in.weight + i) * share * share * inverse, zero);
-    const P W = select(distance < most, weight * inverse, zero), U = select(distance < most, u, zero), V = select(distance < most, v, zero);
+    const auto counts = distance < most;
+    const auto counted = [&](const P& value) { return select(counts, value, zero); };
+    const P weight = counted(cfp::load<P>(in.weight + i) * share * share * inverse);
+    const P W = counted(weight * inverse), U = counted(u), V = counted(v);
     const P products[6] = {x * x, x * y, x, y * y, y, one}, factors[4] = {W, W * U, W * V, W * multiply_add(U, U, V * V)};
     for (int f = 0; f < 4; ++f) {
       for (int k = 0; k < 6; ++k) sum[6 * f + k] = multiply_add(factors[f], products[k], sum[6 * f + k]);
     }
-    const P eu = select(distance < most, weight * du, zero), ev = select(distance < most, weight * dv, zero);
+    const P eu = counted(weight * du), ev = counted(weight * dv);
     const P across = multiply_add(U, eu, V * ev);
     const P gradient[8] = {eu * x, eu * y, eu, ev * x, ev * y, ev, -across * x, -across * y};
     for (int k = 0; k < 8; ++k) sum[g0 + k] += gradient[k];
