@@ -17,14 +17,16 @@
 
 namespace {
 
-/// 1 - IoU of boxes spread over an image against the same boxes moved, plus surplus boxes (kind 0), or uniform (kind 1).
+/// 1 - IoU of boxes spread over an image against the same boxes moved, plus surplus boxes (kind 0), or uniform (kind
+/// 1).
 std::vector<std::vector<double>> problems(std::size_t rows, std::size_t cols, int kind) {
   std::vector<std::vector<double>> all(64);
   cfp::Random random(7, "assignment benchmark");
   for (std::vector<double>& costs : all) {
     std::vector<cfp::Box<double>> left(rows), right(cols);
     const auto random_box = [&] {
-      const double x = random.uniform(0, 580), y = random.uniform(0, 380), w = random.uniform(30, 120), h = random.uniform(60, 240);
+      const double x = random.uniform(0, 580), y = random.uniform(0, 380), w = random.uniform(30, 120),
+                   h = random.uniform(60, 240);
       return cfp::Box<double>{x, y, x + w, y + h};
     };
     for (cfp::Box<double>& b : left) b = random_box();
@@ -37,7 +39,8 @@ std::vector<std::vector<double>> problems(std::size_t rows, std::size_t cols, in
     for (std::size_t j = cols; j > 1; --j) std::swap(right[j - 1], right[random.index(static_cast<std::uint32_t>(j))]);
     costs.resize(rows * cols);
     for (std::size_t i = 0; i < rows; ++i) {
-      for (std::size_t j = 0; j < cols; ++j) costs[i * cols + j] = kind == 0 ? 1 - cfp::iou(left[i], right[j]) : random.uniform();
+      for (std::size_t j = 0; j < cols; ++j)
+        costs[i * cols + j] = kind == 0 ? 1 - cfp::iou(left[i], right[j]) : random.uniform();
     }
   }
   return all;
@@ -72,7 +75,8 @@ void dlib_max_cost(benchmark::State& state) {
   for (auto _ : state) {
     savings = 0;
     for (long i = 0; i < rows; ++i) {
-      for (long j = 0; j < cols; ++j) savings(i, j) = static_cast<int>(1e6 - 1e6 * all[k][static_cast<std::size_t>(i * cols + j)] + 0.5);
+      for (long j = 0; j < cols; ++j)
+        savings(i, j) = static_cast<int>(1e6 - 1e6 * all[k][static_cast<std::size_t>(i * cols + j)] + 0.5);
     }
     const std::vector<long> columns = dlib::max_cost_assignment(savings);
     for (long i = 0; i < rows; ++i) {
@@ -87,7 +91,8 @@ void dlib_max_cost(benchmark::State& state) {
 
 void sizes(benchmark::internal::Benchmark* b) {
   for (const int kind : {0, 1}) {
-    for (const auto& [rows, cols] : {std::pair<int, int>{5, 5}, {5, 8}, {10, 10}, {10, 15}, {50, 50}, {50, 80}, {200, 200}, {200, 300}})
+    for (const auto& [rows, cols] :
+         {std::pair<int, int>{5, 5}, {5, 8}, {10, 10}, {10, 15}, {50, 50}, {50, 80}, {200, 200}, {200, 300}})
       b->Args({rows, cols, kind});
   }
   b->ArgNames({"rows", "cols", "uniform"});

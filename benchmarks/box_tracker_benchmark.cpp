@@ -1,6 +1,7 @@
-// One box predicted and updated, and whole tracker frames. Peers: cv::KalmanFilter and dlib's kalman_filter with the 8-state
-// constant-velocity model of SORT-like trackers on 4 measured numbers (linear: they have no EKF), and our own dense EKF, which computes
-// the same as the split filter. Quality: `rms_px` is the error of the filtered left edge against the noise-free one.
+// One box predicted and updated, and whole tracker frames. Peers: cv::KalmanFilter and dlib's kalman_filter with the
+// 8-state constant-velocity model of SORT-like trackers on 4 measured numbers (linear: they have no EKF), and our own
+// dense EKF, which computes the same as the split filter. Quality: `rms_px` is the error of the filtered left edge
+// against the noise-free one.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -28,8 +29,8 @@ struct Walk {
   explicit Walk(std::uint64_t seed) {
     cfp::Random random(seed, "tracker benchmark");
     for (int k = 0; k < 256; ++k) {
-      const double t = k * dt, w = 80 + 6 * std::sin(t), h = 240 + 12 * std::sin(0.7 * t), u = 300 + 120 * std::sin(0.8 * t),
-                   v = 240 + 10 * std::cos(t);
+      const double t = k * dt, w = 80 + 6 * std::sin(t), h = 240 + 12 * std::sin(0.7 * t),
+                   u = 300 + 120 * std::sin(0.8 * t), v = 240 + 10 * std::cos(t);
       truth.push_back({u - w / 2, v - h / 2, u + w / 2, v + h / 2});
       const auto& b = truth.back();
       const auto noisy = [&](double edge, double size) { return edge + 0.04 * size * random.normal(); };
@@ -88,7 +89,8 @@ void cfp_dense_ekf(benchmark::State& state) {
     const Scalar sx = Scalar(0.0016) * w * w, sy = Scalar(0.0016) * h * h;
     const Eigen::Matrix<Scalar, 4, 4> R = Eigen::Matrix<Scalar, 4, 1>(sx, sx, sy, sy).asDiagonal();
     const Eigen::Matrix<Scalar, 4, 1> z{Scalar(b.x1), Scalar(b.x2), Scalar(b.y1), Scalar(b.y2)};
-    cfp::ekf_update(ekf, z, [](const Vector8& m, Eigen::Matrix<Scalar, 4, 8>& H) { return cfp::box_edges(m, H); }, R);
+    cfp::ekf_update(
+        ekf, z, [](const Vector8& m, Eigen::Matrix<Scalar, 4, 8>& H) { return cfp::box_edges(m, H); }, R);
     return static_cast<double>(ekf.mean[0] - std::exp(ekf.mean[2]) / 2);
   });
 }
@@ -132,8 +134,8 @@ void dlib_kalman_8x4(benchmark::State& state) {
 }
 #endif
 
-/// A whole frame: predict, associate, update, output. Boxes on a grid move to and fro; 10 % of the detections are missed.
-/// `percentiles`: times every call by itself, which adds two readings of the clock to each.
+/// A whole frame: predict, associate, update, output. Boxes on a grid move to and fro; 10 % of the detections are
+/// missed. `percentiles`: times every call by itself, which adds two readings of the clock to each.
 template <typename Scalar, bool percentiles = false>
 void cfp_frame(benchmark::State& state) {
   const int n = static_cast<int>(state.range(0));
@@ -141,10 +143,12 @@ void cfp_frame(benchmark::State& state) {
   std::vector<std::vector<cfp::Detection<Scalar>>> frames(256);
   for (std::size_t k = 0; k < frames.size(); ++k) {
     for (int i = 0; i < n; ++i) {
-      const double x = 20 + 580.0 / n * i + 30 * std::sin(2 * 3.14159265 * static_cast<double>(k) / 256 * (1 + i % 3) + i),
+      const double x = 20 + 580.0 / n * i +
+                       30 * std::sin(2 * 3.14159265 * static_cast<double>(k) / 256 * (1 + i % 3) + i),
                    y = 100 + 40 * (i % 4);
       const auto noisy = [&](double edge) { return Scalar(edge + random.normal()); };
-      if (random.uniform() > 0.1) frames[k].push_back({{noisy(x), noisy(y), noisy(x + 70), noisy(y + 200)}, 0, Scalar(1)});
+      if (random.uniform() > 0.1)
+        frames[k].push_back({{noisy(x), noisy(y), noisy(x + 70), noisy(y + 200)}, 0, Scalar(1)});
     }
   }
   cfp::BoxTrackerOptions options;

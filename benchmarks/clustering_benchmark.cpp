@@ -1,6 +1,7 @@
-// 1-D DBSCAN and depth foreground beside what one would use otherwise. Inputs rotate over up to 64 boxes: repeated on one input, the
-// branch predictor learns the sort and every figure is wrong. `clusters` and `noise` (means over the boxes) show that all methods
-// give the same answer. scikit-learn: benchmarks/peers/sklearn_dbscan.py, on the same distribution of depths.
+// 1-D DBSCAN and depth foreground beside what one would use otherwise. Inputs rotate over up to 64 boxes: repeated on
+// one input, the branch predictor learns the sort and every figure is wrong. `clusters` and `noise` (means over the
+// boxes) show that all methods give the same answer. scikit-learn: benchmarks/peers/sklearn_dbscan.py, on the same
+// distribution of depths.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -24,7 +25,8 @@ constexpr std::size_t min_pts = 5;
 template <typename Scalar>
 std::vector<std::vector<Scalar>> make_boxes(std::size_t n) {
   cfp::Random random(1, "clustering benchmark");
-  std::vector<std::vector<Scalar>> out((std::min)(std::size_t(64), (std::max)(std::size_t(8), (std::size_t(1) << 16U) / n)));
+  std::vector<std::vector<Scalar>> out(
+      (std::min)(std::size_t(64), (std::max)(std::size_t(8), (std::size_t(1) << 16U) / n)));
   for (auto& box : out) {
     for (std::size_t i = 0; i < n; ++i) {
       const double kind = random.uniform();
@@ -67,7 +69,8 @@ Outcome flood(std::size_t n, const Neighbours& neighbours_of, std::vector<int>& 
     }
     ++clusters;
   }
-  return {static_cast<std::size_t>(clusters), static_cast<std::size_t>(std::count(labels.begin(), labels.end(), cfp::dbscan_noise))};
+  return {static_cast<std::size_t>(clusters),
+          static_cast<std::size_t>(std::count(labels.begin(), labels.end(), cfp::dbscan_noise))};
 }
 
 template <typename Scalar, typename Method>
@@ -127,7 +130,8 @@ struct Cloud {
 void nanoflann_dbscan(benchmark::State& state) {
   run<float>(state, [](const std::vector<float>& values, std::vector<int>& labels) {
     const Cloud cloud{&values};
-    const nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Cloud, float, std::uint32_t>, Cloud, 1, std::uint32_t>
+    const nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Cloud, float, std::uint32_t>, Cloud,
+                                              1, std::uint32_t>
         tree(1, cloud);
     std::vector<std::pair<std::uint32_t, float>> found;
     const nanoflann::SearchParams unsorted(32, 0.0F, false);
@@ -147,7 +151,9 @@ template <typename Scalar>
 void sort_ascending(benchmark::State& state) {
   cfp::AscendingWorkspace<Scalar> workspace;
   run<Scalar>(state, [&](const std::vector<Scalar>& values, std::vector<int>&) {
-    return Outcome{cfp::sort_ascending<Scalar>(values, workspace, [](Scalar value) { return cfp::is_finite(value); }).values.size(), 0};
+    return Outcome{cfp::sort_ascending<Scalar>(values, workspace, [](Scalar value) { return cfp::is_finite(value); })
+                       .values.size(),
+                   0};
   });
 }
 

@@ -1,10 +1,11 @@
-// Prints, as JSON, what a benchmark's figures depend on: compiler, flags, instruction set, versions of Eigen and of the peers.
+// Prints, as JSON, what a benchmark's figures depend on: compiler, flags, instruction set, versions of Eigen and of the
+// peers.
 #include <cstdio>
 
 #include <benchmark/benchmark.h>
 #include <Eigen/Core>
 
-#include "cfp/core/packet.hpp"
+#include "cfp/simd/packet.hpp"
 #include "cfp/version.hpp"
 
 #ifdef CFP_HAVE_BOOST
@@ -31,9 +32,11 @@ int main() {
 #else
   std::printf("{\"compiler\": \"other\", ");
 #endif
-  std::printf("\"flags\": \"%s\", \"instruction set\": \"%s, %d floats and %d doubles at once\", \"cfp\": \"%s\", \"Eigen\": \"%d.%d.%d\"",
-              CFP_BENCHMARK_FLAGS, Eigen::SimdInstructionSetsInUse(), cfp::native_lanes<float>, cfp::native_lanes<double>,
-              CFP_VERSION_STRING, EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION);
+  std::printf(
+      "\"flags\": \"%s\", \"instruction set\": \"%s, %d floats and %d doubles at once\", \"cfp\": \"%s\", \"Eigen\": "
+      "\"%d.%d.%d\"",
+      CFP_BENCHMARK_FLAGS, Eigen::SimdInstructionSetsInUse(), cfp::native_lanes<float>, cfp::native_lanes<double>,
+      CFP_VERSION_STRING, EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION);
 #ifdef CFP_HAVE_BOOST
   std::printf(", \"Boost\": \"%d.%d\"", BOOST_VERSION / 100000, BOOST_VERSION / 100 % 1000);
 #endif

@@ -1,6 +1,7 @@
-// What runs once per frame, as a whole, with the spread of single calls: the first and second stage on a frame of about 1000
-// keypoints, 3 boxes of people and 500 optical-flow pairs (images and the optical flow itself excluded), with the fundamental matrix
-// estimated and given. 16 frames rotate. Quality: `auc` of K after both stages for static against moving keypoints inside boxes.
+// What runs once per frame, as a whole, with the spread of single calls: the first and second stage on a frame of about
+// 1000 keypoints, 3 boxes of people and 500 optical-flow pairs (images and the optical flow itself excluded), with the
+// fundamental matrix estimated and given. 16 frames rotate. Quality: `auc` of K after both stages for static against
+// moving keypoints inside boxes.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -37,7 +38,8 @@ struct Frame {
   }
   void first_stage(const cfp::FirstStageOptions& options, bool F_given) {
     const auto& s = run.scene;
-    const cfp::FirstStageInput<Scalar> in{s.keypoints, s.depths, run.boxes, flow_previous, flow_current, F_given ? &F : nullptr};
+    const cfp::FirstStageInput<Scalar> in{s.keypoints,   s.depths,     run.boxes,
+                                          flow_previous, flow_current, F_given ? &F : nullptr};
     cfp::first_stage(in, s.camera, {run.k, run.label, run.ruling_box, run.objects}, options, run.work);
   }
   void second_stage(const cfp::SecondStageOptions& options) {
@@ -88,15 +90,17 @@ void frame(benchmark::State& state) {
     if (stages != Stages::first) f.second_stage(second_options);
     keypoints += static_cast<double>(f.run.k.size()) / frames;
     for (std::size_t i = 0; i < f.run.k.size(); ++i) {
-      if (f.run.label[i] != cfp::KeypointLabel::foreground && f.run.label[i] != cfp::KeypointLabel::background) continue;
+      if (f.run.label[i] != cfp::KeypointLabel::foreground && f.run.label[i] != cfp::KeypointLabel::background)
+        continue;
       k.push_back(static_cast<double>(f.run.k[i]));
       is_static.push_back(f.run.scene.is_static[i]);
     }
   }
   state.counters["keypoints"] = keypoints;
   cfp::CalibrationWorkspace workspace;
-  state.counters["auc"] =
-      cfp::area_under_curve(cfp::span<const double>(k), cfp::span<const char>(is_static), cfp::span<const double>(), workspace).auc;
+  state.counters["auc"] = cfp::area_under_curve(cfp::span<const double>(k), cfp::span<const char>(is_static),
+                                                cfp::span<const double>(), workspace)
+                              .auc;
 }
 
 }  // namespace

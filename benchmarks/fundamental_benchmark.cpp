@@ -1,7 +1,8 @@
-// Robust fundamental matrix: time beside accuracy, cfp and OpenCV interleaved over rotating problems. Motion 10 cm / 2 degrees,
-// 0.5 px noise on both images, mismatches 3 to 40 px off, threshold 1 px, confidence 0.99, at most 1000 iterations.
-// Accuracy: the median Sampson distance of the exact true pairs under the estimate; its median and worst over the problems, of which
-// there are many because the worst of few is chance. Arguments: [problems, default 600] [repetitions, default 1].
+// Robust fundamental matrix: time beside accuracy, cfp and OpenCV interleaved over rotating problems. Motion 10 cm / 2
+// degrees, 0.5 px noise on both images, mismatches 3 to 40 px off, threshold 1 px, confidence 0.99, at most 1000
+// iterations. Accuracy: the median Sampson distance of the exact true pairs under the estimate; its median and worst
+// over the problems, of which there are many because the worst of few is chance. Arguments: [problems, default 600]
+// [repetitions, default 1].
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -12,9 +13,9 @@
 #include <utility>
 #include <vector>
 
+#include "cfp/robust/fundamental_ransac.hpp"
 #include "support/interleaved.hpp"
 #include "support/two_view_scene.hpp"
-#include "cfp/geometry/fundamental_ransac.hpp"
 
 #ifdef CFP_HAVE_OPENCV
 #include <opencv2/calib3d.hpp>
@@ -92,8 +93,8 @@ Scene read_labelled(const std::string& file) {
   return scene;
 }
 
-/// Real matches in 20 random orders each. Accuracy: the median Sampson distance of the pairs labelled as matches, which holds their
-/// own noise, too.
+/// Real matches in 20 random orders each. Accuracy: the median Sampson distance of the pairs labelled as matches, which
+/// holds their own noise, too.
 void real_data(int repetitions) {
   const char* root = std::getenv("CFP_TEST_DATA");
   const std::string folder = std::string(root != nullptr ? root : CFP_DATA_DEFAULT) + "/two_view/";
@@ -108,25 +109,29 @@ void real_data(int repetitions) {
     for (Scene& scene : orders) {
       for (std::size_t i = scene.prev.size(); i-- > 1;) {
         const std::size_t j = random.index(static_cast<std::uint32_t>(i + 1));
-        std::swap(scene.prev[i], scene.prev[j]), std::swap(scene.cur[i], scene.cur[j]), std::swap(scene.is_inlier[i], scene.is_inlier[j]);
+        std::swap(scene.prev[i], scene.prev[j]), std::swap(scene.cur[i], scene.cur[j]),
+            std::swap(scene.is_inlier[i], scene.is_inlier[j]);
       }
     }
     std::vector<Method> methods = all_methods();
     std::vector<std::vector<double>> errors_px(methods.size());
-    cfp_benchmark::run_interleaved(orders, repetitions, methods, [&](std::size_t m, const Scene& scene, const cfp::Matrix3<double>& F) {
-      std::vector<double> distances;
-      for (std::size_t i = 0; i < scene.prev.size(); ++i) {
-        if (scene.is_inlier[i] == 0) continue;
-        const cfp::Vector2<double> a(scene.prev[i][0], scene.prev[i][1]), b(scene.cur[i][0], scene.cur[i][1]);
-        const double d = cfp::sampson_distance<double>(F, a, b);
-        distances.push_back(d >= 0 && d < 1e3 ? d : 1e3);  // no F
-      }
-      errors_px[m].push_back(cfp_benchmark::median(distances));
-    });
+    cfp_benchmark::run_interleaved(
+        orders, repetitions, methods, [&](std::size_t m, const Scene& scene, const cfp::Matrix3<double>& F) {
+          std::vector<double> distances;
+          for (std::size_t i = 0; i < scene.prev.size(); ++i) {
+            if (scene.is_inlier[i] == 0) continue;
+            const cfp::Vector2<double> a(scene.prev[i][0], scene.prev[i][1]), b(scene.cur[i][0], scene.cur[i][1]);
+            const double d = cfp::sampson_distance<double>(F, a, b);
+            distances.push_back(d >= 0 && d < 1e3 ? d : 1e3);  // no F
+          }
+          errors_px[m].push_back(cfp_benchmark::median(distances));
+        });
     for (std::size_t m = 0; m < methods.size(); ++m) {
-      const double share = 100.0 * static_cast<double>(std::count(whole.is_inlier.begin(), whole.is_inlier.end(), 0)) / static_cast<double>(whole.prev.size());
-      std::printf("%-22s %-10s %5zu %3.0f%% %10.4f %10.4f %10.1f\n", methods[m].name.c_str(), name, whole.prev.size(), share,
-                  cfp_benchmark::median(errors_px[m]), cfp_benchmark::largest(errors_px[m]), cfp_benchmark::median(methods[m].times_us));
+      const double share = 100.0 * static_cast<double>(std::count(whole.is_inlier.begin(), whole.is_inlier.end(), 0)) /
+                           static_cast<double>(whole.prev.size());
+      std::printf("%-22s %-10s %5zu %3.0f%% %10.4f %10.4f %10.1f\n", methods[m].name.c_str(), name, whole.prev.size(),
+                  share, cfp_benchmark::median(errors_px[m]), cfp_benchmark::largest(errors_px[m]),
+                  cfp_benchmark::median(methods[m].times_us));
     }
   }
 }
@@ -151,15 +156,18 @@ int main(int argc, char* argv[]) {
       for (int i = 0; i < problems; ++i) scenes.push_back(cfp_test::make_two_view_scene<double>(random, options));
       std::vector<Method> methods = all_methods();
       std::vector<std::vector<double>> errors_px(methods.size());
-      cfp_benchmark::run_interleaved(scenes, repetitions, methods, [&](std::size_t m, const Scene& scene, const cfp::Matrix3<double>& F) {
-        const double error = cfp_test::median_sampson_of_truth<double>(scene, F);
-        errors_px[m].push_back(error >= 0 ? error : 1e3);  // no F
-      });
+      cfp_benchmark::run_interleaved(scenes, repetitions, methods,
+                                     [&](std::size_t m, const Scene& scene, const cfp::Matrix3<double>& F) {
+                                       const double error = cfp_test::median_sampson_of_truth<double>(scene, F);
+                                       errors_px[m].push_back(error >= 0 ? error : 1e3);  // no F
+                                     });
       for (std::size_t m = 0; m < methods.size(); ++m) {
         const Method& method = methods[m];
-        const double mean_iterations = std::accumulate(method.iterations.begin(), method.iterations.end(), 0.0) / problems;
-        std::printf("%-22s %5zu %3.0f%% %10.4f %10.4f %10.1f %6.0f\n", method.name.c_str(), pairs, 100 * outliers, cfp_benchmark::median(errors_px[m]),
-                    cfp_benchmark::largest(errors_px[m]), cfp_benchmark::median(method.times_us), mean_iterations);
+        const double mean_iterations =
+            std::accumulate(method.iterations.begin(), method.iterations.end(), 0.0) / problems;
+        std::printf("%-22s %5zu %3.0f%% %10.4f %10.4f %10.1f %6.0f\n", method.name.c_str(), pairs, 100 * outliers,
+                    cfp_benchmark::median(errors_px[m]), cfp_benchmark::largest(errors_px[m]),
+                    cfp_benchmark::median(method.times_us), mean_iterations);
       }
     }
   }

@@ -1,5 +1,5 @@
-// The distances of 1000 keypoints, one array per call, and the distorted camera. Every iteration takes another of 16 inputs. Time
-// per keypoint is 1/items. All of stage 2's formulas together: static_probability_benchmark.
+// The distances of 1000 keypoints, one array per call, and the distorted camera. Every iteration takes another of 16
+// inputs. Time per keypoint is 1/items. All of stage 2's formulas together: static_probability_benchmark.
 #include <benchmark/benchmark.h>
 
 #include <vector>

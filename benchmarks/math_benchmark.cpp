@@ -1,7 +1,7 @@
-// Chi-squared against Boost.Math, order statistics against std::nth_element and std::sort, the logistic of an array against
-// the scalar loop. Every iteration takes another of at least 16 inputs
-// with 2^17 values together: fewer, and the branch predictor learns nth_element's way through them. The counter `difference` is the largest
-// relative deviation from Boost.Math (chi-squared), or the absolute one from the scalar function (logistic).
+// Chi-squared against Boost.Math, order statistics against std::nth_element and std::sort, the logistic of an array
+// against the scalar loop. Every iteration takes another of at least 16 inputs with 2^17 values together: fewer, and
+// the branch predictor learns nth_element's way through them. The counter `difference` is the largest relative
+// deviation from Boost.Math (chi-squared), or the absolute one from the scalar function (logistic).
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -26,7 +26,8 @@ using cfp::span;
 template <typename Scalar>
 std::vector<std::vector<Scalar>> residuals(std::size_t n) {
   cfp::Random random(1, "residuals");
-  std::vector<std::vector<Scalar>> all((std::max)(std::size_t(16), (std::size_t(1) << 17U) / n), std::vector<Scalar>(n));
+  std::vector<std::vector<Scalar>> all((std::max)(std::size_t(16), (std::size_t(1) << 17U) / n),
+                                       std::vector<Scalar>(n));
   for (std::vector<Scalar>& values : all) {
     for (Scalar& value : values) {
       const double z = random.normal();
@@ -112,7 +113,8 @@ void BM_logistic_array(benchmark::State& state) {
   double difference = 0;
   cfp::logistic(span<const Scalar>(inputs[0]), span<Scalar>(out));
   for (std::size_t i = 0; i < out.size(); ++i) {
-    difference = std::fmax(difference, std::abs(static_cast<double>(out[i]) - cfp::logistic(static_cast<double>(inputs[0][i]))));
+    difference =
+        std::fmax(difference, std::abs(static_cast<double>(out[i]) - cfp::logistic(static_cast<double>(inputs[0][i]))));
   }
   state.counters["difference"] = difference;
 }
@@ -171,8 +173,8 @@ void BM_three_quantiles(benchmark::State& state) {
     } else {
       auto end = scratch.end();
       for (int i = 2; i >= 0; --i) {
-        const auto position =
-            scratch.begin() + static_cast<std::ptrdiff_t>(cfp::quantile_rank(quantiles[static_cast<std::size_t>(i)], n) - 1);
+        const auto position = scratch.begin() + static_cast<std::ptrdiff_t>(
+                                                    cfp::quantile_rank(quantiles[static_cast<std::size_t>(i)], n) - 1);
         std::nth_element(scratch.begin(), position, end);
         end = position;
         benchmark::DoNotOptimize(*position);

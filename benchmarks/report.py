@@ -13,7 +13,7 @@ BUILDS = ("base", "native")
 TITLES = {
     "static_probability": "Formulas of both stages", "frame": "Both stages for a frame", "clustering": "Depth clustering", "box_tracker": "Box tracker",
     "assignment": "Assignment", "math": "Chi-squared, order statistics, logistic", "geometry": "Distances", "fundamental": "Fundamental matrix",
-    "pnp_ransac": "Pose without a start", "weighted_pnp": "Pose refinement", "weighted_ba": "Bundle adjustment"}
+    "pnp_ransac": "Pose without a start", "pose_refinement": "Pose refinement", "bundle_adjustment": "Bundle adjustment"}
 
 # Ours against a peer of the same module and process: (module, ours, peer, what for; {} stands for the arguments).
 BOXES, UNIFORM = "uniform:0", "uniform:1"
@@ -55,11 +55,11 @@ SWEEPS = [
 # The tables that some programs print themselves: (module, section, ours, peer, what for). A row's first number is its time.
 PNP = [(n, out) for n in (300, 1000) for out in (10, 30)]
 TEXT_RATIOS = (
-    [("weighted_pnp", f"pixel only, N = {n}, {out} %", "cfp double, ORB-SLAM2 schedule", "Ceres, ORB-SLAM2 schedule, QR", f"pose, N = {n}, {out} % outliers, ORB-SLAM2's schedule: Ceres")
+    [("pose_refinement", f"pixel only, N = {n}, {out} %", "cfp double, ORB-SLAM2 schedule", "Ceres, ORB-SLAM2 schedule, QR", f"pose, N = {n}, {out} % outliers, ORB-SLAM2's schedule: Ceres")
      for n, out in PNP]
-    + [("weighted_pnp", f"pixel only, N = {n}, {out} %", "cfp double, default", "Ceres, ORB-SLAM2 schedule, QR", f"pose, N = {n}, {out} % outliers, default: Ceres with ORB-SLAM2's schedule")
+    + [("pose_refinement", f"pixel only, N = {n}, {out} %", "cfp double, default", "Ceres, ORB-SLAM2 schedule, QR", f"pose, N = {n}, {out} % outliers, default: Ceres with ORB-SLAM2's schedule")
        for n, out in PNP]
-    + [("weighted_ba", f"Local bundle adjustment, {p} poses (2 fixed) x {x}", "cfp, one thread", "Ceres DENSE_SCHUR, threads: 1", f"bundle adjustment, {p} poses, {x} points: Ceres DENSE_SCHUR")
+    + [("bundle_adjustment", f"Local bundle adjustment, {p} poses (2 fixed) x {x}", "cfp, one thread", "Ceres DENSE_SCHUR, threads: 1", f"bundle adjustment, {p} poses, {x} points: Ceres DENSE_SCHUR")
        for p, x in ((10, 1000), (20, 3000))]
     + [("fundamental", f"{n} {out}%", "cfp", peer, f"F, {n} pairs, {out} % outliers: {peer}") for n in (500, 1000) for out in (20, 40)
        for peer in ("cv USAC_MAGSAC", "cv FM_RANSAC 0.1 px")]
@@ -99,7 +99,7 @@ PAPER = [
      "500 pairs, 3 boxes, F's RANSAC, foreground included; corners and optical flow, most of the paper's time, excluded"),
     ("DBSCAN: clustering of the keypoints in boxes", 1.76, [(3, "clustering", "foreground/density/200")], "3 boxes of 200 keypoints, adaptive eps included"),
     ("KSP: static probability of keypoints", 3.66, [(1, "frame", "frame<float, Stages::second, true>")], "1000 keypoints, map points and weights included"),
-    ("two pose optimisations", "part of Tracking, 42.7", [(2, "weighted_pnp", "cfp double, default", "pixel only, N = 1000, 10 %")], "1000 points, 10 % outliers"),
+    ("two pose optimisations", "part of Tracking, 42.7", [(2, "pose_refinement", "cfp double, default", "pixel only, N = 1000, 10 %")], "1000 points, 10 % outliers"),
 ]
 
 

@@ -1,11 +1,12 @@
-// The formulas of both stages on arrays, beside the code that one would write first. Every iteration takes another input of at
-// least 2^14 matches together, so that the branch predictor cannot learn the data.
+// The formulas of both stages on arrays, beside the code that one would write first. Every iteration takes another
+// input of at least 2^14 matches together, so that the branch predictor cannot learn the data.
 //
-// stage_two: d^T, d^F, and for each D_Th (0.8 order statistic), d_min, C_c and the sigmoid; with `combined` also the combination of
-// both with C_s for every keypoint, by the scalar function (the pipeline does that for keypoints in boxes only). The peer is scalar
-// double with std::sort. `difference` is the largest deviation of K^T, K^F and K from the peer's over all inputs.
-// object_score: d^F of the pairs of one object under a given F, scores, O; the peer is scalar double, Boost.Math's density for the
-// score (the equation as printed) and std::sort. `O` is the mean over the inputs. The scores alone: math_benchmark.
+// stage_two: d^T, d^F, and for each D_Th (0.8 order statistic), d_min, C_c and the sigmoid; with `combined` also the
+// combination of both with C_s for every keypoint, by the scalar function (the pipeline does that for keypoints in
+// boxes only). The peer is scalar double with std::sort. `difference` is the largest deviation of K^T, K^F and K from
+// the peer's over all inputs. object_score: d^F of the pairs of one object under a given F, scores, O; the peer is
+// scalar double, Boost.Math's density for the score (the equation as printed) and std::sort. `O` is the mean over the
+// inputs. The scores alone: math_benchmark.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -16,9 +17,9 @@
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/reprojection.hpp"
 #include "cfp/probability/confidence.hpp"
-#include "cfp/probability/constraint.hpp"
-#include "cfp/probability/fusion.hpp"
+#include "cfp/probability/distance_sigmoid.hpp"
 #include "cfp/probability/object.hpp"
+#include "cfp/probability/second_stage_probability.hpp"
 
 #ifdef CFP_HAVE_BOOST
 #include <boost/math/distributions/chi_squared.hpp>
@@ -77,7 +78,8 @@ struct Buffers {
 };
 
 template <bool combined, typename Scalar>
-void stage_two(const Matches<Scalar>& in, const cfp::SE3<Scalar>& T, const cfp::Matrix3<Scalar>& F, Buffers<Scalar>& b) {
+void stage_two(const Matches<Scalar>& in, const cfp::SE3<Scalar>& T, const cfp::Matrix3<Scalar>& F,
+               Buffers<Scalar>& b) {
   const cfp::ConstraintOptions options;
   cfp::reprojection_distances(camera_as<Scalar>(), T, in.prev, in.depth, in.cur, b.projection);
   cfp::epipolar_distances(F, in.prev, in.cur, b.epipolar);
@@ -95,7 +97,8 @@ void stage_two(const Matches<Scalar>& in, const cfp::SE3<Scalar>& T, const cfp::
 }
 
 /// D_Th, d_min, C_c by sorting, then the sigmoid of every distance.
-double sorted_sigmoid(const std::vector<double>& distance, std::vector<double>& scratch, std::vector<double>& probability) {
+double sorted_sigmoid(const std::vector<double>& distance, std::vector<double>& scratch,
+                      std::vector<double>& probability) {
   scratch = distance;
   std::sort(scratch.begin(), scratch.end());
   const double minimum = scratch.front(), threshold = scratch[cfp::quantile_rank(0.8, scratch.size()) - 1];
@@ -110,13 +113,15 @@ double sorted_sigmoid(const std::vector<double>& distance, std::vector<double>& 
 }
 
 template <bool combined>
-void stage_two_first_thought(const Matches<double>& in, const cfp::SE3<double>& T, const cfp::Matrix3<double>& F, Buffers<double>& b) {
+void stage_two_first_thought(const Matches<double>& in, const cfp::SE3<double>& T, const cfp::Matrix3<double>& F,
+                             Buffers<double>& b) {
   for (std::size_t i = 0; i < in.prev.size(); ++i) {
     const cfp::Vector3<double> p((in.prev[i].x() - camera.cx) / camera.fx * in.depth[i],
                                  (in.prev[i].y() - camera.cy) / camera.fy * in.depth[i], in.depth[i]);
     const cfp::Vector3<double> q = T.rotation * p + T.translation;
     b.projection[i] =
-        (cfp::Vector2<double>(camera.fx * q.x() / q.z() + camera.cx, camera.fy * q.y() / q.z() + camera.cy) - in.cur[i]).norm();
+        (cfp::Vector2<double>(camera.fx * q.x() / q.z() + camera.cx, camera.fy * q.y() / q.z() + camera.cy) - in.cur[i])
+            .norm();
     const cfp::Vector3<double> line = F * in.prev[i].homogeneous();
     b.epipolar[i] = std::abs(line.dot(in.cur[i].homogeneous())) / line.head<2>().norm();
   }
@@ -137,8 +142,10 @@ void stage_two_cfp(benchmark::State& state) {
   Buffers<Scalar> buffers(n);
   std::size_t turn = 0;
   for (auto _ : state) {
-    stage_two<combined>(inputs[turn++ % inputs.size()], T.cast<Scalar>(), cfp::Matrix3<Scalar>(F.cast<Scalar>()), buffers);
-    for (const auto* out : {&buffers.k_projection, &buffers.k_epipolar, &buffers.k}) benchmark::DoNotOptimize(out->data());
+    stage_two<combined>(inputs[turn++ % inputs.size()], T.cast<Scalar>(), cfp::Matrix3<Scalar>(F.cast<Scalar>()),
+                        buffers);
+    for (const auto* out : {&buffers.k_projection, &buffers.k_epipolar, &buffers.k})
+      benchmark::DoNotOptimize(out->data());
     benchmark::ClobberMemory();
   }
   const std::vector<Matches<double>> truth_inputs = make_matches<double>(n);
@@ -148,7 +155,8 @@ void stage_two_cfp(benchmark::State& state) {
     stage_two<combined>(inputs[f], T.cast<Scalar>(), cfp::Matrix3<Scalar>(F.cast<Scalar>()), buffers);
     stage_two_first_thought<combined>(truth_inputs[f], T, F, truth);
     for (std::size_t i = 0; i < n; ++i) {
-      difference = std::fmax(difference, std::abs(static_cast<double>(buffers.k_projection[i]) - truth.k_projection[i]));
+      difference =
+          std::fmax(difference, std::abs(static_cast<double>(buffers.k_projection[i]) - truth.k_projection[i]));
       difference = std::fmax(difference, std::abs(static_cast<double>(buffers.k_epipolar[i]) - truth.k_epipolar[i]));
       difference = std::fmax(difference, std::abs(static_cast<double>(buffers.k[i]) - truth.k[i]));
     }
@@ -167,7 +175,8 @@ void stage_two_scalar_sort(benchmark::State& state) {
   std::size_t turn = 0;
   for (auto _ : state) {
     stage_two_first_thought<combined>(inputs[turn++ % inputs.size()], T, F, buffers);
-    for (const auto* out : {&buffers.k_projection, &buffers.k_epipolar, &buffers.k}) benchmark::DoNotOptimize(out->data());
+    for (const auto* out : {&buffers.k_projection, &buffers.k_epipolar, &buffers.k})
+      benchmark::DoNotOptimize(out->data());
     benchmark::ClobberMemory();
   }
   state.SetItemsProcessed(state.iterations() * state.range(0));

@@ -1,13 +1,15 @@
-// Which keypoints in a person's box are on the person? Red: foreground, green: background, grey: no depth, as in the paper's figure.
+// Which keypoints in a person's box are on the person? Red: foreground, green: background, grey: no depth, as in the
+// paper's figure.
 //
 //   02_depth_foreground image RGB.png DEPTH.png UNITS_PER_METRE OUT.png X1 Y1 X2 Y2 [X1 Y1 X2 Y2 ...]
 //   02_depth_foreground sequence TUM_FOLDER OUT_FOLDER [UNITS_PER_METRE = 5000]
 //
 // For instance, with the frame of five people (1000 units per metre) and its boxes:
-//   ... image rgb.png depth_mm.png 1000 out.png 15 62 155 480 143 95 245 480 276 103 384 442 362 103 470 462 460 50 606 480
+//   ... image rgb.png depth_mm.png 1000 out.png 15 62 155 480 143 95 245 480 276 103 384 442 362 103 470 462 460 50 606
+//   480
 //
-// A TUM folder has rgb.txt, depth.txt (timestamp filename) and detections.txt (timestamp class score x1 y1 x2 y2). One picture is
-// written per frame, and a contact sheet of nine.
+// A TUM folder has rgb.txt, depth.txt (timestamp filename) and detections.txt (timestamp class score x1 y1 x2 y2). One
+// picture is written per frame, and a contact sheet of nine.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -44,7 +46,8 @@ cv::Mat annotate(const cv::Mat& rgb, const cv::Mat& depth, double units_per_metr
     for (const cv::KeyPoint& keypoint : keypoints) {
       if (!cfp::contains(box, keypoint.pt.x, keypoint.pt.y)) continue;
       points.push_back(keypoint.pt);
-      depths.push_back(static_cast<float>(depth.at<std::uint16_t>(cvRound(keypoint.pt.y), cvRound(keypoint.pt.x)) / units_per_metre));
+      depths.push_back(static_cast<float>(depth.at<std::uint16_t>(cvRound(keypoint.pt.y), cvRound(keypoint.pt.x)) /
+                                          units_per_metre));
     }
     std::vector<char> foreground(depths.size());
     const cfp::ForegroundResult result = cfp::depth_foreground<float>(depths, {}, workspace, foreground);
@@ -57,23 +60,26 @@ cv::Mat annotate(const cv::Mat& rgb, const cv::Mat& depth, double units_per_metr
     char text[160];
     std::snprintf(text, sizeof text, "%.2f-%.2f m", result.near_m, result.far_m);
     cv::rectangle(picture, cv::Point2f(box.x1, box.y1), cv::Point2f(box.x2, box.y2), cv::Scalar(255, 160, 0), 1);
-    cv::putText(picture, text, cv::Point2f(box.x1 + 2, box.y1 + 12), cv::FONT_HERSHEY_SIMPLEX, 0.4, cv::Scalar(255, 255, 255), 1,
-                cv::LINE_AA);
+    cv::putText(picture, text, cv::Point2f(box.x1 + 2, box.y1 + 12), cv::FONT_HERSHEY_SIMPLEX, 0.4,
+                cv::Scalar(255, 255, 255), 1, cv::LINE_AA);
     std::printf(
-        "box %.0f %.0f %.0f %.0f: %s, foreground %zu (%.2f to %.2f m), background %zu, without depth %zu, eps %.3f m, min_pts %zu\n",
-        static_cast<double>(box.x1), static_cast<double>(box.y1), static_cast<double>(box.x2), static_cast<double>(box.y2),
-        to_string(result.status), result.foreground, result.near_m, result.far_m, result.background, result.invalid, result.dbscan.eps,
-        result.dbscan.min_pts);
+        "box %.0f %.0f %.0f %.0f: %s, foreground %zu (%.2f to %.2f m), background %zu, without depth %zu, eps %.3f m, "
+        "min_pts %zu\n",
+        static_cast<double>(box.x1), static_cast<double>(box.y1), static_cast<double>(box.x2),
+        static_cast<double>(box.y2), to_string(result.status), result.foreground, result.near_m, result.far_m,
+        result.background, result.invalid, result.dbscan.eps, result.dbscan.min_pts);
   }
   return picture;
 }
 
 int run_sequence(const std::filesystem::path& folder, const std::filesystem::path& out, double units_per_metre) {
-  const auto images = cfp_examples::read_tum_list(folder / "rgb.txt"), depths = cfp_examples::read_tum_list(folder / "depth.txt");
+  const auto images = cfp_examples::read_tum_list(folder / "rgb.txt"),
+             depths = cfp_examples::read_tum_list(folder / "depth.txt");
   std::ifstream stream(folder / "detections.txt");
   const auto detected = cfp_examples::read_detections(stream, (folder / "detections.txt").string());
   if (!detected.error.empty()) throw std::runtime_error(detected.error);
-  if (images.empty() || depths.empty()) throw std::runtime_error(folder.string() + ": rgb.txt and depth.txt need at least one line each");
+  if (images.empty() || depths.empty())
+    throw std::runtime_error(folder.string() + ": rgb.txt and depth.txt need at least one line each");
   std::filesystem::create_directories(out);
   std::vector<cv::Mat> sheet;
   for (std::size_t i = 0; i < images.size(); ++i) {
@@ -92,7 +98,8 @@ int run_sequence(const std::filesystem::path& folder, const std::filesystem::pat
       if (std::abs(frame.timestamp - image.time_s) >= 0.005) continue;
       for (const auto& d : frame.detections) {
         if (detected.classes[static_cast<std::size_t>(d.class_id)] != "person") continue;
-        boxes.push_back({static_cast<float>(d.box.x1), static_cast<float>(d.box.y1), static_cast<float>(d.box.x2), static_cast<float>(d.box.y2)});
+        boxes.push_back({static_cast<float>(d.box.x1), static_cast<float>(d.box.y1), static_cast<float>(d.box.x2),
+                         static_cast<float>(d.box.y2)});
       }
     }
     std::printf("%s\n", image.file.c_str());
@@ -133,8 +140,8 @@ int main(int argc, char* argv[]) {
     }
     std::vector<Box> boxes;
     for (int i = 6; i + 3 < argc; i += 4) {
-      boxes.push_back({std::strtof(argv[i], nullptr), std::strtof(argv[i + 1], nullptr), std::strtof(argv[i + 2], nullptr),
-                       std::strtof(argv[i + 3], nullptr)});
+      boxes.push_back({std::strtof(argv[i], nullptr), std::strtof(argv[i + 1], nullptr),
+                       std::strtof(argv[i + 2], nullptr), std::strtof(argv[i + 3], nullptr)});
     }
     return cv::imwrite(argv[5], annotate(rgb, depth, std::atof(argv[4]), boxes)) ? 0 : 1;
   }

@@ -1,5 +1,5 @@
-// Missed-detection compensation: reads a detections file (format: support/detections_file.hpp) and prints, frame by frame, what the
-// detector saw and what it missed but the tracker knows.
+// Missed-detection compensation: reads a detections file (format: support/detections_file.hpp) and prints, frame by
+// frame, what the detector saw and what it missed but the tracker knows.
 //   cfp_example_03_missed_detections [detections.txt [image width] [image height]]
 #include <cstdio>
 #include <cstdlib>
@@ -54,9 +54,10 @@ int main(int argc, char** argv) {
     compensated += result.compensated;
     std::printf("frame %zu at %.3f s\n", k, frame.timestamp);
     for (const cfp::TrackedBox<double>& box : result.boxes) {
-      std::printf("  %-11s %s %d  [%.0f, %.0f] x [%.0f, %.0f]  age %d%s\n", box.compensated() ? "COMPENSATED" : "detected",
-                  file.classes[static_cast<std::size_t>(box.class_id)].c_str(), static_cast<int>(box.id), box.box.x1, box.box.x2,
-                  box.box.y1, box.box.y2, box.age, box.associated ? "" : "  (new: not in the frame before)");
+      std::printf(
+          "  %-11s %s %d  [%.0f, %.0f] x [%.0f, %.0f]  age %d%s\n", box.compensated() ? "COMPENSATED" : "detected",
+          file.classes[static_cast<std::size_t>(box.class_id)].c_str(), static_cast<int>(box.id), box.box.x1,
+          box.box.x2, box.box.y1, box.box.y2, box.age, box.associated ? "" : "  (new: not in the frame before)");
     }
   }
   std::printf("%zu frames, %zu boxes compensated\n", file.frames.size(), compensated);

@@ -1,16 +1,17 @@
-// A camera in a room where one person fills most of the view: the pose from all matches follows the person, the pose with
-// static probabilities as weights stays with the room.
+// A camera in a room where one person fills most of the view: the pose from all matches follows the person, the pose
+// with static probabilities as weights stays with the room.
 #include <array>
 #include <cstdio>
 #include <vector>
 
 #include "cfp/core/random.hpp"
-#include "cfp/optimization/weighted_pnp.hpp"
+#include "cfp/optimization/pose/pose_refinement.hpp"
 
 int main() {
   const cfp::PinholeCamera<double> camera{535.4, 539.2, 320.1, 247.6};
   const cfp::SE3<double> truth{cfp::so3_exp<double>({0.1, -0.4, 0.05}), {0.3, -0.1, 0.2}};
-  const cfp::SE3<double> start{cfp::so3_exp<double>({0.01, 0.01, -0.01}) * truth.rotation, truth.translation};  // from a motion model, say
+  const cfp::SE3<double> start{cfp::so3_exp<double>({0.01, 0.01, -0.01}) * truth.rotation,
+                               truth.translation};  // from a motion model, say
 
   // 400 map points and where they were matched; the first 240 are on the person, who took a step of 15 cm to the right.
   cfp::Random random(4, "scene");
@@ -27,22 +28,25 @@ int main() {
     if (on_person) p.x() += 0.15;
     if (!camera.project(p, pixel)) continue;
     points.push_back({static_cast<float>(X.x()), static_cast<float>(X.y()), static_cast<float>(X.z())});
-    pixels.push_back({static_cast<float>(pixel.x() + random.normal()), static_cast<float>(pixel.y() + random.normal())});
-    weights.push_back(static_cast<float>(on_person ? random.uniform(0, 0.02) : random.uniform(0.5, 1)));  // static probabilities
+    pixels.push_back(
+        {static_cast<float>(pixel.x() + random.normal()), static_cast<float>(pixel.y() + random.normal())});
+    weights.push_back(
+        static_cast<float>(on_person ? random.uniform(0, 0.02) : random.uniform(0.5, 1)));  // static probabilities
   }
 
   cfp::PoseObservations<float> observations;
   observations.points = points;
   observations.pixels = pixels;
-  cfp::WeightedPnPOptions options;
-  cfp::WeightedPnPWorkspace<double> workspace;  // double inside; <float> is twice as fast
+  cfp::PoseOptions options;
+  cfp::PoseWorkspace<double> workspace;  // double inside; <float> is twice as fast
   std::vector<char> inliers(points.size());
 
   for (const bool weighted : {false, true}) {
     observations.weights = weighted ? cfp::span<const float>(weights) : cfp::span<const float>();
-    const cfp::WeightedPnPResult result = cfp::refine_pose(observations, camera, start, options, workspace, inliers);
+    const cfp::PoseResult result = cfp::refine_pose(observations, camera, start, options, workspace, inliers);
     const double error_mm = 1e3 * (result.T_cam_world.inverse().translation - truth.inverse().translation).norm();
-    std::printf("%-8s camera centre off by %7.2f mm, %3d of %3d inliers, worth %5.1f observations, %d passes, %s\n", weighted ? "weighted" : "plain", error_mm,
-                result.inliers, result.used, result.effective, result.evaluations, cfp::to_string(result.reason));
+    std::printf("%-8s camera centre off by %7.2f mm, %3d of %3d inliers, worth %5.1f observations, %d passes, %s\n",
+                weighted ? "weighted" : "plain", error_mm, result.inliers, result.used, result.effective,
+                result.evaluations, cfp::to_string(result.reason));
   }
 }

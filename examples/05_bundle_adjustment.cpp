@@ -9,20 +9,22 @@
 #include <vector>
 
 #include "ba_files.hpp"
-#include "cfp/optimization/two_threads.hpp"
-#include "cfp/optimization/weighted_ba.hpp"
+#include "cfp/optimization/bundle/bundle_adjustment.hpp"
+#include "cfp/optimization/bundle/two_threads.hpp"
 
 namespace {
 
 struct Arguments {
   std::string file;
-  cfp::WeightedBaOptions options;
+  cfp::BundleOptions options;
   int threads = 1;
 };
 
 int usage(const char* program, const std::string& problem) {
-  std::fprintf(stderr, "%s: %s\nusage: %s <BAL text or libmv .bin> [--loss trivial|huber|cauchy] [--iterations N] [--threads 1|2]\n", program,
-               problem.c_str(), program);
+  std::fprintf(
+      stderr,
+      "%s: %s\nusage: %s <BAL text or libmv .bin> [--loss trivial|huber|cauchy] [--iterations N] [--threads 1|2]\n",
+      program, problem.c_str(), program);
   return 2;
 }
 
@@ -39,12 +41,18 @@ std::string parse(int argc, char** argv, Arguments& arguments) {
     }
     if (i + 1 == argc) return name + " needs a value";
     const std::string value = argv[++i];
-    if (name == "--loss" && value == "trivial") arguments.options.loss = cfp::LossType::trivial;
-    else if (name == "--loss" && value == "huber") arguments.options.loss = cfp::LossType::huber;
-    else if (name == "--loss" && value == "cauchy") arguments.options.loss = cfp::LossType::cauchy;
-    else if (name == "--threads" && (value == "1" || value == "2")) arguments.threads = value == "2" ? 2 : 1;
-    else if (name == "--iterations" && std::atoi(value.c_str()) > 0) arguments.options.levenberg_marquardt.max_iterations = std::atoi(value.c_str());
-    else return "cannot use " + name + " " + value;
+    if (name == "--loss" && value == "trivial")
+      arguments.options.loss = cfp::LossType::trivial;
+    else if (name == "--loss" && value == "huber")
+      arguments.options.loss = cfp::LossType::huber;
+    else if (name == "--loss" && value == "cauchy")
+      arguments.options.loss = cfp::LossType::cauchy;
+    else if (name == "--threads" && (value == "1" || value == "2"))
+      arguments.threads = value == "2" ? 2 : 1;
+    else if (name == "--iterations" && std::atoi(value.c_str()) > 0)
+      arguments.options.levenberg_marquardt.max_iterations = std::atoi(value.c_str());
+    else
+      return "cannot use " + name + " " + value;
   }
   return arguments.file.empty() ? "no file" : "";
 }
@@ -72,17 +80,18 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;
   }
-  std::printf("%s: %zu cameras, %zu points, %zu observations\n", arguments.file.c_str(), data.poses.size(), data.points.size(), data.pose.size());
+  std::printf("%s: %zu cameras, %zu points, %zu observations\n", arguments.file.c_str(), data.poses.size(),
+              data.points.size(), data.pose.size());
 
-  cfp::WeightedBaWorkspace workspace;
+  cfp::BundleWorkspace workspace;
   std::vector<double> squared_errors(data.pose.size());
-  cfp::WeightedBaOptions judge_only = arguments.options;
+  cfp::BundleOptions judge_only = arguments.options;
   judge_only.levenberg_marquardt.max_iterations = 0;
   cfp::adjust_bundle(data.view(), judge_only, workspace, cfp::SingleThread{}, squared_errors);
   const double before = rms(squared_errors);
 
   const auto start = std::chrono::steady_clock::now();
-  cfp::WeightedBaResult result;
+  cfp::BundleResult result;
   if (arguments.threads == 2) {
     cfp::TwoThreads two_threads;
     result = cfp::adjust_bundle(data.view(), arguments.options, workspace, two_threads, squared_errors);
@@ -91,8 +100,10 @@ int main(int argc, char** argv) {
   }
   const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - start;
 
-  std::printf("RMS   %.6f px -> %.6f px\ncost  %.6f -> %.6f\n", before, rms(squared_errors), result.initial_cost, result.final_cost);
-  std::printf("%d iterations (%d accepted), %s, %.2f ms\n", result.iterations, result.accepted, to_string(result.reason), time.count());
+  std::printf("RMS   %.6f px -> %.6f px\ncost  %.6f -> %.6f\n", before, rms(squared_errors), result.initial_cost,
+              result.final_cost);
+  std::printf("%d iterations (%d accepted), %s, %.2f ms\n", result.iterations, result.accepted,
+              to_string(result.reason), time.count());
   std::printf("observations: %zu used, %zu behind a camera, %zu invalid\n", result.used, result.behind, result.invalid);
   return 0;
 }

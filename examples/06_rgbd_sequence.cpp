@@ -1,10 +1,10 @@
-// One call per frame on a recording: OpenCV makes the arrays, cfp the static probabilities and the pose of every frame against
-// the one before. Writes a picture per frame: boxes (yellow: detected, orange: compensated) with O, keypoints from red (K = 0)
-// to green (K = 1), prints a line per frame and, with a groundtruth.txt, the error of the chained poses. There is no map: this is
-// odometry from frame to frame, made to show the calls, not to be a SLAM system.
+// One call per frame on a recording: OpenCV makes the arrays, cfp the static probabilities and the pose of every frame
+// against the one before. Writes a picture per frame: boxes (yellow: detected, orange: compensated) with O, keypoints
+// from red (K = 0) to green (K = 1), prints a line per frame and, with a groundtruth.txt, the error of the chained
+// poses. There is no map: this is odometry from frame to frame, made to show the calls, not to be a SLAM system.
 //   06_rgbd_sequence TUM_FOLDER OUT_FOLDER [VARIANT]
-// TUM_FOLDER holds rgb.txt, depth.txt, camera.txt and detections.txt, optionally groundtruth.txt; VARIANT is cfp (default), cfp-minus, no-mdc, no-dbscan,
-// no-ksp, only-boxes or plain.
+// TUM_FOLDER holds rgb.txt, depth.txt, camera.txt and detections.txt, optionally groundtruth.txt; VARIANT is cfp
+// (default), cfp-minus, no-mdc, no-dbscan, no-ksp, only-boxes or plain.
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -57,16 +57,19 @@ void track(const View& previous, const View& current, std::vector<cv::Point2f>& 
   cv::calcOpticalFlowPyrLK(previous.gray, current.gray, corners, forth, found, error, {21, 21}, 4);
   cv::calcOpticalFlowPyrLK(current.gray, previous.gray, forth, back, found_back, error, {21, 21}, 4);
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    if (found[i] == 0 || found_back[i] == 0 || std::hypot(back[i].x - corners[i].x, back[i].y - corners[i].y) > 0.5F) continue;
+    if (found[i] == 0 || found_back[i] == 0 || std::hypot(back[i].x - corners[i].x, back[i].y - corners[i].y) > 0.5F)
+      continue;
     from.push_back(corners[i]);
     to.push_back(forth[i]);
   }
 }
 
-/// The pose of the current camera in the previous one's frame, from previous points with depth: any optimiser may stand here.
+/// The pose of the current camera in the previous one's frame, from previous points with depth: any optimiser may stand
+/// here.
 class PoseSolver {
  public:
-  PoseSolver(const cfp::PinholeCamera<float>& camera, const View& previous, const View& current, const std::vector<std::int32_t>& matches)
+  PoseSolver(const cfp::PinholeCamera<float>& camera, const View& previous, const View& current,
+             const std::vector<std::int32_t>& matches)
       : camera_{camera.fx, camera.fy, camera.cx, camera.cy} {
     for (std::size_t i = 0; i < matches.size(); ++i) {
       if (matches[i] == cfp::no_match) continue;
@@ -92,7 +95,7 @@ class PoseSolver {
     observations.sigmas = sigmas_;
     observations.depths = depths_;
     observations.baseline_fx = 40;  // ORB-SLAM2's Camera.bf for this sensor
-    const cfp::WeightedPnPResult result = cfp::refine_pose(observations, camera_, start_, cfp::WeightedPnPOptions{}, workspace_);
+    const cfp::PoseResult result = cfp::refine_pose(observations, camera_, start_, cfp::PoseOptions{}, workspace_);
     if (!cfp::is_refined(result.reason)) return {};
     start_ = result.T_cam_world;
     return {result.T_cam_world, static_cast<std::size_t>(result.inliers), true};
@@ -105,7 +108,7 @@ class PoseSolver {
   std::vector<float> depths_, sigmas_;
   std::vector<std::size_t> keypoint_;
   cfp::SE3<double> start_;
-  cfp::WeightedPnPWorkspace<double> workspace_;
+  cfp::PoseWorkspace<double> workspace_;
 };
 
 void draw(cv::Mat& picture, const View& view, const cfp::FrameResult<float>& result) {
@@ -123,8 +126,8 @@ void draw(cv::Mat& picture, const View& view, const cfp::FrameResult<float>& res
     const cv::Point corner(static_cast<int>(box.box.x1), static_cast<int>(box.box.y1));
     cv::rectangle(picture, corner, {static_cast<int>(box.box.x2), static_cast<int>(box.box.y2)}, colour, 2);
     char text[64];
-    std::snprintf(text, sizeof text, "%lld%s O %.2f", static_cast<long long>(box.id), box.compensated() ? " compensated" : "",
-                  result.objects[b].static_probability);
+    std::snprintf(text, sizeof text, "%lld%s O %.2f", static_cast<long long>(box.id),
+                  box.compensated() ? " compensated" : "", result.objects[b].static_probability);
     cv::putText(picture, text, corner + cv::Point(4, 16), cv::FONT_HERSHEY_SIMPLEX, 0.5, colour, 1, cv::LINE_AA);
   }
 }
@@ -146,7 +149,8 @@ const cfp_examples::TumImage* nearest(const std::vector<cfp_examples::TumImage>&
 }
 
 void run(const std::filesystem::path& folder, const std::filesystem::path& out, cfp::Variant variant) {
-  const auto images = cfp_examples::read_tum_list(folder / "rgb.txt"), depth_images = cfp_examples::read_tum_list(folder / "depth.txt");
+  const auto images = cfp_examples::read_tum_list(folder / "rgb.txt"),
+             depth_images = cfp_examples::read_tum_list(folder / "depth.txt");
   const auto tum = cfp_examples::read_tum_camera(folder / "camera.txt");
   std::ifstream stream(folder / "detections.txt");
   const auto detected = cfp_examples::read_detections(stream, (folder / "detections.txt").string());
@@ -161,7 +165,8 @@ void run(const std::filesystem::path& folder, const std::filesystem::path& out, 
     if (detected.classes[id] == "person") options.classes.push_back({static_cast<int>(id), true});
   }
   cfp::StaticProbabilityPipeline<float> pipeline(options);
-  const cfp::PinholeCamera<float> camera{static_cast<float>(tum.fx), static_cast<float>(tum.fy), static_cast<float>(tum.cx), static_cast<float>(tum.cy)};
+  const cfp::PinholeCamera<float> camera{static_cast<float>(tum.fx), static_cast<float>(tum.fy),
+                                         static_cast<float>(tum.cx), static_cast<float>(tum.cy)};
   const cv::Ptr<cv::ORB> orb = cv::ORB::create(1000, 1.2F, 8, 15, 0, 2, cv::ORB::HARRIS_SCORE, 31, 10);
   View previous;
   std::vector<cfp::StampedPose<double>> trajectory;
@@ -169,25 +174,30 @@ void run(const std::filesystem::path& folder, const std::filesystem::path& out, 
   for (const auto& image : images) {
     cv::Mat picture = cv::imread((folder / image.file).string());
     const auto* depth_image = nearest(depth_images, image.time_s);
-    const cv::Mat depth = depth_image != nullptr ? cv::imread((folder / depth_image->file).string(), cv::IMREAD_UNCHANGED) : cv::Mat();
+    const cv::Mat depth =
+        depth_image != nullptr ? cv::imread((folder / depth_image->file).string(), cv::IMREAD_UNCHANGED) : cv::Mat();
     if (picture.empty() || depth.size() != picture.size()) {
-      std::fprintf(stderr, "%s:%d: no image, or no depth image of its size within 20 ms; skipped\n", (folder / "rgb.txt").c_str(), image.line);
+      std::fprintf(stderr, "%s:%d: no image, or no depth image of its size within 20 ms; skipped\n",
+                   (folder / "rgb.txt").c_str(), image.line);
       continue;
     }
     View current;
     cv::cvtColor(picture, current.gray, cv::COLOR_BGR2GRAY);
     orb->detectAndCompute(current.gray, cv::noArray(), current.keypoints, current.descriptors);
     current.depths.resize(current.keypoints.size());
-    cfp::sample_depth(depth, cfp::view(current.keypoints), 1 / tum.depth_units_per_metre, cfp::span<float>(current.depths));
+    cfp::sample_depth(depth, cfp::view(current.keypoints), 1 / tum.depth_units_per_metre,
+                      cfp::span<float>(current.depths));
     const std::vector<std::int32_t> matches = match(previous, current);
-    for (const std::int32_t j : matches) current.map_points.push_back(j == cfp::no_match ? 1.0F : previous.map_points[static_cast<std::size_t>(j)]);
+    for (const std::int32_t j : matches)
+      current.map_points.push_back(j == cfp::no_match ? 1.0F : previous.map_points[static_cast<std::size_t>(j)]);
     std::vector<cv::Point2f> flow_from, flow_to;
     if (!previous.gray.empty()) track(previous, current, flow_from, flow_to);
     std::vector<cfp::Detection<float>> detections;
     for (const auto& frame : detected.frames) {
       if (std::abs(frame.timestamp - image.time_s) > 0.005) continue;
       for (const auto& d : frame.detections) {
-        detections.push_back({{float(d.box.x1), float(d.box.y1), float(d.box.x2), float(d.box.y2)}, d.class_id, float(d.score)});
+        detections.push_back(
+            {{float(d.box.x1), float(d.box.y1), float(d.box.x2), float(d.box.y2)}, d.class_id, float(d.score)});
       }
     }
 
@@ -201,16 +211,20 @@ void run(const std::filesystem::path& folder, const std::filesystem::path& out, 
     frame.flow_current = cfp::view(flow_to);
     frame.match = matches;
     frame.map_point_probability = current.map_points;
-    const cfp::FrameResult<float> result = pipeline.process(frame, camera, PoseSolver(camera, previous, current, matches));
+    const cfp::FrameResult<float> result =
+        pipeline.process(frame, camera, PoseSolver(camera, previous, current, matches));
     // [driver]
 
-    std::printf("%s: %zu keypoints (%zu foreground, %zu background), flow %s, D_Th %.2f px, pose %s with %zu inliers, effective points %.0f\n", image.file.c_str(),
-                current.keypoints.size(), result.first.foreground, result.first.background, cfp::to_string(result.first.flow_reason),
-                result.second.projection_threshold_px, result.pose.valid ? "ok" : "none", result.pose.inliers, result.health.effective_points);
+    std::printf(
+        "%s: %zu keypoints (%zu foreground, %zu background), flow %s, D_Th %.2f px, pose %s with %zu inliers, "
+        "effective points %.0f\n",
+        image.file.c_str(), current.keypoints.size(), result.first.foreground, result.first.background,
+        cfp::to_string(result.first.flow_reason), result.second.projection_threshold_px,
+        result.pose.valid ? "ok" : "none", result.pose.inliers, result.health.effective_points);
     for (std::size_t b = 0; b < result.boxes.size(); ++b) {
       std::printf("  box %lld %s, O %.3f from %zu flow pairs (%s)\n", static_cast<long long>(result.boxes[b].id),
-                  result.boxes[b].compensated() ? "compensated" : "detected", result.objects[b].static_probability, result.objects[b].pairs,
-                  cfp::to_string(result.objects[b].status));
+                  result.boxes[b].compensated() ? "compensated" : "detected", result.objects[b].static_probability,
+                  result.objects[b].pairs, cfp::to_string(result.objects[b].status));
     }
     draw(picture, current, result);
     cv::imwrite((out / std::filesystem::path(image.file).filename()).string(), picture);
@@ -226,16 +240,19 @@ void run(const std::filesystem::path& folder, const std::filesystem::path& out, 
   const auto truth = cfp_examples::read_tum_trajectory(folder / "groundtruth.txt");
   cfp::TrajectoryErrorWorkspace workspace;
   const auto error = cfp::absolute_trajectory_error<double>(truth, trajectory, cfp::AbsoluteErrorOptions{}, workspace);
-  std::printf("%-10s ATE %.4f m RMSE, S.D. %.4f m, rigid alignment, %zu of %zu poses matched, largest gap %.2f s; %zu frames without a pose\n",
-              cfp::to_string(variant), error.translation_m.rmse, error.translation_m.standard_deviation, error.coverage.matched, images.size(),
-              error.coverage.largest_gap_s, lost);
+  std::printf(
+      "%-10s ATE %.4f m RMSE, S.D. %.4f m, rigid alignment, %zu of %zu poses matched, largest gap %.2f s; %zu frames "
+      "without a pose\n",
+      cfp::to_string(variant), error.translation_m.rmse, error.translation_m.standard_deviation, error.coverage.matched,
+      images.size(), error.coverage.largest_gap_s, lost);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   if (argc < 3) {
-    std::fprintf(stderr, "usage: %s TUM_FOLDER OUT_FOLDER [cfp|cfp-minus|no-mdc|no-dbscan|no-ksp|only-boxes|plain]\n", argv[0]);
+    std::fprintf(stderr, "usage: %s TUM_FOLDER OUT_FOLDER [cfp|cfp-minus|no-mdc|no-dbscan|no-ksp|only-boxes|plain]\n",
+                 argv[0]);
     return 2;
   }
   try {

@@ -1,5 +1,5 @@
-// Compares an estimated trajectory with the truth, both TUM text files: the numbers of evaluate_ate.py and evaluate_rpe.py, and beside
-// them what a reader needs to judge them.
+// Compares an estimated trajectory with the truth, both TUM text files: the numbers of evaluate_ate.py and
+// evaluate_rpe.py, and beside them what a reader needs to judge them.
 //   cfp_example_07_evaluate_trajectory groundtruth.txt estimate.txt [--similarity]
 #include <cstdio>
 #include <cstring>
@@ -17,7 +17,8 @@ int main(int argc, char* argv[]) {
   }
   try {
     using View = cfp::span<const cfp::StampedPose<double>>;
-    const auto truth = cfp_examples::read_tum_trajectory(argv[1]), estimate = cfp_examples::read_tum_trajectory(argv[2]);
+    const auto truth = cfp_examples::read_tum_trajectory(argv[1]),
+               estimate = cfp_examples::read_tum_trajectory(argv[2]);
     cfp::TrajectoryErrorWorkspace workspace;
     cfp::AbsoluteErrorOptions options;
     if (similarity) options.alignment = cfp::AlignmentMode::similarity;

@@ -1,5 +1,5 @@
-// Readers of two bundle adjustment file formats, and the camera both need: the text of "Bundle Adjustment in the Large" and the
-// binary of libmv. Used by 05_bundle_adjustment.cpp and by the benchmark and test that run on such files.
+// Readers of two bundle adjustment file formats, and the camera both need: the text of "Bundle Adjustment in the Large"
+// and the binary of libmv. Used by 05_bundle_adjustment.cpp and by the benchmark and test that run on such files.
 #pragma once
 
 #include <cmath>
@@ -14,16 +14,18 @@
 #include <string>
 #include <vector>
 
-#include "cfp/optimization/ba_problem.hpp"
+#include "cfp/optimization/bundle/bundle_problem.hpp"
 
 namespace ba_files {
 
-/// A pinhole camera with radial (k1, k2, k3) and tangential (p1, p2) distortion, as cfp wants a camera: project, with Jacobian.
+/// A pinhole camera with radial (k1, k2, k3) and tangential (p1, p2) distortion, as cfp wants a camera: project, with
+/// Jacobian.
 struct DistortedCamera {
   using ScalarType = double;
   double focal = 1, cx = 0, cy = 0, k1 = 0, k2 = 0, k3 = 0, p1 = 0, p2 = 0;
 
-  bool project(const cfp::Vector3<double>& point, cfp::Vector2<double>& pixel, cfp::Matrix23<double>* jacobian = nullptr) const noexcept {
+  bool project(const cfp::Vector3<double>& point, cfp::Vector2<double>& pixel,
+               cfp::Matrix23<double>* jacobian = nullptr) const noexcept {
     if (!(point.z() > cfp::Tolerance<double>::min_depth)) return false;
     const double inv_z = 1 / point.z(), x = point.x() * inv_z, y = point.y() * inv_z;
     const double r2 = x * x + y * y, radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
@@ -33,9 +35,12 @@ struct DistortedCamera {
     pixel << u, v;
     if (jacobian != nullptr) {
       const double slope = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3));  // d radial / d r2, times 2
-      const double ux = focal * (radial + slope * x * x + 2 * p1 * y + 6 * p2 * x), uy = focal * (slope * x * y + 2 * p1 * x + 2 * p2 * y);
-      const double vx = focal * (slope * x * y + 2 * p2 * y + 2 * p1 * x), vy = focal * (radial + slope * y * y + 2 * p2 * x + 6 * p1 * y);
-      *jacobian << ux * inv_z, uy * inv_z, -(ux * x + uy * y) * inv_z, vx * inv_z, vy * inv_z, -(vx * x + vy * y) * inv_z;
+      const double ux = focal * (radial + slope * x * x + 2 * p1 * y + 6 * p2 * x),
+                   uy = focal * (slope * x * y + 2 * p1 * x + 2 * p2 * y);
+      const double vx = focal * (slope * x * y + 2 * p2 * y + 2 * p1 * x),
+                   vy = focal * (radial + slope * y * y + 2 * p2 * x + 6 * p1 * y);
+      *jacobian << ux * inv_z, uy * inv_z, -(ux * x + uy * y) * inv_z, vx * inv_z, vy * inv_z,
+          -(vx * x + vy * y) * inv_z;
     }
     return true;
   }
@@ -49,13 +54,14 @@ struct Problem {
   std::vector<cfp::Vector2<double>> pixels;
 
   /// The view that cfp::adjust_bundle takes.
-  cfp::BaProblem<DistortedCamera> view() { return {poses, points, cameras, {pose, point, pixels}}; }
+  cfp::BundleProblem<DistortedCamera> view() { return {poses, points, cameras, {pose, point, pixels}}; }
 };
 
 inline void fail(const std::string& file, const std::string& what) { throw std::runtime_error(file + ": " + what); }
 
-/// "cameras points observations", then "camera point x y" per observation, then nine numbers per camera (rotation vector, translation,
-/// f, k1, k2) and three per point. BAL's camera looks down -z with y up; here it is turned to look down +z with y down, and v changes sign.
+/// "cameras points observations", then "camera point x y" per observation, then nine numbers per camera (rotation
+/// vector, translation, f, k1, k2) and three per point. BAL's camera looks down -z with y up; here it is turned to look
+/// down +z with y down, and v changes sign.
 inline Problem read_bal(const std::string& file) {
   std::ifstream in(file);
   if (!in) fail(file, "cannot be opened");
@@ -66,7 +72,8 @@ inline Problem read_bal(const std::string& file) {
     double value = 0;
     std::string field;
     while (!(fields >> field)) {
-      if (!std::getline(in, line)) fail(file, "line " + std::to_string(line_number + 1) + ": the file ends before " + what);
+      if (!std::getline(in, line))
+        fail(file, "line " + std::to_string(line_number + 1) + ": the file ends before " + what);
       ++line_number;
       fields.clear();
       fields.str(line);
@@ -81,7 +88,8 @@ inline Problem read_bal(const std::string& file) {
   const auto count = [&](const std::string& what, double limit) {
     const double value = next(what);
     if (!(value >= 0 && value < limit && value == std::floor(value))) {
-      fail(file, "line " + std::to_string(line_number) + ": " + what + " is not a whole number from 0 to below " + std::to_string(static_cast<long long>(limit)));
+      fail(file, "line " + std::to_string(line_number) + ": " + what + " is not a whole number from 0 to below " +
+                     std::to_string(static_cast<long long>(limit)));
     }
     return static_cast<int>(value);
   };
@@ -98,7 +106,8 @@ inline Problem read_bal(const std::string& file) {
   const cfp::Vector3<double> flip(1, -1, -1);
   for (int k = 0; k < cameras; ++k) {
     double p[9];
-    static constexpr const char* names[9] = {"rotation x", "rotation y", "rotation z", "translation x", "translation y", "translation z", "f", "k1", "k2"};
+    static constexpr const char* names[9] = {
+        "rotation x", "rotation y", "rotation z", "translation x", "translation y", "translation z", "f", "k1", "k2"};
     for (int e = 0; e < 9; ++e) p[e] = next("camera " + std::to_string(k) + ", " + names[e]);
     problem.poses.push_back({flip.asDiagonal() * cfp::so3_exp(cfp::Vector3<double>(p[0], p[1], p[2])),
                              flip.cwiseProduct(cfp::Vector3<double>(p[3], p[4], p[5]))});
@@ -112,8 +121,9 @@ inline Problem read_bal(const std::string& file) {
   return problem;
 }
 
-/// libmv: byte order ('V' big, 'v' little), marker space ('P' pixels, 'N' normalised), eight intrinsics (f, cx, cy, k1, k2, k3, p1, p2), then
-/// counted lists of cameras (image, rotation column by column, translation), points (track, position), markers (image, track, x, y).
+/// libmv: byte order ('V' big, 'v' little), marker space ('P' pixels, 'N' normalised), eight intrinsics (f, cx, cy, k1,
+/// k2, k3, p1, p2), then counted lists of cameras (image, rotation column by column, translation), points (track,
+/// position), markers (image, track, x, y).
 inline Problem read_libmv(const std::string& file) {
   std::ifstream in(file, std::ios::binary);
   if (!in) fail(file, "cannot be opened");
@@ -122,7 +132,8 @@ inline Problem read_libmv(const std::string& file) {
   const auto at = [&] { return "byte " + std::to_string(offset) + ": "; };
   const auto character = [&](const std::string& what, char first, char second) {
     if (offset >= bytes.size()) fail(file, at() + "the file ends before " + what);
-    if (bytes[offset] != first && bytes[offset] != second) fail(file, at() + what + " is neither '" + first + "' nor '" + second + "'");
+    if (bytes[offset] != first && bytes[offset] != second)
+      fail(file, at() + what + " is neither '" + first + "' nor '" + second + "'");
     return bytes[offset++];
   };
   const bool big_endian = character("the byte order", 'V', 'v') == 'V';
@@ -130,13 +141,16 @@ inline Problem read_libmv(const std::string& file) {
   const auto word = [&](const std::string& what) {
     if (bytes.size() - offset < 4) fail(file, at() + "the file ends before " + what);
     std::uint32_t value = 0;
-    for (std::size_t b = 0; b < 4; ++b) value |= static_cast<std::uint32_t>(static_cast<unsigned char>(bytes[offset + (big_endian ? 3 - b : b)])) << (8 * b);
+    for (std::size_t b = 0; b < 4; ++b)
+      value |= static_cast<std::uint32_t>(static_cast<unsigned char>(bytes[offset + (big_endian ? 3 - b : b)]))
+               << (8 * b);
     offset += 4;
     return value;
   };
   const auto whole = [&](const std::string& what) {
     const std::uint32_t value = word(what);
-    if (value > static_cast<std::uint32_t>((std::numeric_limits<int>::max)())) offset -= 4, fail(file, at() + what + " is negative");
+    if (value > static_cast<std::uint32_t>((std::numeric_limits<int>::max)()))
+      offset -= 4, fail(file, at() + what + " is negative");
     return static_cast<int>(value);
   };
   const auto real = [&](const std::string& what) {
@@ -150,7 +164,8 @@ inline Problem read_libmv(const std::string& file) {
   static constexpr const char* names[8] = {"f", "cx", "cy", "k1", "k2", "k3", "p1", "p2"};
   for (int e = 0; e < 8; ++e) k[e] = real(std::string("intrinsic ") + names[e]);
   Problem problem;
-  problem.cameras.push_back(pixels ? DistortedCamera{k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7]} : DistortedCamera{});
+  problem.cameras.push_back(pixels ? DistortedCamera{k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7]}
+                                   : DistortedCamera{});
   std::map<int, int> pose_of_image, point_of_track;
   for (int n = whole("number of cameras"), i = 0; i < n; ++i) {
     const std::string name = "camera " + std::to_string(i);
@@ -173,7 +188,8 @@ inline Problem read_libmv(const std::string& file) {
     const auto pose = pose_of_image.find(whole(name + ", image"));
     const auto point = point_of_track.find(whole(name + ", track"));
     const double x = real(name + ", x"), y = real(name + ", y");
-    if (pose == pose_of_image.end() || point == point_of_track.end()) continue;  // libmv keeps markers it has not reconstructed
+    if (pose == pose_of_image.end() || point == point_of_track.end())
+      continue;  // libmv keeps markers it has not reconstructed
     problem.pose.push_back(pose->second);
     problem.point.push_back(point->second);
     problem.pixels.emplace_back(x, y);
@@ -181,7 +197,8 @@ inline Problem read_libmv(const std::string& file) {
   return problem;
 }
 
-/// By the name's end: .bin is libmv, anything else BAL text. Throws std::runtime_error naming the file and the line or byte.
+/// By the name's end: .bin is libmv, anything else BAL text. Throws std::runtime_error naming the file and the line or
+/// byte.
 inline Problem read(const std::string& file) {
   const bool binary = file.size() >= 4 && file.compare(file.size() - 4, 4, ".bin") == 0;
   return binary ? read_libmv(file) : read_bal(file);

@@ -1,14 +1,15 @@
-// Which rule for DBSCAN's eps and min_pts tells people from what is behind them? The default of clustering/adaptive.hpp rests on
-// the tables printed here.
+// Which rule for DBSCAN's eps and min_pts tells people from what is behind them? The default of clustering/adaptive.hpp
+// rests on the tables printed here.
 //
 //   dbscan_study [scenes per scenario, default 150] [seed stream, default "held out"] [folder of the real recordings]
 //
-// The scenes (support/person_scene.hpp) were looked at under the stream "tune" while the default was chosen; the tables below
-// come from a stream not used for it ("report" was, as a check along the way). Every rule gets the same foreground selection and the same sensor floor; `best fixed` is, for
-// every column anew, the best of 25 fixed settings. Judged per box and averaged: the share of foreground points labelled
-// foreground, and of background points labelled background. Points without depth or with a depth mixed from two surfaces take part in
-// the clustering but are not judged. Table 1 judges the background behind the person's farthest surface, what depth can
-// decide; table 2 all background, with the ceiling that the best cut per box, knowing the truth, reaches. Pictures of real frames:
+// The scenes (support/person_scene.hpp) were looked at under the stream "tune" while the default was chosen; the tables
+// below come from a stream not used for it ("report" was, as a check along the way). Every rule gets the same
+// foreground selection and the same sensor floor; `best fixed` is, for every column anew, the best of 25 fixed
+// settings. Judged per box and averaged: the share of foreground points labelled foreground, and of background points
+// labelled background. Points without depth or with a depth mixed from two surfaces take part in the clustering but are
+// not judged. Table 1 judges the background behind the person's farthest surface, what depth can decide; table 2 all
+// background, with the ceiling that the best cut per box, knowing the truth, reaches. Pictures of real frames:
 // examples/02_depth_foreground.
 #include <algorithm>
 #include <cstdio>
@@ -50,7 +51,8 @@ struct Figures {
   [[nodiscard]] double worse() const { return (std::min)(f(), b()); }
 };
 
-std::vector<char> label(const Keypoints& points, const cfp::ForegroundOptions& options, cfp::ForegroundResult* result = nullptr) {
+std::vector<char> label(const Keypoints& points, const cfp::ForegroundOptions& options,
+                        cfp::ForegroundResult* result = nullptr) {
   static cfp::ForegroundWorkspace<double> workspace;
   std::vector<char> mask(points.depths.size());
   const cfp::ForegroundResult r = cfp::depth_foreground<double>(points.depths, options, workspace, mask);
@@ -105,8 +107,9 @@ void print_table(const std::vector<std::vector<Box>>& boxes, bool all_background
       return label(points, options);
     });
   };
-  print("best cut (ceiling)",
-        evaluate(boxes, all_background, [all_background](const Keypoints& points) { return best_cut(points, all_background); }));
+  print("best cut (ceiling)", evaluate(boxes, all_background, [all_background](const Keypoints& points) {
+          return best_cut(points, all_background);
+        }));
   const Row ours = rule_row(cfp::AdaptiveRule::foreground_density);
   print("foreground density", ours);
   std::vector<Row> rivals;
@@ -148,7 +151,8 @@ int main(int argc, char* argv[]) {
   for (const cfp_study::Scenario scenario : cfp_study::scenarios) {
     for (int k = 0; k < scenes; ++k) {
       const cfp_study::PersonScene scene = cfp_study::draw_scene(random, scenario);
-      for (std::size_t s = 0; s < sizes.size(); ++s) boxes[s].push_back({cfp_study::draw_keypoints(random, scene, sizes[s]), scenario});
+      for (std::size_t s = 0; s < sizes.size(); ++s)
+        boxes[s].push_back({cfp_study::draw_keypoints(random, scene, sizes[s]), scenario});
     }
   }
   std::printf("%zu scenarios, %d scenes each, stream \"%s\"\n\n", cfp_study::scenarios.size(), scenes, stream);
@@ -191,11 +195,14 @@ int main(int argc, char* argv[]) {
       guess_wrong += withheld.worse() < 90.0 ? 1 : 0;
     }
     const int total = static_cast<int>(boxes[s].size());
-    std::printf("| n = %4zu | cannot tell %5.1f %% (%.0f %% of these would have been wrong) | where ok %5.1f / %5.1f |\n", sizes[s],
-                100.0 * (total - ok) / total, 100.0 * guess_wrong / (std::max)(1, total - ok), figures.f(), figures.b());
+    std::printf(
+        "| n = %4zu | cannot tell %5.1f %% (%.0f %% of these would have been wrong) | where ok %5.1f / %5.1f |\n",
+        sizes[s], 100.0 * (total - ok) / total, 100.0 * guess_wrong / (std::max)(1, total - ok), figures.f(),
+        figures.b());
   }
 #ifdef CFP_HAVE_OPENCV
-  std::printf("\nTable 5: real depth frames, limits between person and background read by hand (support/real_boxes.hpp)\n");
+  std::printf(
+      "\nTable 5: real depth frames, limits between person and background read by hand (support/real_boxes.hpp)\n");
   cfp_study::print_real_boxes(argc > 3 ? argv[3] : CFP_DATA_DEFAULT);
 #endif
 }

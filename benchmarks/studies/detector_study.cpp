@@ -1,6 +1,6 @@
-// What the detectors of the SLAM example find on a real recording, against two lists of boxes made elsewhere (NanoDet-m 320's own
-// program; YOLOv5x on the first ten frames): recall and precision of persons at IoU >= 0.5 over the score threshold, time per
-// frame. The default thresholds of examples/slam/detection/network_detector.hpp rest on it.
+// What the detectors of the SLAM example find on a real recording, against two lists of boxes made elsewhere (NanoDet-m
+// 320's own program; YOLOv5x on the first ten frames): recall and precision of persons at IoU >= 0.5 over the score
+// threshold, time per frame. The default thresholds of examples/slam/detection/network_detector.hpp rest on it.
 //   cfp_detector_study [--pictures FOLDER]
 #include "../../examples/slam/detection/detector.hpp"
 
@@ -49,7 +49,8 @@ void compare(const cfp_slam::Detections& reference, const cfp_slam::Detections& 
 
 cfp_slam::Detections people(const cfp_slam::Detector& detector, cfp_slam::Detections all, float min_score) {
   const int person = detector.class_of("person");
-  all.erase(std::remove_if(all.begin(), all.end(), [&](const auto& d) { return d.class_id != person || !(d.score >= min_score); }),
+  all.erase(std::remove_if(all.begin(), all.end(),
+                           [&](const auto& d) { return d.class_id != person || !(d.score >= min_score); }),
             all.end());
   return all;
 }
@@ -71,17 +72,22 @@ int main(int argc, char** argv) {
   }
   std::vector<Image> images;
   for (const auto& image : cfp_examples::read_tum_list(folder / "rgb.txt")) {
-    images.push_back({image.time_s, fs::path(image.file).filename().string(), cv::imread((folder / image.file).string())});
+    images.push_back(
+        {image.time_s, fs::path(image.file).filename().string(), cv::imread((folder / image.file).string())});
     if (smoke && images.size() == 3) break;
   }
   const auto nanodet_list = cfp_slam::make_detector((folder / "detections.txt").string()),
              yolo_list = cfp_slam::make_detector((folder / "detections_yolov5x.txt").string());
 
-  std::printf("persons at IoU >= 0.5; recall/precision against NanoDet's list (all frames) and YOLOv5x's (frames 0-9); %d OpenCV threads\n",
-              cv::getNumThreads());
-  std::printf("%-36s %9s %7s   %s\n", "detector", "ms median", "score", "R/P of NanoDet's list   R/P of YOLOv5x's list");
-  for (const std::string& spec : {(data / "detectors/nanodet.onnx").string(), (data / "detectors/FastestDet.onnx").string(),
-                                  (data / "detectors/yolo-fastest-1.1_body.cfg").string(), std::string("hog")}) {
+  std::printf(
+      "persons at IoU >= 0.5; recall/precision against NanoDet's list (all frames) and YOLOv5x's (frames 0-9); %d "
+      "OpenCV threads\n",
+      cv::getNumThreads());
+  std::printf("%-36s %9s %7s   %s\n", "detector", "ms median", "score",
+              "R/P of NanoDet's list   R/P of YOLOv5x's list");
+  for (const std::string& spec :
+       {(data / "detectors/nanodet.onnx").string(), (data / "detectors/FastestDet.onnx").string(),
+        (data / "detectors/yolo-fastest-1.1_body.cfg").string(), std::string("hog")}) {
     cfp_slam::DetectorOptions options;
     const bool hog = spec == "hog";
     options.min_score = hog ? 0 : 0.1;
@@ -101,8 +107,9 @@ int main(int argc, char** argv) {
         compare(people(*nanodet_list, nanodet_list->detect(images[i].bgr, images[i].time_s), 0), found, nanodet);
         if (i < 10) compare(people(*yolo_list, yolo_list->detect(images[i].bgr, images[i].time_s), 0), found, yolo);
       }
-      std::printf("%-36s %9.1f %7.2f   %3d/%3d  %3d/%3d        %3d/%3d  %3d/%3d\n", detector->name().c_str(), ms[ms.size() / 2], min_score,
-                  nanodet.common, nanodet.reference, nanodet.common, nanodet.found, yolo.common, yolo.reference, yolo.common, yolo.found);
+      std::printf("%-36s %9.1f %7.2f   %3d/%3d  %3d/%3d        %3d/%3d  %3d/%3d\n", detector->name().c_str(),
+                  ms[ms.size() / 2], min_score, nanodet.common, nanodet.reference, nanodet.common, nanodet.found,
+                  yolo.common, yolo.reference, yolo.common, yolo.found);
     }
     if (pictures.empty()) continue;
     const auto drawn = cfp_slam::make_detector(spec);
@@ -111,7 +118,8 @@ int main(int argc, char** argv) {
       for (const auto& d : drawn->detect(image.bgr, image.time_s)) {
         const cv::Point corner(int(d.box.x1), int(d.box.y1));
         cv::rectangle(picture, corner, {int(d.box.x2), int(d.box.y2)}, {0, 255, 255}, 2);
-        cv::putText(picture, drawn->classes()[static_cast<std::size_t>(d.class_id)] + cv::format(" %.2f", double(d.score)),
+        cv::putText(picture,
+                    drawn->classes()[static_cast<std::size_t>(d.class_id)] + cv::format(" %.2f", double(d.score)),
                     corner + cv::Point(4, 16), cv::FONT_HERSHEY_SIMPLEX, 0.5, {0, 255, 255}, 1, cv::LINE_AA);
       }
       fs::create_directories(pictures / drawn->name());

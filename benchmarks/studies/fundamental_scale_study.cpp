@@ -1,11 +1,13 @@
-// How should the F that RANSAC found be refined? Two tables over three kinds of noise: `equal`, 0.5 px for every coordinate; `octaves`,
-// 0.3 px times 1.2^level as detectors on an image pyramid have it, a level 1.2 times as rare as the one below; `mixed`, half of the
-// pairs 0.2 px and half 0.7 px. Motion 10 cm / 2 degrees, threshold 1 px, mismatches 3 to 40 px off. Error: the median Sampson
-// distance of the exact true pairs under the estimate.
-// 1. The scale of the loss in standard deviations of the measured noise: mean error over the problems relative to the best scale of its row
-//    of problems, averaged over 200, 500 and 1000 pairs with 20 % and 40 % of mismatches; `largest` is the worst kind of noise.
-// 2. What the search among further starts brings: mean, 97th percentile and worst error without and with it, equal noise.
-// Argument: [problems, default 200].
+// How should the F that RANSAC found be refined? Two tables over three kinds of noise: `equal`, 0.5 px for every
+// coordinate; `octaves`, 0.3 px times 1.2^level as detectors on an image pyramid have it, a level 1.2 times as rare as
+// the one below; `mixed`, half of the pairs 0.2 px and half 0.7 px. Motion 10 cm / 2 degrees, threshold 1 px,
+// mismatches 3 to 40 px off. Error: the median Sampson distance of the exact true pairs under the estimate.
+// 1. The scale of the loss in standard deviations of the measured noise: mean error over the problems relative to the
+// best scale of its row
+//    of problems, averaged over 200, 500 and 1000 pairs with 20 % and 40 % of mismatches; `largest` is the worst kind
+//    of noise.
+// 2. What the search among further starts brings: mean, 97th percentile and worst error without and with it, equal
+// noise. Argument: [problems, default 200].
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -14,7 +16,7 @@
 #include <vector>
 
 #include "../../tests/support/two_view_scene.hpp"
-#include "cfp/geometry/fundamental_ransac.hpp"
+#include "cfp/robust/fundamental_ransac.hpp"
 
 namespace {
 
@@ -50,11 +52,17 @@ Scene make_scene(std::size_t pairs, double outliers, Noise noise, cfp::Random& r
 /// The steps of fundamental_ransac one by one. Errors per scale without and with the search among further starts.
 class Experiment {
  public:
-  void run(const Scene& scene, const std::vector<double>& scales, std::vector<double>& plain, std::vector<double>& explored) {
+  void run(const Scene& scene, const std::vector<double>& scales, std::vector<double>& plain,
+           std::vector<double>& explored) {
     pairs_.load<double>(scene.prev, scene.cur, {});
     sampler_.reset(pairs_.size, {}, 7, cfp::Sampling::uniform, options_.max_iterations);
-    cfp::detail::FundamentalSearch search{
-        pairs_, options_, sampler_, list_, distances_sq_, pairs_.factor * pairs_.factor, cfp::Random(0, "fundamental_ransac")};
+    cfp::detail::FundamentalSearch search{pairs_,
+                                          options_,
+                                          sampler_,
+                                          list_,
+                                          distances_sq_,
+                                          pairs_.factor * pairs_.factor,
+                                          cfp::Random(0, "fundamental_ransac")};
     cfp::detail::FactoredF F(search.run().F);
     search.measure_noise(F.matrix());
     plain = errors(scene, scales, search, F);
@@ -64,8 +72,8 @@ class Experiment {
   }
 
  private:
-  std::vector<double> errors(const Scene& scene, const std::vector<double>& scales, const cfp::detail::FundamentalSearch& search,
-                             const cfp::detail::FactoredF& F) const {
+  std::vector<double> errors(const Scene& scene, const std::vector<double>& scales,
+                             const cfp::detail::FundamentalSearch& search, const cfp::detail::FactoredF& F) const {
     std::vector<double> out;
     for (const double scale : scales) {
       cfp::detail::FactoredF refined = F;
@@ -82,7 +90,9 @@ class Experiment {
   std::vector<double> distances_sq_;
 };
 
-double mean(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size()); }
+double mean(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
 
 void print_spread(const char* name, std::vector<double> errors) {
   std::sort(errors.begin(), errors.end());
@@ -127,7 +137,8 @@ int main(int argc, char* argv[]) {
       }
     }
     std::printf("%-8s", noise == Noise::equal ? "equal" : noise == Noise::octaves ? "octaves" : "mixed");
-    for (std::size_t s = 0; s < scales.size(); ++s) std::printf(" %6.3f", relative[s]), largest[s] = (std::max)(largest[s], relative[s]);
+    for (std::size_t s = 0; s < scales.size(); ++s)
+      std::printf(" %6.3f", relative[s]), largest[s] = (std::max)(largest[s], relative[s]);
     std::printf("\n");
   }
   std::printf("%-8s", "largest");

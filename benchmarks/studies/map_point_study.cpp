@@ -1,8 +1,8 @@
 // Which rule should carry a map point's static probability M from frame to frame? Simulated in-box map points with the
-// fine stage's own K = K^T K^F: static ones under unit reprojection noise, moving ones displaced by a few pixels. Prints how
-// many static points each rule deletes within 1 s and 3 s (30 Hz), how many frames a moving point survives, and how near M
-// is to the truth. Supports
-// MapPointOptions::policy and ::rate. Usage: cfp_map_point_study [points | --smoke]
+// fine stage's own K = K^T K^F: static ones under unit reprojection noise, moving ones displaced by a few pixels.
+// Prints how many static points each rule deletes within 1 s and 3 s (30 Hz), how many frames a moving point survives,
+// and how near M is to the truth. Supports MapPointOptions::policy and ::rate. Usage: cfp_map_point_study [points |
+// --smoke]
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "cfp/core/random.hpp"
-#include "cfp/probability/constraint.hpp"
-#include "cfp/probability/fusion.hpp"
+#include "cfp/probability/distance_sigmoid.hpp"
 #include "cfp/probability/map_point.hpp"
+#include "cfp/probability/second_stage_probability.hpp"
 
 namespace {
 
@@ -41,19 +41,21 @@ struct Frame {
 };
 
 struct Outcome {
-  int frames = 0;       ///< until deletion, limit + 1 without
-  double m_after = 0;   ///< M after `settled` frames, deletion ignored
+  int frames = 0;      ///< until deletion, limit + 1 without
+  double m_after = 0;  ///< M after `settled` frames, deletion ignored
 };
 
 /// A point that is off its projection by `displacement_px` in a direction of its own, in every frame.
-Outcome follow(double displacement_px, int limit, int settled, const std::vector<Frame>& sigmoids, const cfp::MapPointOptions& options, cfp::Random& random) {
+Outcome follow(double displacement_px, int limit, int settled, const std::vector<Frame>& sigmoids,
+               const cfp::MapPointOptions& options, cfp::Random& random) {
   const double angle = random.uniform(0, 2 * cfp::pi<double>);
   Outcome outcome;
   outcome.frames = limit + 1;
   double m = 1;
   for (int frame = 0; frame < limit; ++frame) {
     const Frame& sigmoid = sigmoids[random.index(static_cast<std::uint32_t>(sigmoids.size()))];
-    const double along = displacement_px * std::cos(angle) + random.normal(), across = displacement_px * std::sin(angle) + random.normal();
+    const double along = displacement_px * std::cos(angle) + random.normal(),
+                 across = displacement_px * std::sin(angle) + random.normal();
     m = cfp::updated_map_point(m, sigmoid.k(along, across), options);
     if (frame + 1 == settled) outcome.m_after = m;
     if (cfp::is_deletable(m, options)) outcome.frames = (std::min)(outcome.frames, frame + 1);
@@ -71,7 +73,8 @@ void row(const char* name, const cfp::MapPointOptions& options, int points, cons
     within_3s += point.frames <= 90 ? 1 : 0;
     brier += (1 - point.m_after) * (1 - point.m_after) / points;
   }
-  std::printf("| %-22s | %5.1f %% | %5.1f %% | %.3f |", name, 100.0 * within_1s / points, 100.0 * within_3s / points, brier);
+  std::printf("| %-22s | %5.1f %% | %5.1f %% | %.3f |", name, 100.0 * within_1s / points, 100.0 * within_3s / points,
+              brier);
   for (const double displacement : {3.0, 6.0, 12.0}) {
     std::vector<int> lifetimes;
     brier = 0;
@@ -98,8 +101,11 @@ int main(int argc, char** argv) {
   cfp::Random random(1, "map point study frames");
   std::vector<Frame> sigmoids;
   for (int i = 0; i < 500; ++i) sigmoids.emplace_back(random);
-  std::printf("%d points a row, seed 1; M starts at 1, deletion below 0.3, Brier score of M after 10 frames\n\n", points);
-  std::printf("| rule | static deleted in 1 s | in 3 s | Brier | moving 3 px: frames it survives (median / 90 %%), Brier | 6 px | 12 px |\n|---|--:|--:|--:|--:|--:|--:|\n");
+  std::printf("%d points a row, seed 1; M starts at 1, deletion below 0.3, Brier score of M after 10 frames\n\n",
+              points);
+  std::printf(
+      "| rule | static deleted in 1 s | in 3 s | Brier | moving 3 px: frames it survives (median / 90 %%), Brier | 6 "
+      "px | 12 px |\n|---|--:|--:|--:|--:|--:|--:|\n");
   cfp::MapPointOptions options;
   options.policy = cfp::MapPointPolicy::copy;
   row("copy", options, points, sigmoids);

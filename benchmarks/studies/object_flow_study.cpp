@@ -1,9 +1,10 @@
-// Optical flow for the object stage: how few points, how small a window, which points, and is tracking back worth its time? The
-// usual way (1000 corners over the whole image, 22x22, five levels, no check) against keypoints of the previous frame on pyramids
-// that are kept. On rendered sequences with labels: time on one core for flow and for F and O, and how well O tells moving people
-// from still ones (AUC; a box is moving when at least half, still when at most 2 % of its person pixels move).
-// Supports cfp_slam::FlowOptions.
-//   cfp_object_flow_study [--smoke | --frames N | TUM_FOLDER...]   instead of rendering, folders of cfp_synthetic; one without
+// Optical flow for the object stage: how few points, how small a window, which points, and is tracking back worth its
+// time? The usual way (1000 corners over the whole image, 22x22, five levels, no check) against keypoints of the
+// previous frame on pyramids that are kept. On rendered sequences with labels: time on one core for flow and for F and
+// O, and how well O tells moving people from still ones (AUC; a box is moving when at least half, still when at most 2
+// % of its person pixels move). Supports cfp_slam::FlowOptions.
+//   cfp_object_flow_study [--smoke | --frames N | TUM_FOLDER...]   instead of rendering, folders of cfp_synthetic; one
+//   without
 // labels, with a detections.txt, gives times and mean O alone (as "partly")
 #include <algorithm>
 #include <cstdio>
@@ -19,13 +20,13 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
-#include "../../examples/slam/loop/flow.hpp"
-#include "../../examples/slam/input/sequence.hpp"
 #include "../../examples/slam/detection/simple_detectors.hpp"
+#include "../../examples/slam/input/sequence.hpp"
+#include "../../examples/slam/loop/flow.hpp"
 #include "../../examples/synthetic/sequence.hpp"
 #include "cfp/evaluation/calibration.hpp"
+#include "cfp/frame/first_stage.hpp"
 #include "cfp/interop/opencv.hpp"
-#include "cfp/pipeline/first_stage.hpp"
 
 namespace {
 
@@ -50,8 +51,8 @@ struct Candidate {
   std::vector<float> score{};
   std::vector<char> is_static{};
   double still_sum = 0, moving_sum = 0, partly_sum = 0, pairs = 0;
-  std::size_t still = 0, moving = 0, partly = 0, unknown = 0, frames = 0, still_passed = 0, moving_passed = 0, no_model = 0,
-              homographies = 0;
+  std::size_t still = 0, moving = 0, partly = 0, unknown = 0, frames = 0, still_passed = 0, moving_passed = 0,
+              no_model = 0, homographies = 0;
 };
 
 double processor_ms() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
@@ -64,7 +65,8 @@ double quantile(std::vector<double> values, double q) {
 }
 
 // Corners of its own on the previous image, pyramids built anew.
-Candidate corners(const std::string& name, int count, double quality, double distance, int window, int levels, bool backward) {
+Candidate corners(const std::string& name, int count, double quality, double distance, int window, int levels,
+                  bool backward) {
   return {name, [=](const cv::Mat& previous, const Image&, const Image& now, Pairs& pairs) {
             std::vector<cv::Point2f> from, to, back;
             std::vector<unsigned char> found, found_back;
@@ -72,9 +74,11 @@ Candidate corners(const std::string& name, int count, double quality, double dis
             cv::goodFeaturesToTrack(previous, from, count, quality, distance);
             if (from.empty()) return;
             cv::calcOpticalFlowPyrLK(previous, now.gray, from, to, found, error, {window, window}, levels - 1);
-            if (backward) cv::calcOpticalFlowPyrLK(now.gray, previous, to, back, found_back, error, {window, window}, levels - 1);
+            if (backward)
+              cv::calcOpticalFlowPyrLK(now.gray, previous, to, back, found_back, error, {window, window}, levels - 1);
             for (std::size_t i = 0; i < from.size(); ++i) {
-              if (found[i] == 0 || (backward && (found_back[i] == 0 || std::hypot(back[i].x - from[i].x, back[i].y - from[i].y) > 0.5F)))
+              if (found[i] == 0 ||
+                  (backward && (found_back[i] == 0 || std::hypot(back[i].x - from[i].x, back[i].y - from[i].y) > 0.5F)))
                 continue;
               pairs.first.push_back(from[i]);
               pairs.second.push_back(to[i]);
@@ -83,8 +87,8 @@ Candidate corners(const std::string& name, int count, double quality, double dis
 }
 
 Candidate tracker(const std::string& name, const cfp_slam::FlowOptions& options) {
-  auto state = std::make_shared<std::pair<cfp_slam::FlowTracker, std::vector<cfp::Box<float>>>>(cfp_slam::FlowTracker(options),
-                                                                                                std::vector<cfp::Box<float>>());
+  auto state = std::make_shared<std::pair<cfp_slam::FlowTracker, std::vector<cfp::Box<float>>>>(
+      cfp_slam::FlowTracker(options), std::vector<cfp::Box<float>>());
   return {name, [state](const cv::Mat& previous, const Image& before, const Image& now, Pairs& pairs) {
             auto& [flow, boxes] = *state;
             boxes.clear();
@@ -106,7 +110,8 @@ std::vector<Candidate> candidates() {
   all.push_back(corners("500 corners, 22 px, 5 levels", 500, 0.01, 8, 22, 5, false));
   all.push_back(corners("500 corners, 21 px, 5 levels, back", 500, 0.01, 8, 21, 5, true));
   all.push_back(tracker("default", {}));
-  all.push_back(tracker("  keypoints alone, 300 outside", with([](auto& o) { o.corners = 0, o.keypoints_outside = 300; })));
+  all.push_back(
+      tracker("  keypoints alone, 300 outside", with([](auto& o) { o.corners = 0, o.keypoints_outside = 300; })));
   all.push_back(tracker("  corners alone", with([](auto& o) { o.keypoints_per_box = 0; })));
   all.push_back(tracker("  250 corners", with([](auto& o) { o.corners = 250; })));
   all.push_back(tracker("  800 corners", with([](auto& o) { o.corners = 800; })));
@@ -124,7 +129,8 @@ std::vector<Candidate> candidates() {
 double moving_share(const cv::Mat& labels, const cfp::Box<float>& box) {
   if (labels.empty()) return std::numeric_limits<double>::quiet_NaN();
   const cv::Rect inside =
-      cv::Rect(int(box.x1), int(box.y1), int(std::ceil(box.width())), int(std::ceil(box.height()))) & cv::Rect({0, 0}, labels.size());
+      cv::Rect(int(box.x1), int(box.y1), int(std::ceil(box.width())), int(std::ceil(box.height()))) &
+      cv::Rect({0, 0}, labels.size());
   const int moving = cv::countNonZero(labels(inside) == 1), still = cv::countNonZero(labels(inside) == 2);
   return moving + still > 0 ? double(moving) / (moving + still) : 0;
 }
@@ -187,19 +193,23 @@ void finish(Image& image, const cv::Mat& bgr, cv::ORB& orb) {
 }
 
 void print(const std::vector<Candidate>& all) {
-  std::printf("%-36s %6s | %6s %6s %6s %6s %6s | %7s %7s %7s | %7s %7s | %7s %5s %5s | %4s %4s %4s\n", "", "pairs", "flow", "F, O", "sum",
-              "95 %", "ratio", "AUC", "still>", "moving>", "O still", "moving", "partly", "boxes", "unkn.", "F", "H", "none");
+  std::printf("%-36s %6s | %6s %6s %6s %6s %6s | %7s %7s %7s | %7s %7s | %7s %5s %5s | %4s %4s %4s\n", "", "pairs",
+              "flow", "F, O", "sum", "95 %", "ratio", "AUC", "still>", "moving>", "O still", "moving", "partly",
+              "boxes", "unkn.", "F", "H", "none");
   for (const Candidate& c : all) {
     cfp::CalibrationWorkspace workspace;
-    const auto auc =
-        cfp::area_under_curve(cfp::span<const float>(c.score), cfp::span<const char>(c.is_static), cfp::span<const float>(), workspace);
+    const auto auc = cfp::area_under_curve(cfp::span<const float>(c.score), cfp::span<const char>(c.is_static),
+                                           cfp::span<const float>(), workspace);
     const auto mean = [](double sum, std::size_t n) { return n > 0 ? sum / static_cast<double>(n) : 0.0; };
-    std::printf("%-36s %6.0f | %6.2f %6.2f %6.2f %6.2f %6.2f | %7.4f %7.3f %7.3f | %7.3f %7.3f | %7.3f %5zu %5zu | %4zu %4zu %4zu\n",
-                c.name.c_str(), mean(c.pairs, c.frames), quantile(c.flow_ms, 0.5), quantile(c.object_ms, 0.5), quantile(c.total_ms, 0.5),
-                quantile(c.total_ms, 0.95), quantile(c.total_ms, 0.5) / quantile(all[0].total_ms, 0.5), auc.auc,
-                mean(double(c.still_passed), c.still), mean(double(c.moving_passed), c.moving), mean(c.still_sum, c.still),
-                mean(c.moving_sum, c.moving), mean(c.partly_sum, c.partly), c.still + c.moving + c.partly, c.unknown,
-                c.frames - c.no_model - c.homographies, c.homographies, c.no_model);
+    std::printf(
+        "%-36s %6.0f | %6.2f %6.2f %6.2f %6.2f %6.2f | %7.4f %7.3f %7.3f | %7.3f %7.3f | %7.3f %5zu %5zu | %4zu %4zu "
+        "%4zu\n",
+        c.name.c_str(), mean(c.pairs, c.frames), quantile(c.flow_ms, 0.5), quantile(c.object_ms, 0.5),
+        quantile(c.total_ms, 0.5), quantile(c.total_ms, 0.95),
+        quantile(c.total_ms, 0.5) / quantile(all[0].total_ms, 0.5), auc.auc, mean(double(c.still_passed), c.still),
+        mean(double(c.moving_passed), c.moving), mean(c.still_sum, c.still), mean(c.moving_sum, c.moving),
+        mean(c.partly_sum, c.partly), c.still + c.moving + c.partly, c.unknown, c.frames - c.no_model - c.homographies,
+        c.homographies, c.no_model);
   }
 }
 
@@ -242,8 +252,8 @@ int main(int argc, char** argv) {
       if (!frame.usable) continue;
       if (frame.labels.empty()) {
         if (!detections)
-          detections =
-              std::make_unique<cfp_slam::FileDetector>((sequence.folder() / "detections.txt").string(), cfp_slam::DetectorOptions{});
+          detections = std::make_unique<cfp_slam::FileDetector>((sequence.folder() / "detections.txt").string(),
+                                                                cfp_slam::DetectorOptions{});
         for (const auto& d : detections->detect(frame.bgr, frame.time_s)) boxes.push_back(d.box);
       }
       add(frame.bgr, frame.labels, boxes);
@@ -274,7 +284,9 @@ int main(int argc, char** argv) {
     const auto& c = sequence.options().camera;
     judge(all, images, {float(c.fx), float(c.fy), float(c.cx), float(c.cy)});
   }
-  std::printf("processor ms per frame on one core (medians; ratio of sums to the first line), AUC of O, share with O > 0.9, mean O\n");
+  std::printf(
+      "processor ms per frame on one core (medians; ratio of sums to the first line), AUC of O, share with O > 0.9, "
+      "mean O\n");
   print(all);
   return 0;
 }

@@ -1,6 +1,7 @@
-// How many optical-flow pairs does an object's static probability need? Simulated objects: static ones with epipolar noise,
-// and moving ones of which only a share of the pairs moves (an arm, a leg). Prints, for M pairs, how often either passes
-// O_Th = 0.9. Supports ObjectProbabilityOptions::min_pairs. Usage: cfp_object_score_study [trials | --smoke]
+// How many optical-flow pairs does an object's static probability need? Simulated objects: static ones with epipolar
+// noise, and moving ones of which only a share of the pairs moves (an arm, a leg). Prints, for M pairs, how often
+// either passes O_Th = 0.9. Supports ObjectProbabilityOptions::min_pairs. Usage: cfp_object_score_study [trials |
+// --smoke]
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -40,7 +41,9 @@ int main(int argc, char** argv) {
   }
   std::printf("Share of objects with O > 0.9, %d trials each, seed 1\n", trials);
   std::printf("balanced = mean of (static 0.2 px passes) and (20 %% of the pairs move, does not pass)\n\n");
-  std::printf("| M | static, 0.2 px | static, 0.3 px | static, 0.5 px | 20 %% move | 40 %% move | all move | balanced |\n|--:|--:|--:|--:|--:|--:|--:|--:|\n");
+  std::printf(
+      "| M | static, 0.2 px | static, 0.3 px | static, 0.5 px | 20 %% move | 40 %% move | all move | balanced "
+      "|\n|--:|--:|--:|--:|--:|--:|--:|--:|\n");
   for (const std::size_t pairs : {1U, 2U, 3U, 5U, 7U, 10U, 15U, 20U, 30U, 60U, 120U}) {
     cfp::Random random(1, "object score study");
     const double still = pass_share(pairs, 0.2, 0, trials, random);
@@ -49,7 +52,8 @@ int main(int argc, char** argv) {
     const double arm = pass_share(pairs, 0.2, 0.2, trials, random);
     const double half = pass_share(pairs, 0.2, 0.4, trials, random);
     const double all = pass_share(pairs, 0.2, 1.0, trials, random);
-    std::printf("| %zu | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f |\n", pairs, still, still3, still5, arm, half, all, (still + 1 - arm) / 2);
+    std::printf("| %zu | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f |\n", pairs, still, still3, still5, arm, half,
+                all, (still + 1 - arm) / 2);
   }
   return 0;
 }

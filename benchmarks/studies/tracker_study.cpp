@@ -1,12 +1,12 @@
 // What the defaults of the box tracker rest on. Two kinds of data, so that neither alone decides:
 //   TUD-Stadtmitte (MOT format: det.txt, gt.txt; 25 Hz, static camera, people who occlude each other), and
-//   simulated walkers at 30 Hz (turns, stops, arms that change the width, bursts of misses, false alarms) before a static
-//   camera and before a hand-held one, without and with the image motion handed to the tracker.
-// Of the truth boxes that the detector missed (IoU < 0.5) for 1-6 frames in a row it prints the share that a compensated box
-// covers at IoU >= 0.5, the compensated boxes on nothing and on a person who was detected, per frame, and identity switches.
-// What no tracker can compensate is counted, too: `unseen` (never detected before) and `loose` (a detection overlaps the person by
-// 0.3 to 0.5: there is a box, it only fits badly, so it counts as a detection). `recovered` is the share of the rest.
-// Usage: cfp_tracker_study [folder of TUD-Stadtmitte]
+//   simulated walkers at 30 Hz (turns, stops, arms that change the width, bursts of misses, false alarms) before a
+//   static camera and before a hand-held one, without and with the image motion handed to the tracker.
+// Of the truth boxes that the detector missed (IoU < 0.5) for 1-6 frames in a row it prints the share that a
+// compensated box covers at IoU >= 0.5, the compensated boxes on nothing and on a person who was detected, per frame,
+// and identity switches. What no tracker can compensate is counted, too: `unseen` (never detected before) and `loose`
+// (a detection overlaps the person by 0.3 to 0.5: there is a box, it only fits badly, so it counts as a detection).
+// `recovered` is the share of the rest. Usage: cfp_tracker_study [folder of TUD-Stadtmitte]
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -68,7 +68,8 @@ Sequence read_mot(const std::string& folder) {
   };
   for (const auto& r : read_rows(folder + "/gt.txt"))
     frame(r[0]).truth.push_back({{r[2], r[3], r[2] + r[4], r[3] + r[5]}, static_cast<int>(r[1])});
-  for (const auto& r : read_rows(folder + "/det.txt")) frame(r[0]).detections.push_back({{r[2], r[3], r[2] + r[4], r[3] + r[5]}, 0, r[6]});
+  for (const auto& r : read_rows(folder + "/det.txt"))
+    frame(r[0]).detections.push_back({{r[2], r[3], r[2] + r[4], r[3] + r[5]}, 0, r[6]});
   return sequence;
 }
 
@@ -84,7 +85,8 @@ Sequence simulate(std::uint64_t seed, bool hand_held, bool use_motion) {
   };
   std::vector<Person> people(4);
   for (Person& p : people)
-    p = {random.uniform(-1.5, 1.5), random.uniform(1.8, 4.5), random.normal() * 0.6, random.normal() * 0.4, random.uniform(0, 6), 0};
+    p = {random.uniform(-1.5, 1.5), random.uniform(1.8, 4.5), random.normal() * 0.6,
+         random.normal() * 0.4,     random.uniform(0, 6),     0};
   double pan = 0, tilt = 0, roll = 0, pan_rate = 0, tilt_rate = 0, roll_rate = 0;
   Matrix3<double> before = Matrix3<double>::Identity();
   const double f = 525, cx = 320, cy = 240;
@@ -101,7 +103,8 @@ Sequence simulate(std::uint64_t seed, bool hand_held, bool use_motion) {
     }
     Matrix3<double> K;
     K << f, 0, cx, 0, f, cy, 0, 0, 1;
-    const Matrix3<double> R = cfp::so3_exp<double>({0, 0, roll}) * cfp::so3_exp<double>({tilt, 0, 0}) * cfp::so3_exp<double>({0, pan, 0});
+    const Matrix3<double> R =
+        cfp::so3_exp<double>({0, 0, roll}) * cfp::so3_exp<double>({tilt, 0, 0}) * cfp::so3_exp<double>({0, pan, 0});
     frame.image_motion = K * R * before.transpose() * K.inverse();
     before = R;
     std::vector<double> depth;
@@ -172,7 +175,8 @@ Sequence withhold(Sequence sequence, Withhold what) {
   for (std::size_t k = 0; k < sequence.frames.size(); ++k) {
     auto& d = sequence.frames[k].detections;
     if (what == Withhold::frames && k % 3 == 2) d.clear();
-    if (what == Withhold::detections) d.erase(std::remove_if(d.begin(), d.end(), [&](const auto&) { return count++ % 3 == 2; }), d.end());
+    if (what == Withhold::detections)
+      d.erase(std::remove_if(d.begin(), d.end(), [&](const auto&) { return count++ % 3 == 2; }), d.end());
   }
   return sequence;
 }
@@ -180,12 +184,13 @@ Sequence withhold(Sequence sequence, Withhold what) {
 // ---- figures ----
 
 struct Figures {
-  double missed = 0, covered = 0;      // truth boxes in bursts of 1-6 missed frames
-  double unseen = 0, loose = 0;        // of those not covered: no detection before the burst; a detection at IoU 0.3 to 0.5
+  double missed = 0, covered = 0;  // truth boxes in bursts of 1-6 missed frames
+  double unseen = 0, loose = 0;    // of those not covered: no detection before the burst; a detection at IoU 0.3 to 0.5
   double on_nothing = 0, on_detected = 0, frames = 0, switches = 0, overlap = 0, overlaps = 0;
   void add(const Figures& o) {
     missed += o.missed, covered += o.covered, unseen += o.unseen, loose += o.loose, on_nothing += o.on_nothing;
-    on_detected += o.on_detected, frames += o.frames, switches += o.switches, overlap += o.overlap, overlaps += o.overlaps;
+    on_detected += o.on_detected, frames += o.frames, switches += o.switches, overlap += o.overlap,
+        overlaps += o.overlaps;
   }
 };
 
@@ -227,7 +232,8 @@ Figures run(const Sequence& sequence, cfp::BoxTrackerOptions options) {
   };
   for (std::size_t k = 0; k < sequence.frames.size(); ++k) {
     const Frame& frame = sequence.frames[k];
-    const auto result = tracker.update(frame.detections, k == 0 ? 0.0 : sequence.dt_s, sequence.use_motion ? &frame.image_motion : nullptr);
+    const auto result = tracker.update(frame.detections, k == 0 ? 0.0 : sequence.dt_s,
+                                       sequence.use_motion ? &frame.image_motion : nullptr);
     const std::vector<int> detected = match(frame.truth, frame.detections);
     const std::vector<int> tracked = match(frame.truth, result.boxes);
     figures.frames += 1;
@@ -330,14 +336,14 @@ int main(int argc, char** argv) {
     sets[sets.size() - 2].sequences.push_back(simulate(seed, true, true));
     sets[sets.size() - 1].sequences.push_back(every_other(simulate(seed, true, false)));
   }
-  std::printf("%-42s %9s %8s %8s %8s %9s %10s %11s %9s %8s\n", "data, defaults", "missed1-6", "covered", "unseen", "loose", "recovered",
-              "on nothing", "on detected", "switches", "mean IoU");
+  std::printf("%-42s %9s %8s %8s %8s %9s %10s %11s %9s %8s\n", "data, defaults", "missed1-6", "covered", "unseen",
+              "loose", "recovered", "on nothing", "on detected", "switches", "mean IoU");
   for (const DataSet& set : sets) {
     const Figures f = run(set, {});
     std::printf("%-42s %9.0f %7.1f%% %7.1f%% %7.1f%% %8.1f%% %10.4f %11.4f %9.0f %8.3f\n", set.name.c_str(), f.missed,
                 100 * f.covered / f.missed, 100 * f.unseen / f.missed, 100 * f.loose / f.missed,
-                100 * f.covered / (f.missed - f.unseen - f.loose), f.on_nothing / f.frames, f.on_detected / f.frames, f.switches,
-                f.overlap / f.overlaps);
+                100 * f.covered / (f.missed - f.unseen - f.loose), f.on_nothing / f.frames, f.on_detected / f.frames,
+                f.switches, f.overlap / f.overlaps);
   }
   std::printf("\nper data set: covered %% / on nothing per frame / switches\n%-26s", "variant");
   for (const DataSet& set : sets) std::printf("| %-21.21s", set.name.c_str());

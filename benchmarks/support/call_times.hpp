@@ -10,7 +10,8 @@
 
 namespace cfp_benchmark {
 
-/// Times each call by the wall clock (two readings, some 50 ns) and gives the benchmark the counters p50_us, p95_us, p99_us, max_us.
+/// Times each call by the wall clock (two readings, some 50 ns) and gives the benchmark the counters p50_us, p95_us,
+/// p99_us, max_us.
 class CallTimes {
  public:
   explicit CallTimes(const benchmark::State& state) { us_.reserve(static_cast<std::size_t>(state.max_iterations)); }

@@ -1,9 +1,9 @@
-// Seeded depth scenes of people for studies of depth clustering: a jointed body of capsules before planes, boxes or another
-// person, ray-cast through a detection box, with structured-light noise. What is hard in real frames is in here on purpose:
-// limbs nearer than the body by more than the sensor's noise, walls a hand's breadth behind the back, floors and slanted walls
-// that cross the body's depth range, mixed ("flying") pixels along silhouettes, missing depth, and keypoints in clumps that
-// crowd at silhouettes and leave plain parts empty. Points of a crossing plane at the body's own depth cannot be told apart by depth at
-// all; no rule reaches 100 %.
+// Seeded depth scenes of people for studies of depth clustering: a jointed body of capsules before planes, boxes or
+// another person, ray-cast through a detection box, with structured-light noise. What is hard in real frames is in here
+// on purpose: limbs nearer than the body by more than the sensor's noise, walls a hand's breadth behind the back,
+// floors and slanted walls that cross the body's depth range, mixed ("flying") pixels along silhouettes, missing depth,
+// and keypoints in clumps that crowd at silhouettes and leave plain parts empty. Points of a crossing plane at the
+// body's own depth cannot be told apart by depth at all; no rule reaches 100 %.
 #pragma once
 
 #include <algorithm>
@@ -24,9 +24,9 @@ namespace cfp_study {
 using Eigen::Vector3d;
 
 enum class Scenario { wall_far, wall_close, slanted_wall, desk_and_clutter, two_people, outstretched_arm, sitting };
-inline constexpr std::array<Scenario, 7> scenarios{Scenario::wall_far,         Scenario::wall_close, Scenario::slanted_wall,
-                                                   Scenario::desk_and_clutter, Scenario::two_people, Scenario::outstretched_arm,
-                                                   Scenario::sitting};
+inline constexpr std::array<Scenario, 7> scenarios{
+    Scenario::wall_far,   Scenario::wall_close,       Scenario::slanted_wall, Scenario::desk_and_clutter,
+    Scenario::two_people, Scenario::outstretched_arm, Scenario::sitting};
 inline const char* name_of(Scenario scenario) {
   constexpr std::array<const char*, 7> names{"wall far",   "wall close",  "slanted wall", "desk, clutter",
                                              "two people", "arm forward", "sitting"};
@@ -79,15 +79,17 @@ struct PersonScene {
 };
 
 struct Keypoints {
-  std::vector<double> depths;  ///< as measured; 0 = missing
+  std::vector<double> depths;      ///< as measured; 0 = missing
+  std::vector<signed char> truth;  ///< 1 foreground, 0 background, -1 not judged (missing depth, or a mixed pixel: its
+                                   ///< depth is on neither surface)
   std::vector<signed char>
-      truth;  ///< 1 foreground, 0 background, -1 not judged (missing depth, or a mixed pixel: its depth is on neither surface)
-  std::vector<signed char> beyond;  ///< 1 for background behind the person's farthest surface: what depth alone can tell apart
+      beyond;  ///< 1 for background behind the person's farthest surface: what depth alone can tell apart
 };
 
 namespace detail {
 
-// y is down and 0 at the floor, z is away from the camera, x to the right; the body stands at the origin facing the camera.
+// y is down and 0 at the floor, z is away from the camera, x to the right; the body stands at the origin facing the
+// camera.
 inline std::vector<Capsule> body(cfp::Random& random, Scenario scenario) {
   const auto u = [&](double a, double b) { return random.uniform(a, b); };
   std::vector<Capsule> parts;
@@ -104,13 +106,14 @@ inline std::vector<Capsule> body(cfp::Random& random, Scenario scenario) {
     const double swing = u(-0.25, 0.25);
     if (scenario == Scenario::outstretched_arm && side > 0) {
       const double reach = u(0.35, 0.6), up = u(-0.25, 0.2), out = u(-0.2, 0.2);
-      limb(shoulder, shoulder + 0.5 * Vector3d(out, up + 0.1, -reach), shoulder + Vector3d(out, up, -reach), 0.05, 0.045);
+      limb(shoulder, shoulder + 0.5 * Vector3d(out, up + 0.1, -reach), shoulder + Vector3d(out, up, -reach), 0.05,
+           0.045);
     } else if (sits) {
       limb(shoulder, shoulder + Vector3d(side * 0.05, 0.28, u(-0.15, 0.05)),
            shoulder + Vector3d(side * u(-0.1, 0.05), u(0.25, 0.4), u(-0.4, -0.15)), 0.055, 0.045);
     } else {
-      limb(shoulder, shoulder + Vector3d(side * u(0.02, 0.1), 0.28, 0.5 * swing), shoulder + Vector3d(side * u(0, 0.1), 0.52, swing - 0.05),
-           0.055, 0.045);
+      limb(shoulder, shoulder + Vector3d(side * u(0.02, 0.1), 0.28, 0.5 * swing),
+           shoulder + Vector3d(side * u(0, 0.1), 0.52, swing - 0.05), 0.055, 0.045);
     }
     const Vector3d joint(side * 0.1, -hip, 0);
     if (sits) {
@@ -128,8 +131,8 @@ inline std::vector<Capsule> body(cfp::Random& random, Scenario scenario) {
 
 }  // namespace detail
 
-/// Draws one scene. Camera: 525 px focal length, 640 x 480, 1.0-1.5 m above the floor, level; person 1.2-4.5 m away, turned by up to 90
-/// degrees.
+/// Draws one scene. Camera: 525 px focal length, 640 x 480, 1.0-1.5 m above the floor, level; person 1.2-4.5 m away,
+/// turned by up to 90 degrees.
 inline PersonScene draw_scene(cfp::Random& random, Scenario scenario) {
   const auto u = [&](double a, double b) { return random.uniform(a, b); };
   const double height = u(1.0, 1.5), distance = u(1.2, 4.5);
@@ -156,7 +159,8 @@ inline PersonScene draw_scene(cfp::Random& random, Scenario scenario) {
   if (scenario == Scenario::desk_and_clutter || scenario == Scenario::sitting) {
     const auto clutter = 3 + random.index(6);
     for (std::uint32_t i = 0; i < clutter; ++i) {
-      const double z = distance + u(0.55, (std::max)(0.6, gap)), radius = u(0.06, 0.15), y = height - u(0.3, 1.6), cx = x + u(-0.5, 0.5);
+      const double z = distance + u(0.55, (std::max)(0.6, gap)), radius = u(0.06, 0.15), y = height - u(0.3, 1.6),
+                   cx = x + u(-0.5, 0.5);
       others.push_back({{cx, y, z}, {cx + u(-0.3, 0.3), y + u(-0.2, 0.2), z}, radius});
     }
   }
@@ -188,7 +192,8 @@ inline PersonScene draw_scene(cfp::Random& random, Scenario scenario) {
   std::vector<Seen> grid(columns * rows);
   for (int r = 0; r < rows; ++r) {
     for (int c = 0; c < columns; ++c) {
-      const Vector3d direction(x1 + (x2 - x1) * (c + 0.5) / columns, y1 + (y2 - y1) * (r + 0.5) / rows, 1.0), ray = direction.normalized();
+      const Vector3d direction(x1 + (x2 - x1) * (c + 0.5) / columns, y1 + (y2 - y1) * (r + 0.5) / rows, 1.0),
+          ray = direction.normalized();
       double best = 12.0;
       int what = 2;
       for (std::size_t i = 0; i < planes.size(); ++i) {
@@ -211,8 +216,8 @@ inline PersonScene draw_scene(cfp::Random& random, Scenario scenario) {
   scene.mixed_share = u(0.05, 0.25);
   scene.missing_share = u(0.0, 0.2);
   const double person_texture = std::exp(u(-0.9, 0.9)), floor_texture = u(0.1, 0.6);
-  // Keypoints come in clumps: every patch of 5 x 5 cells has its own texture, log-normal, so bodies show gaps in depth where they are
-  // plain.
+  // Keypoints come in clumps: every patch of 5 x 5 cells has its own texture, log-normal, so bodies show gaps in depth
+  // where they are plain.
   constexpr int patch = 5, patches_per_row = columns / patch + 1;
   std::vector<double> patch_texture(static_cast<std::size_t>(patches_per_row * (rows / patch + 1)));
   for (double& texture : patch_texture) texture = std::exp(1.2 * random.normal());
@@ -241,11 +246,14 @@ inline PersonScene draw_scene(cfp::Random& random, Scenario scenario) {
 inline Keypoints draw_keypoints(cfp::Random& random, const PersonScene& scene, std::size_t n) {
   Keypoints out;
   for (std::size_t i = 0; i < n; ++i) {
-    const auto at = std::upper_bound(scene.cumulative.begin(), scene.cumulative.end(), random.uniform() * scene.cumulative.back()) -
-                    scene.cumulative.begin();
+    const auto at =
+        std::upper_bound(scene.cumulative.begin(), scene.cumulative.end(), random.uniform() * scene.cumulative.back()) -
+        scene.cumulative.begin();
     const PersonScene::Cell& cell = scene.cells[(std::min)(static_cast<std::size_t>(at), scene.cells.size() - 1)];
-    const bool mixed = cell.mixed_with_m > 0 && random.uniform() < scene.mixed_share, missing = random.uniform() < scene.missing_share;
-    const double share = random.uniform(), surface = mixed ? cell.depth_m + share * (cell.mixed_with_m - cell.depth_m) : cell.depth_m;
+    const bool mixed = cell.mixed_with_m > 0 && random.uniform() < scene.mixed_share,
+               missing = random.uniform() < scene.missing_share;
+    const double share = random.uniform(),
+                 surface = mixed ? cell.depth_m + share * (cell.mixed_with_m - cell.depth_m) : cell.depth_m;
     out.depths.push_back(missing ? 0.0 : surface + structured_light_sigma(surface) * random.normal());
     out.beyond.push_back(cell.depth_m > scene.far_m ? 1 : 0);
     out.truth.push_back(static_cast<signed char>(missing || mixed ? -1 : cell.foreground ? 1 : 0));

@@ -1,6 +1,6 @@
-// Person boxes of real depth frames with the depth that parts person from background, for dbscan_study. The limits were read by hand
-// off the depth images and hold for whole boxes, so background at a person's own depth counts as person here.
-// The recordings belong to others and are not in this repository; absent ones are reported and left out.
+// Person boxes of real depth frames with the depth that parts person from background, for dbscan_study. The limits were
+// read by hand off the depth images and hold for whole boxes, so background at a person's own depth counts as person
+// here. The recordings belong to others and are not in this repository; absent ones are reported and left out.
 #pragma once
 
 #include <cmath>
@@ -26,8 +26,9 @@ struct RealBox {
   double limit_m;
 };
 
-inline void add_real_boxes(const std::string& group, const std::string& image, const std::string& depth_image, double units_per_metre,
-                           const std::vector<std::pair<cfp::Box<float>, double>>& boxes, std::vector<RealBox>& out) {
+inline void add_real_boxes(const std::string& group, const std::string& image, const std::string& depth_image,
+                           double units_per_metre, const std::vector<std::pair<cfp::Box<float>, double>>& boxes,
+                           std::vector<RealBox>& out) {
   const cv::Mat rgb = cv::imread(image), depth = cv::imread(depth_image, cv::IMREAD_UNCHANGED);
   if (rgb.empty() || depth.type() != CV_16U || rgb.size() != depth.size()) return;
   std::vector<cv::KeyPoint> keypoints;
@@ -58,10 +59,11 @@ inline std::vector<RealBox> read_real_boxes(const std::string& data) {
       double at = 0, score = 0;
       std::string name;
       cfp::Box<float> box;
-      if (!(words >> at >> name >> score >> box.x1 >> box.y1 >> box.x2 >> box.y2) || std::abs(at - time) > 0.005) continue;
+      if (!(words >> at >> name >> score >> box.x1 >> box.y1 >> box.x2 >> box.y2) || std::abs(at - time) > 0.005)
+        continue;
       const bool left = box.x1 + box.x2 < 600.0F;
-      add_real_boxes(left ? "walking, left man" : "walking, right man", walking + image_name, walking + depth_name, 5000.0,
-                     {{box, left ? 2.28 : 2.0}}, out);
+      add_real_boxes(left ? "walking, left man" : "walking, right man", walking + image_name, walking + depth_name,
+                     5000.0, {{box, left ? 2.28 : 2.0}}, out);
     }
   }
   add_real_boxes("five people", five + "rgb.png", five + "depth_mm.png", 1000.0,
@@ -85,11 +87,14 @@ inline void print_real_boxes(const std::string& data) {
     cfp::AdaptiveRule rule;
     cfp::DbscanOptions fixed;
   };
-  const Rule rules[] = {
-      {"foreground density", cfp::AdaptiveRule::foreground_density, {}}, {"k-distance median", cfp::AdaptiveRule::k_distance_median, {}},
-      {"k-distance knee", cfp::AdaptiveRule::k_distance_knee, {}},       {"KANN-DBSCAN", cfp::AdaptiveRule::kann, {}},
-      {"fixed 0.05 m / 5", cfp::AdaptiveRule::fixed, {0.05, 5}},         {"fixed 0.1 m / 5", cfp::AdaptiveRule::fixed, {0.1, 5}},
-      {"fixed 0.15 m / 10", cfp::AdaptiveRule::fixed, {0.15, 10}},       {"fixed 0.2 m / 10", cfp::AdaptiveRule::fixed, {0.2, 10}}};
+  const Rule rules[] = {{"foreground density", cfp::AdaptiveRule::foreground_density, {}},
+                        {"k-distance median", cfp::AdaptiveRule::k_distance_median, {}},
+                        {"k-distance knee", cfp::AdaptiveRule::k_distance_knee, {}},
+                        {"KANN-DBSCAN", cfp::AdaptiveRule::kann, {}},
+                        {"fixed 0.05 m / 5", cfp::AdaptiveRule::fixed, {0.05, 5}},
+                        {"fixed 0.1 m / 5", cfp::AdaptiveRule::fixed, {0.1, 5}},
+                        {"fixed 0.15 m / 10", cfp::AdaptiveRule::fixed, {0.15, 10}},
+                        {"fixed 0.2 m / 10", cfp::AdaptiveRule::fixed, {0.2, 10}}};
   const char* groups[] = {"walking, left man", "walking, right man", "five people"};
   std::printf("| foreground / background kept, %% |");
   for (const char* group : groups) {
@@ -124,7 +129,8 @@ inline void print_real_boxes(const std::string& data) {
         if (f > 0) foreground += 100.0 * f_kept / f, ++boxes_f;
         if (b > 0) background += 100.0 * b_kept / b, ++boxes_b;
       }
-      std::printf(" %5.1f / %5.1f |", foreground / (boxes_f > 0 ? boxes_f : 1), background / (boxes_b > 0 ? boxes_b : 1));
+      std::printf(" %5.1f / %5.1f |", foreground / (boxes_f > 0 ? boxes_f : 1),
+                  background / (boxes_b > 0 ? boxes_b : 1));
     }
     std::printf("\n");
   }

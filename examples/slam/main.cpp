@@ -15,11 +15,11 @@
 
 #include "../support/tum.hpp"
 #include "detection/detector.hpp"
+#include "loop/run.hpp"
+#include "progress.hpp"
 #include "report/picture.hpp"
 #include "report/profile.hpp"
-#include "progress.hpp"
 #include "report/report.hpp"
-#include "loop/run.hpp"
 #include "report/summary_file.hpp"
 #include "report/tables.hpp"
 
@@ -81,8 +81,9 @@ void write_frames(const fs::path& file, const RunRecord& run) {
   out << " note\n";
   for (const cfp_slam::FrameRecord& f : run.frames) {
     char text[256];
-    std::snprintf(text, sizeof text, "%.6f %s %s %d %zu %zu %zu %.1f %.3f %zu", f.time_s, f.image.c_str(), to_string(f.outcome), f.keyframe ? 1 : 0, f.keypoints,
-                  f.matches, f.inliers, f.health.effective_points, f.health.box_share, f.boxes.size());
+    std::snprintf(text, sizeof text, "%.6f %s %s %d %zu %zu %zu %.1f %.3f %zu", f.time_s, f.image.c_str(),
+                  to_string(f.outcome), f.keyframe ? 1 : 0, f.keypoints, f.matches, f.inliers,
+                  f.health.effective_points, f.health.box_share, f.boxes.size());
     out << text;
     for (const double ms : f.milliseconds) {
       std::snprintf(text, sizeof text, " %.3f", ms);
@@ -102,20 +103,25 @@ void write_trajectory(const fs::path& file, const RunRecord& run) {
 
 void print_summary(const RunRecord& run) {
   const cfp_slam::RunSummary s = cfp_slam::summarize(run);
-  const auto ms = [&](cfp_slam::Module m) { return std::pair{s.median_ms[static_cast<std::size_t>(m)], s.p95_ms[static_cast<std::size_t>(m)]}; };
+  const auto ms = [&](cfp_slam::Module m) {
+    return std::pair{s.median_ms[static_cast<std::size_t>(m)], s.p95_ms[static_cast<std::size_t>(m)]};
+  };
   std::printf("%-11s", s.variant.c_str());
   if (s.expected > 0 && s.matched > 0) {
     std::printf(" ATE %.4f m RMSE (median %.4f, max %.4f)", s.ate_rmse_m, s.ate_median_m, s.ate_max_m);
-    if (std::isfinite(s.rpe_rmse_m)) std::printf(", RPE %.4f m/s %.3f deg/s", s.rpe_rmse_m, s.rpe_rmse_deg);  // not for clips below a second
+    if (std::isfinite(s.rpe_rmse_m))
+      std::printf(", RPE %.4f m/s %.3f deg/s", s.rpe_rmse_m, s.rpe_rmse_deg);  // not for clips below a second
     std::printf(", %zu of %zu poses", s.matched, s.expected);
   } else {
     std::printf(" no true trajectory, %zu of %zu frames with a pose", s.tracked + s.relocalised, s.frames);
   }
   const auto [median, p95] = ms(cfp_slam::Module::tracking);
-  std::printf("; lost %zu, relocalised %zu, skipped %zu; tracking %.1f ms (95 %%: %.1f)\n", s.lost, s.relocalised, s.skipped, median, p95);
+  std::printf("; lost %zu, relocalised %zu, skipped %zu; tracking %.1f ms (95 %%: %.1f)\n", s.lost, s.relocalised,
+              s.skipped, median, p95);
 }
 
-RunRecord run_one(const cfp_slam::Sequence& sequence, cfp_slam::Detector& detector, const Arguments& arguments, const std::string& variant, std::uint64_t seed, std::size_t pictures,
+RunRecord run_one(const cfp_slam::Sequence& sequence, cfp_slam::Detector& detector, const Arguments& arguments,
+                  const std::string& variant, std::uint64_t seed, std::size_t pictures,
                   const fs::path& picture_folder) {
   cfp_slam::RunOptions options = run_options(arguments, variant, seed);
   options.pictures = pictures;
@@ -131,25 +137,30 @@ void run_command(const Arguments& arguments) {
   for (const std::string& folder : arguments.folders) {
     const cfp_slam::Sequence sequence(folder);
     for (const std::string& note : sequence.notes()) std::fprintf(stderr, "%s\n", note.c_str());
-    std::printf("%s: %zu frames%s\n", sequence.name().c_str(), sequence.size(), sequence.truth().empty() ? "" : (", truth: " + sequence.truth_file()).c_str());
+    std::printf("%s: %zu frames%s\n", sequence.name().c_str(), sequence.size(),
+                sequence.truth().empty() ? "" : (", truth: " + sequence.truth_file()).c_str());
     const auto detector = detector_for(folder, arguments);
     for (const std::string& variant : arguments.variants) {
       const std::string base = sequence.name() + "_" + variant;
-      runs.push_back(run_one(sequence, *detector, arguments, variant, arguments.seed, arguments.pictures, arguments.write_pictures ? arguments.out / base : fs::path()));
+      runs.push_back(run_one(sequence, *detector, arguments, variant, arguments.seed, arguments.pictures,
+                             arguments.write_pictures ? arguments.out / base : fs::path()));
       const RunRecord& run = runs.back();
       for (const auto& frame : run.frames) {
         if (frame.outcome == cfp_slam::Outcome::skipped) std::fprintf(stderr, "skipped: %s\n", frame.note.c_str());
-        if (frame.outcome == cfp_slam::Outcome::lost) std::fprintf(stderr, "%s: lost: %s\n", frame.image.c_str(), frame.note.c_str());
+        if (frame.outcome == cfp_slam::Outcome::lost)
+          std::fprintf(stderr, "%s: lost: %s\n", frame.image.c_str(), frame.note.c_str());
       }
       write_trajectory(arguments.out / (base + "_trajectory.txt"), run);
       write_frames(arguments.out / (base + "_frames.txt"), run);
       print_summary(run);
-      if (arguments.profile) std::printf("%s", cfp_slam::profile_text(run, arguments.target_fps, arguments.features).c_str());
+      if (arguments.profile)
+        std::printf("%s", cfp_slam::profile_text(run, arguments.target_fps, arguments.features).c_str());
     }
   }
   if (!arguments.picture.empty()) {
     const auto of_first = [&](const RunRecord& run) { return run.sequence == runs.front().sequence; };
-    cfp_slam::write_summary_picture(arguments.picture, {runs.begin(), std::find_if_not(runs.begin(), runs.end(), of_first)});
+    cfp_slam::write_summary_picture(arguments.picture,
+                                    {runs.begin(), std::find_if_not(runs.begin(), runs.end(), of_first)});
     std::printf("picture: %s\n", arguments.picture.c_str());
   }
   if (arguments.no_report) return;
@@ -180,7 +191,8 @@ std::vector<fs::path> recordings(const std::vector<std::string>& folders) {
 void tables_command(const Arguments& arguments) {
   fs::create_directories(arguments.out);
   const fs::path journal = arguments.out / "runs.jsonl";
-  std::vector<cfp_slam::RunSummary> runs = fs::exists(journal) ? cfp_slam::read_summaries(journal) : std::vector<cfp_slam::RunSummary>{};
+  std::vector<cfp_slam::RunSummary> runs =
+      fs::exists(journal) ? cfp_slam::read_summaries(journal) : std::vector<cfp_slam::RunSummary>{};
   for (const fs::path& folder : recordings(arguments.folders)) {
     const cfp_slam::Sequence sequence(folder);
     const std::size_t frames = frames_of(sequence, arguments);
@@ -188,7 +200,8 @@ void tables_command(const Arguments& arguments) {
     for (std::uint64_t seed = 1; seed <= arguments.seeds; ++seed) {
       for (const std::string& variant : arguments.variants) {
         const auto same = [&](const cfp_slam::RunSummary& r) {
-          return r.sequence == sequence.name() && r.variant == variant && r.seed == seed && r.frames == frames && r.detector == detector->name();
+          return r.sequence == sequence.name() && r.variant == variant && r.seed == seed && r.frames == frames &&
+                 r.detector == detector->name();
         };
         if (std::any_of(runs.begin(), runs.end(), same)) continue;
         const RunRecord run = run_one(sequence, *detector, arguments, variant, seed, 0, {});
@@ -211,14 +224,27 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   Arguments a;
   const auto common = [&](CLI::App* command) {
-    command->add_option("folders", a.folders, "recordings in TUM format (rgb.txt, depth.txt, camera.txt, ...)")->required()->check(CLI::ExistingDirectory);
+    command->add_option("folders", a.folders, "recordings in TUM format (rgb.txt, depth.txt, camera.txt, ...)")
+        ->required()
+        ->check(CLI::ExistingDirectory);
     command->add_option("--out", a.out, "folder for everything that is written")->capture_default_str();
-    command->add_option("--detector", a.detector, "auto, none, hog, FILE.txt, FILE.onnx[@SIZE], FILE.cfg or FILE.weights")->capture_default_str();
-    command->add_option("--min-score", a.min_score, "detections below are left out; 0: the detector's own default")->capture_default_str();
+    command
+        ->add_option("--detector", a.detector, "auto, none, hog, FILE.txt, FILE.onnx[@SIZE], FILE.cfg or FILE.weights")
+        ->capture_default_str();
+    command->add_option("--min-score", a.min_score, "detections below are left out; 0: the detector's own default")
+        ->capture_default_str();
     command->add_option("--frames", a.frames, "only so many frames; 0: all")->capture_default_str();
-    command->add_option("--features", a.features, "ORB keypoints per frame")->check(CLI::Range(100, 10000))->capture_default_str();
-    command->add_option("--threads", a.threads, "1: everything one after the other, with the same result")->check(CLI::Range(1, 64))->capture_default_str();
-    command->add_option("--variant", a.variants, "cfp, cfp-minus, no-mdc, no-dbscan, no-ksp, only-boxes, plain; several with commas")->delimiter(',')->capture_default_str();
+    command->add_option("--features", a.features, "ORB keypoints per frame")
+        ->check(CLI::Range(100, 10000))
+        ->capture_default_str();
+    command->add_option("--threads", a.threads, "1: everything one after the other, with the same result")
+        ->check(CLI::Range(1, 64))
+        ->capture_default_str();
+    command
+        ->add_option("--variant", a.variants,
+                     "cfp, cfp-minus, no-mdc, no-dbscan, no-ksp, only-boxes, plain; several with commas")
+        ->delimiter(',')
+        ->capture_default_str();
   };
   CLI::App* run = app.add_subcommand("run", "runs variants side by side and writes trajectories and a report");
   common(run);
@@ -228,15 +254,19 @@ int main(int argc, char** argv) {
   run->add_option("--picture", a.picture, "writes trajectories and a frame of the first recording as SVG");
   run->add_flag("--no-report", a.no_report, "writes no HTML");
   run->add_flag("--profile", a.profile, "prints where a frame's time goes and what to turn down");
-  run->add_option("--target-fps", a.target_fps, "frame rate that --profile aims at")->check(CLI::PositiveNumber)->capture_default_str();
-  CLI::App* tables = app.add_subcommand("tables", "all variants, all recordings, several seeds: the paper's Tables I to V");
+  run->add_option("--target-fps", a.target_fps, "frame rate that --profile aims at")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  CLI::App* tables =
+      app.add_subcommand("tables", "all variants, all recordings, several seeds: the paper's Tables I to V");
   common(tables);
   tables->add_option("--seeds", a.seeds, "runs of each")->check(CLI::PositiveNumber)->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   try {
     for (const std::string& variant : a.variants) variant_of(variant);
     cv::setNumThreads(a.threads);
-    if (tables->parsed() && tables->get_option("--variant")->count() == 0) a.variants = {"plain", "only-boxes", "no-ksp", "no-dbscan", "no-mdc", "cfp-minus", "cfp"};
+    if (tables->parsed() && tables->get_option("--variant")->count() == 0)
+      a.variants = {"plain", "only-boxes", "no-ksp", "no-dbscan", "no-mdc", "cfp-minus", "cfp"};
     run->parsed() ? run_command(a) : tables_command(a);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());

@@ -1,5 +1,5 @@
-// What a run of the SLAM example leaves behind: one record per frame and the figures of the whole. The loop fills it, the report
-// and the tables read it; neither knows the other.
+// What a run of the SLAM example leaves behind: one record per frame and the figures of the whole. The loop fills it,
+// the report and the tables read it; neither knows the other.
 #pragma once
 
 #include <array>
@@ -11,13 +11,13 @@
 #include "cfp/evaluation/error_statistics.hpp"
 #include "cfp/evaluation/trajectory.hpp"
 #include "cfp/evaluation/trajectory_error.hpp"
+#include "cfp/frame/health.hpp"
 #include "cfp/geometry/box.hpp"
-#include "cfp/pipeline/health.hpp"
 
 namespace cfp_slam {
 
-// Where a frame's time goes, in the order of the loop. `detection` runs beside `features` and `flow`; `reading` is not part of
-// the tracking thread, nor is `bundle_adjustment` while it runs beside the next frames.
+// Where a frame's time goes, in the order of the loop. `detection` runs beside `features` and `flow`; `reading` is not
+// part of the tracking thread, nor is `bundle_adjustment` while it runs beside the next frames.
 enum class Module : std::uint8_t {
   reading,            // decoding the two images
   detection,          // object detector, its own thread
@@ -37,8 +37,13 @@ enum class Module : std::uint8_t {
 inline constexpr std::size_t module_count = static_cast<std::size_t>(Module::count);
 
 constexpr const char* to_string(Module module) {
-  constexpr const char* names[] = {"reading",          "detection", "features", "flow",    "box filter",        "object probability",
-                                   "depth clustering", "keypoint probability", "matching", "pose", "mapping", "bundle adjustment", "tracking thread"};
+  constexpr const char* names[] = {"reading",          "detection",
+                                   "features",         "flow",
+                                   "box filter",       "object probability",
+                                   "depth clustering", "keypoint probability",
+                                   "matching",         "pose",
+                                   "mapping",          "bundle adjustment",
+                                   "tracking thread"};
   return names[static_cast<std::size_t>(module)];
 }
 
@@ -66,8 +71,8 @@ struct FrameRecord {
   double time_s = 0;
   std::string image;  // file of the colour image, relative to the sequence
   Outcome outcome = Outcome::lost;
-  std::string note;               // why a frame was skipped or lost
-  cfp::SE3<double> T_world_cam;   // for tracked and relocalised frames
+  std::string note;              // why a frame was skipped or lost
+  cfp::SE3<double> T_world_cam;  // for tracked and relocalised frames
   bool keyframe = false;
   std::size_t keypoints = 0, matches = 0, inliers = 0;
   cfp::FrameHealth health;

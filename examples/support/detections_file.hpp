@@ -1,8 +1,8 @@
 // Reads the detections text file of the examples. One line per box, blank-separated, `#` starts a comment:
 //   timestamp class score x1 y1 x2 y2
-// timestamp in seconds (not decreasing; lines of equal timestamps form a frame), class a word, score a number (more is surer),
-// and the box in pixels with x1 < x2 and y1 < y2. A frame without any box has no
-// line and is not known to the reader.
+// timestamp in seconds (not decreasing; lines of equal timestamps form a frame), class a word, score a number (more is
+// surer), and the box in pixels with x1 < x2 and y1 < y2. A frame without any box has no line and is not known to the
+// reader.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "cfp/detection/box_track.hpp"
+#include "cfp/detection/box_tracker_types.hpp"
 
 namespace cfp_examples {
 
@@ -49,7 +49,8 @@ inline DetectionsFile read_detections(std::istream& input, const std::string& na
     if (!(fields >> timestamp) || !std::isfinite(timestamp)) return fail(number, "no timestamp: '" + rest + "'");
     if (!(fields >> label)) return fail(number, "no class after the timestamp");
     if (!(fields >> d.score)) return fail(number, "no score after class '" + label + "'");
-    if (!(fields >> d.box.x1 >> d.box.y1 >> d.box.x2 >> d.box.y2)) return fail(number, "four numbers x1 y1 x2 y2 must follow the score");
+    if (!(fields >> d.box.x1 >> d.box.y1 >> d.box.x2 >> d.box.y2))
+      return fail(number, "four numbers x1 y1 x2 y2 must follow the score");
     if (fields >> rest) return fail(number, "surplus '" + rest + "' after the box");
     if (!cfp::is_proper(d.box)) return fail(number, "the box needs x1 < x2 and y1 < y2");
     if (!file.frames.empty() && timestamp < file.frames.back().timestamp)

@@ -1,5 +1,5 @@
-// Reading and writing the TUM RGB-D text formats: lines of `timestamp …`, # starts a comment, blank lines are skipped. Whatever is
-// wrong with a file is thrown as std::runtime_error that says file and line.
+// Reading and writing the TUM RGB-D text formats: lines of `timestamp …`, # starts a comment, blank lines are skipped.
+// Whatever is wrong with a file is thrown as std::runtime_error that says file and line.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +24,8 @@ namespace cfp_examples {
   throw std::runtime_error(file.string() + ":" + std::to_string(line) + ": " + what);
 }
 
-/// Calls visit(line_number, words) for every line that is neither blank nor a comment. Commas separate words, too, as in the TUM scripts.
+/// Calls visit(line_number, words) for every line that is neither blank nor a comment. Commas separate words, too, as
+/// in the TUM scripts.
 template <typename Visit>
 void for_each_line(const std::filesystem::path& file, const Visit& visit) {
   std::ifstream stream(file);
@@ -46,18 +47,21 @@ inline double parse_number(const std::filesystem::path& file, int line, const st
   double value = 0;
   const char* const first = word.data() + (word.size() > 1 && word[0] == '+' ? 1 : 0);
   const auto [end, error] = std::from_chars(first, word.data() + word.size(), value);
-  if (error != std::errc() || end != word.data() + word.size()) bad_line(file, line, "'" + word + "' is no number (" + meaning + ")");
+  if (error != std::errc() || end != word.data() + word.size())
+    bad_line(file, line, "'" + word + "' is no number (" + meaning + ")");
   return value;
 }
 
-/// `timestamp tx ty tz qx qy qz qw`, camera to world. Quaternions are normalised; a line whose quaternion is zero, or with a value
-/// that is not finite, is kept as a pose that cfp::is_usable refuses, as SLAM systems print such lines for lost frames.
+/// `timestamp tx ty tz qx qy qz qw`, camera to world. Quaternions are normalised; a line whose quaternion is zero, or
+/// with a value that is not finite, is kept as a pose that cfp::is_usable refuses, as SLAM systems print such lines for
+/// lost frames.
 inline std::vector<cfp::StampedPose<double>> read_tum_trajectory(const std::filesystem::path& file) {
   std::vector<cfp::StampedPose<double>> poses;
   for_each_line(file, [&](int line, const std::vector<std::string>& words) {
     static constexpr const char* meaning[] = {"timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"};
     if (words.size() != 8)
-      bad_line(file, line, "expected 'timestamp tx ty tz qx qy qz qw', found " + std::to_string(words.size()) + " words");
+      bad_line(file, line,
+               "expected 'timestamp tx ty tz qx qy qz qw', found " + std::to_string(words.size()) + " words");
     double v[8];
     for (std::size_t i = 0; i < 8; ++i) v[i] = parse_number(file, line, words[i], meaning[i]);
     cfp::StampedPose<double> pose;
@@ -79,7 +83,8 @@ inline std::string tum_line(const cfp::StampedPose<double>& pose) {
   const Eigen::Quaterniond q(pose.T_world_cam.rotation);
   const auto& t = pose.T_world_cam.translation;
   char text[256];
-  std::snprintf(text, sizeof text, "%.6f %.9f %.9f %.9f %.9f %.9f %.9f %.9f", pose.time_s, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+  std::snprintf(text, sizeof text, "%.6f %.9f %.9f %.9f %.9f %.9f %.9f %.9f", pose.time_s, t.x(), t.y(), t.z(), q.x(),
+                q.y(), q.z(), q.w());
   return text;
 }
 
@@ -92,7 +97,8 @@ struct TumImage {
 inline std::vector<TumImage> read_tum_list(const std::filesystem::path& file) {
   std::vector<TumImage> images;
   for_each_line(file, [&](int line, const std::vector<std::string>& words) {
-    if (words.size() != 2) bad_line(file, line, "expected 'timestamp filename', found " + std::to_string(words.size()) + " words");
+    if (words.size() != 2)
+      bad_line(file, line, "expected 'timestamp filename', found " + std::to_string(words.size()) + " words");
     images.push_back({parse_number(file, line, words[0], "timestamp"), words[1], line});
   });
   return images;
@@ -108,8 +114,8 @@ struct TumCamera {
   [[nodiscard]] bool distorted() const { return k1 != 0 || k2 != 0 || p1 != 0 || p2 != 0 || k3 != 0; }
 };
 
-/// camera.txt: one line `fx fy cx cy width height depth_units_per_metre [k1 k2 p1 p2 k3]`. The distortion may stand in a comment
-/// instead, after the words `k1 k2 p1 p2 k3 =`, where programs that read seven numbers do not see it.
+/// camera.txt: one line `fx fy cx cy width height depth_units_per_metre [k1 k2 p1 p2 k3]`. The distortion may stand in
+/// a comment instead, after the words `k1 k2 p1 p2 k3 =`, where programs that read seven numbers do not see it.
 inline TumCamera read_tum_camera(const std::filesystem::path& file) {
   TumCamera camera;
   int cameras = 0;
@@ -133,7 +139,8 @@ inline TumCamera read_tum_camera(const std::filesystem::path& file) {
       if (!(v[i] == std::floor(v[i]))) bad_line(file, line, "'" + words[i] + "' is no number of pixels");
     }
     v.resize(12, 0);
-    camera = {v[0], v[1], v[2], v[3], static_cast<int>(v[4]), static_cast<int>(v[5]), v[6], v[7], v[8], v[9], v[10], v[11]};
+    camera = {v[0], v[1], v[2],  v[3], static_cast<int>(v[4]), static_cast<int>(v[5]), v[6], v[7],
+              v[8], v[9], v[10], v[11]};
   });
   if (cameras == 0) throw std::runtime_error(file.string() + ": no camera in it");
   std::ifstream stream(file);
@@ -159,19 +166,21 @@ inline std::string folder_name(const std::filesystem::path& folder) {
   return (whole.has_filename() ? whole : whole.parent_path()).filename().string();
 }
 
-/// The calibration that the TUM RGB-D data set publishes for its three cameras, told from the folder's name (`freiburg2` or `fr2`
-/// in it): the drivers' depth is registered to the colour image, fr3's images are undistorted. Throws when the name tells nothing.
+/// The calibration that the TUM RGB-D data set publishes for its three cameras, told from the folder's name
+/// (`freiburg2` or `fr2` in it): the drivers' depth is registered to the colour image, fr3's images are undistorted.
+/// Throws when the name tells nothing.
 inline TumCamera published_tum_camera(const std::filesystem::path& folder) {
   const std::string name = folder_name(folder);
   const auto is = [&](const char* number) {
-    return name.find(std::string("freiburg") + number) != std::string::npos || name.find(std::string("fr") + number) != std::string::npos;
+    return name.find(std::string("freiburg") + number) != std::string::npos ||
+           name.find(std::string("fr") + number) != std::string::npos;
   };
   if (is("1")) return {517.3, 516.5, 318.6, 255.3, 640, 480, 5000, 0.2624, -0.9531, -0.0054, 0.0026, 1.1633};
   if (is("2")) return {520.9, 521.0, 325.1, 249.7, 640, 480, 5000, 0.2312, -0.7849, -0.0033, -0.0001, 0.9172};
   if (is("3")) return {535.4, 539.2, 320.1, 247.6, 640, 480, 5000};
-  throw std::runtime_error(
-      folder.string() +
-      ": no camera.txt (fx fy cx cy width height depth_units_per_metre), and the name tells no TUM camera (fr1, fr2, fr3)");
+  throw std::runtime_error(folder.string() +
+                           ": no camera.txt (fx fy cx cy width height depth_units_per_metre), and the name tells no "
+                           "TUM camera (fr1, fr2, fr3)");
 }
 
 }  // namespace cfp_examples

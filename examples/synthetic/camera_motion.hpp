@@ -45,16 +45,19 @@ class CameraMotion {
         break;
       case Motion::xyz:
         // One axis after the other, as the operators did, with a little of the others.
-        T.translation +=
-            Eigen::Vector3d(axis(time, 0) * 0.28 * wave(5.2, 0), axis(time, 1) * 0.25 * wave(5.6, 1), axis(time, 2) * 0.22 * wave(5.0, 2));
-        T.rotation = T.rotation * cfp::so3_exp<double>(Eigen::Vector3d(0.038 * wave(3.4, 3), 0.047 * wave(4.1, 4), 0.03 * wave(3, 2)));
+        T.translation += Eigen::Vector3d(axis(time, 0) * 0.28 * wave(5.2, 0), axis(time, 1) * 0.25 * wave(5.6, 1),
+                                         axis(time, 2) * 0.22 * wave(5.0, 2));
+        T.rotation = T.rotation * cfp::so3_exp<double>(
+                                      Eigen::Vector3d(0.038 * wave(3.4, 3), 0.047 * wave(4.1, 4), 0.03 * wave(3, 2)));
         break;
       case Motion::halfsphere: {
         const double azimuth = 1.35 * wave(13, 0), elevation = 0.55 + 0.6 * wave(9, 1), r = 0.5 * gain;
-        T = look_at(base + Eigen::Vector3d(r * std::cos(elevation) * std::sin(azimuth), r * (0.5 - std::cos(elevation) * std::cos(azimuth)),
+        T = look_at(base + Eigen::Vector3d(r * std::cos(elevation) * std::sin(azimuth),
+                                           r * (0.5 - std::cos(elevation) * std::cos(azimuth)),
                                            r * (std::sin(elevation) - 0.4)),
                     target);
-        T.rotation = T.rotation * cfp::so3_exp<double>(Eigen::Vector3d(0.13 * wave(3.4, 2), 0.21 * wave(3.9, 3), 0.14 * wave(4.6, 4)));
+        T.rotation = T.rotation * cfp::so3_exp<double>(
+                                      Eigen::Vector3d(0.13 * wave(3.4, 2), 0.21 * wave(3.9, 3), 0.14 * wave(4.6, 4)));
         break;
       }
       case Motion::rpy: {

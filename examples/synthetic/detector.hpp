@@ -1,4 +1,5 @@
-// A person detector as it fails in reality: boxes that shake, bursts of misses where detection is hard, now and then a false box.
+// A person detector as it fails in reality: boxes that shake, bursts of misses where detection is hard, now and then a
+// false box.
 #pragma once
 
 #include <algorithm>
@@ -33,7 +34,8 @@ class Detector {
  public:
   Detector(const DetectorOptions& options, std::uint64_t seed) : options_(options), random_(seed, "detector") {}
 
-  std::vector<Detection> detect(const std::array<Sighting, 2>& people, double rotation_rad_s, bool blurred, int width, int height) {
+  std::vector<Detection> detect(const std::array<Sighting, 2>& people, double rotation_rad_s, bool blurred, int width,
+                                int height) {
     std::vector<Detection> found;
     const auto add = [&](cfp::Box<double> box, double score) {
       box = cfp::clip<double>(box, width, height);
@@ -68,7 +70,8 @@ class Detector {
     if (false_left_ > 0) {
       --false_left_;
       const double dx = 2 * random_.normal(), dy = 2 * random_.normal();
-      add({false_box_.x1 + dx, false_box_.y1 + dy, false_box_.x2 + dx, false_box_.y2 + dy}, 0.42 + 0.08 * random_.normal());
+      add({false_box_.x1 + dx, false_box_.y1 + dy, false_box_.x2 + dx, false_box_.y2 + dy},
+          0.42 + 0.08 * random_.normal());
     }
     return found;
   }

@@ -43,7 +43,9 @@ void write_with_progress(const synthetic::Sequence& sequence, const std::filesys
 
 int main(int argc, char* argv[]) {
   using namespace synthetic;
-  CLI::App app{"Renders people who sit or walk before a moving RGB-D camera: TUM format, with truth for poses, boxes and every pixel."};
+  CLI::App app{
+      "Renders people who sit or walk before a moving RGB-D camera: TUM format, with truth for poses, boxes and every "
+      "pixel."};
   std::string scenario = "walking", motion = "xyz";
   std::filesystem::path out, background;
   SequenceOptions options;
@@ -51,8 +53,12 @@ int main(int argc, char* argv[]) {
   int threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency())), width = 640;
   double camera_height = 1.35;
   app.add_option("out", out, "folder to write; with --all, one folder per sequence in it")->required();
-  app.add_option("--scenario", scenario, "what the people do")->check(CLI::IsMember(strings(scenario_names)))->capture_default_str();
-  app.add_option("--motion", motion, "what the camera does")->check(CLI::IsMember(strings(motion_names)))->capture_default_str();
+  app.add_option("--scenario", scenario, "what the people do")
+      ->check(CLI::IsMember(strings(scenario_names)))
+      ->capture_default_str();
+  app.add_option("--motion", motion, "what the camera does")
+      ->check(CLI::IsMember(strings(motion_names)))
+      ->capture_default_str();
   app.add_flag("--all", all, "all eight sequences, as out/<scenario>_<motion>");
   app.add_option("--frames", options.frames, "length at 30 Hz")->check(CLI::Range(1, 1000000))->capture_default_str();
   app.add_option("--seed", options.seed, "of everything random")->capture_default_str();
@@ -63,7 +69,8 @@ int main(int argc, char* argv[]) {
   app.add_option("--threads", threads, "rendering threads")->check(CLI::Range(1, 256))->capture_default_str();
   app.add_option("--background", background, "a recording in TUM format with poses; the people are put into it")
       ->check(CLI::ExistingDirectory);
-  app.add_option("--camera-height", camera_height, "of the first background camera above the floor, m")->capture_default_str();
+  app.add_option("--camera-height", camera_height, "of the first background camera above the floor, m")
+      ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
 
   cv::setNumThreads(1);  // the frames are what runs in parallel
@@ -77,7 +84,8 @@ int main(int argc, char* argv[]) {
         if (all && recording != nullptr && m > 0) continue;  // the recording moves the camera
         options.scenario = static_cast<Scenario>(s);
         options.motion = static_cast<Motion>(m);
-        const std::string name = std::string(scenario_names[s]) + (recording != nullptr ? "" : std::string("_") + motion_names[m]);
+        const std::string name =
+            std::string(scenario_names[s]) + (recording != nullptr ? "" : std::string("_") + motion_names[m]);
         write_with_progress(Sequence(options, recording), all ? out / name : out, threads);
       }
     }

@@ -1,5 +1,5 @@
-// Articulated people: a skeleton driven by a script, dressed in capsules. A person is a pure function of time, so frames can be
-// rendered in any order and by any thread.
+// Articulated people: a skeleton driven by a script, dressed in capsules. A person is a pure function of time, so
+// frames can be rendered in any order and by any thread.
 #pragma once
 
 #include <array>
@@ -31,7 +31,9 @@ inline Skeleton skeleton_at(const Script& script, double time) {
   const double heading = script.heading(time), sit = script.sit(time), lean = script.lean(time);
   const Vector3d up = Vector3d::UnitZ(), forward(std::cos(heading), std::sin(heading), 0);
   const Vector3d right = forward.cross(up);
-  const auto in_plane = [&](double angle) -> Vector3d { return std::sin(angle) * forward - std::cos(angle) * up; };  // 0 = down
+  const auto in_plane = [&](double angle) -> Vector3d {
+    return std::sin(angle) * forward - std::cos(angle) * up;
+  };  // 0 = down
 
   // Gait: one cycle per 1.35 m; its strength follows the speed, so that starting and stopping look natural.
   const double speed = (script.distance(time + 0.05) - script.distance(time - 0.05)) / 0.1;
@@ -48,7 +50,9 @@ inline Skeleton skeleton_at(const Script& script, double time) {
     const double bend = gait * (0.12 + 0.85 * std::max(0.0, std::cos(p)));
     const double knee = 0.04 + bend + sit * (1.42 - bend);
     const Vector3d hip_at = (side == 0 ? -0.095 : 0.095) * size * right;
-    const auto offset = [](Joint left, int is_right) { return static_cast<std::size_t>(left) + static_cast<std::size_t>(is_right); };
+    const auto offset = [](Joint left, int is_right) {
+      return static_cast<std::size_t>(left) + static_cast<std::size_t>(is_right);
+    };
     s.at[offset(hip_left, side)] = hip_at;
     s.at[offset(knee_left, side)] = hip_at + thigh * in_plane(hip) + (side == 0 ? -0.05 : 0.05) * sit * right;
     s.at[offset(ankle_left, side)] = s.at[offset(knee_left, side)] + shin * in_plane(hip - knee);
@@ -74,14 +78,17 @@ inline Skeleton skeleton_at(const Script& script, double time) {
     const double wave = 2 * cfp::pi<double> * 0.8 * time + side;
     const double upper = shoulder + raised * (0.95 + 0.3 * std::sin(wave) - shoulder);
     const double lower = upper + elbow + raised * (0.9 + 0.5 * std::sin(1.3 * wave) - elbow);
-    const auto tilt = [&](double angle, double open) -> Vector3d { return (in_plane(angle) + open * outward * across).normalized(); };
+    const auto tilt = [&](double angle, double open) -> Vector3d {
+      return (in_plane(angle) + open * outward * across).normalized();
+    };
     const auto i = [side](Joint left) { return static_cast<std::size_t>(left) + static_cast<std::size_t>(side); };
     s.at[i(shoulder_left)] = s.at[chest] + 0.175 * size * outward * across;
     s.at[i(elbow_left)] = s.at[i(shoulder_left)] + 0.29 * size * tilt(upper, 0.16 + 0.2 * raised);
     s.at[i(wrist_left)] = s.at[i(elbow_left)] + 0.25 * size * tilt(lower, -0.1 - 0.3 * sit * (1 - raised));
     s.at[i(finger_left)] = s.at[i(wrist_left)] + 0.09 * size * tilt(lower + 0.15, -0.1);
   }
-  // The script moves the feet; sitting down, the pelvis goes back by the thigh's length. The lower foot stands on the floor.
+  // The script moves the feet; sitting down, the pelvis goes back by the thigh's length. The lower foot stands on the
+  // floor.
   const Vector3d root(script.x(time), script.y(time), reach + sole);
   const Vector3d back = -sit * thigh * forward;
   for (Vector3d& joint : s.at) joint += root + back;

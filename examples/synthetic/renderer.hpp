@@ -1,4 +1,5 @@
-// Ray casting with per-tile culling: colour, depth, surface and label of every pixel, and what of each person can be seen.
+// Ray casting with per-tile culling: colour, depth, surface and label of every pixel, and what of each person can be
+// seen.
 #pragma once
 
 #include <algorithm>
@@ -54,8 +55,9 @@ struct RenderOptions {
 class Renderer {
  public:
   /// Renders surfaces (people among them) as seen by the camera.
-  void render(const Scene& scene, const std::vector<Surface>& surfaces, const ImageCamera& camera, const cfp::SE3<double>& T_world_cam,
-              const Backdrop& backdrop, const RenderOptions& options, Frame& frame) {
+  void render(const Scene& scene, const std::vector<Surface>& surfaces, const ImageCamera& camera,
+              const cfp::SE3<double>& T_world_cam, const Backdrop& backdrop, const RenderOptions& options,
+              Frame& frame) {
     scene_ = &scene;
     surfaces_ = &surfaces;
     camera_ = camera;
@@ -138,7 +140,9 @@ class Renderer {
   }
   [[nodiscard]] const Prepared& at(int i) const { return prepared_[static_cast<std::size_t>(i)]; }
   [[nodiscard]] const Surface& surface(int i) const { return (*surfaces_)[static_cast<std::size_t>(i)]; }
-  [[nodiscard]] Vector3d ray(double x, double y) const { return {(x - camera_.cx) / camera_.fx, (y - camera_.cy) / camera_.fy, 1}; }
+  [[nodiscard]] Vector3d ray(double x, double y) const {
+    return {(x - camera_.cx) / camera_.fx, (y - camera_.cy) / camera_.fy, 1};
+  }
 
   [[nodiscard]] Sample trace(const Vector3d& direction, double farthest) const {
     Sample best;
@@ -169,12 +173,15 @@ class Renderer {
     const Vector3d n = normal_at(s, local, sample.hit.face);
     const double cosine = std::abs(n.dot(rotation_ * direction)) / direction.norm();
     if (slant != nullptr) *slant = cosine;
-    // The pixel's footprint: depth / f across, longer along a slanted surface. The square root is between blur and aliasing.
+    // The pixel's footprint: depth / f across, longer along a slanted surface. The square root is between blur and
+    // aliasing.
     const double footprint_m = sample.hit.depth / camera_.fx / std::sqrt(std::max(cosine, 0.1));
     const Eigen::Vector2d uv = texture_coordinates(s, local, sample.hit.face);
-    const Color color = scene_->textures[static_cast<std::size_t>(s.texture)].sample(uv.x(), uv.y(), footprint_m / tile_size(s));
+    const Color color =
+        scene_->textures[static_cast<std::size_t>(s.texture)].sample(uv.x(), uv.y(), footprint_m / tile_size(s));
     // Two lamps and the light that comes from everywhere.
-    static const Vector3d lamp_a = Vector3d(-0.4, -0.5, 0.75).normalized(), lamp_b = Vector3d(0.7, 0.3, 0.5).normalized();
+    static const Vector3d lamp_a = Vector3d(-0.4, -0.5, 0.75).normalized(),
+                          lamp_b = Vector3d(0.7, 0.3, 0.5).normalized();
     const double light = 0.62 + 0.5 * std::max(0.0, n.dot(lamp_a)) + 0.25 * std::max(0.0, n.dot(lamp_b));
     return static_cast<float>(light) * color;
   }
@@ -243,7 +250,8 @@ class Renderer {
         const bool on_grid = x % 4 == 0 && y % 4 == 0;
         if (person >= 0) {
           Sighting& s = frame.people[static_cast<std::size_t>(person)];
-          s.box = {std::min(s.box.x1, x * 1.0), std::min(s.box.y1, y * 1.0), std::max(s.box.x2, x + 1.0), std::max(s.box.y2, y + 1.0)};
+          s.box = {std::min(s.box.x1, x * 1.0), std::min(s.box.y1, y * 1.0), std::max(s.box.x2, x + 1.0),
+                   std::max(s.box.y2, y + 1.0)};
           ++s.pixels;
           if (on_grid) ++seen[static_cast<std::size_t>(person)];
         }
@@ -253,7 +261,8 @@ class Renderer {
           for (std::size_t i = 0; i < prepared_.size(); ++i) {
             const int who = (*surfaces_)[i].person;
             const Prepared& p = prepared_[i];
-            if (who < 0 || hits[static_cast<std::size_t>(who)] || x < p.x1 || x > p.x2 || y < p.y1 || y > p.y2) continue;
+            if (who < 0 || hits[static_cast<std::size_t>(who)] || x < p.x1 || x > p.x2 || y < p.y1 || y > p.y2)
+              continue;
             hits[static_cast<std::size_t>(who)] = hit((*surfaces_)[i], p.origin, p.A_cam * direction).depth < infinity;
           }
           for (std::size_t who = 0; who < 2; ++who) there[who] += hits[who] ? 1 : 0;
@@ -263,7 +272,8 @@ class Renderer {
     for (std::size_t who = 0; who < 2; ++who) {
       Sighting& s = frame.people[who];
       s.visible = there[who] > 0 ? std::min(1.0, static_cast<double>(seen[who]) / there[who]) : 0;
-      s.at_border = s.pixels > 0 && (s.box.x1 <= 0 || s.box.y1 <= 0 || s.box.x2 >= camera_.width || s.box.y2 >= camera_.height);
+      s.at_border =
+          s.pixels > 0 && (s.box.x1 <= 0 || s.box.y1 <= 0 || s.box.x2 >= camera_.width || s.box.y2 >= camera_.height);
     }
   }
 

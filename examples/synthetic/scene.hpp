@@ -1,6 +1,6 @@
-// The room: x to the right, y away from the camera, z up, metres; the floor is z = 0 and the desk stands around the origin. Near
-// structure (desk, chairs, side tables) lies 2 to 3.5 m from the camera, cabinets at 5 to 6 m, the back wall at 6.9 m, where depth
-// fails in half of the pixels.
+// The room: x to the right, y away from the camera, z up, metres; the floor is z = 0 and the desk stands around the
+// origin. Near structure (desk, chairs, side tables) lies 2 to 3.5 m from the camera, cabinets at 5 to 6 m, the back
+// wall at 6.9 m, where depth fails in half of the pixels.
 #pragma once
 
 #include <vector>
@@ -25,12 +25,14 @@ class SceneBuilder {
  public:
   explicit SceneBuilder(std::uint64_t seed) : random_(seed, "textures") {}
 
-  /// Textures of the people and, when furnished, the room; otherwise only the chairs (for composing into a real recording).
+  /// Textures of the people and, when furnished, the room; otherwise only the chairs (for composing into a real
+  /// recording).
   Scene build(bool furnished) {
     for (int person = 0; person < 2; ++person) {
       const cv::Scalar skin = person == 0 ? cv::Scalar(125, 155, 205) : cv::Scalar(150, 180, 225);
       scene_.skins[person] = add(plain(random_, 256, skin, 4));
-      scene_.heads[person] = add(head(random_, 256, skin, person == 0 ? cv::Scalar(25, 30, 40) : cv::Scalar(70, 120, 150)));
+      scene_.heads[person] =
+          add(head(random_, 256, skin, person == 0 ? cv::Scalar(25, 30, 40) : cv::Scalar(70, 120, 150)));
     }
     scene_.shirts[0] = add(collage(random_, 512, {70, 60, 50}, 260, 0.25, 1));
     scene_.shirts[1] = add(plaid(random_, 512, {190, 180, 160}));
@@ -106,8 +108,8 @@ class SceneBuilder {
     }
     for (int i = 0; i < 9; ++i) {
       box(random_.uniform(-1.5, 1.5), random_.uniform(-0.3, 0.3), 0.74,
-          {random_.uniform(0.06, 0.25), random_.uniform(0.06, 0.2), random_.uniform(0.02, 0.25)}, i % 2 == 0 ? books : brown, 0.5,
-          random_.uniform(-0.6, 0.6));
+          {random_.uniform(0.06, 0.25), random_.uniform(0.06, 0.2), random_.uniform(0.02, 0.25)},
+          i % 2 == 0 ? books : brown, 0.5, random_.uniform(-0.6, 0.6));
     }
     box(0, 0.56, 0, {3.5, 0.05, 1.22}, brown, 3.5);         // the partition behind the desk
     box(-2.75, 0.3, 0, {0.6, 0.9, 1.05}, books, 1.1, 0.2);  // low shelves and tables at the sides

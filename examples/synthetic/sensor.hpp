@@ -34,18 +34,20 @@ class NormalTable {
   std::vector<float> values_;
 };
 
-/// Standard deviation of the depth, m (Nguyen, Izadi, Lovell: "Modeling Kinect sensor noise", 3DIMPVT 2012, axial part).
+/// Standard deviation of the depth, m (Nguyen, Izadi, Lovell: "Modeling Kinect sensor noise", 3DIMPVT 2012, axial
+/// part).
 inline double depth_sigma(double z) { return 0.0012 + 0.0019 * (z - 0.4) * (z - 0.4); }
 
-/// 16-bit depth image; 0 = no depth. Fails beyond the range, on black glossy and grazing surfaces, in the projector's shadow to the left of
-/// near things and, raggedly, along silhouettes, where a few pixels fly between near and far. Where frame.surface is −1 (a real recording),
-/// depth goes through as it is, but for the new shadows.
+/// 16-bit depth image; 0 = no depth. Fails beyond the range, on black glossy and grazing surfaces, in the projector's
+/// shadow to the left of near things and, raggedly, along silhouettes, where a few pixels fly between near and far.
+/// Where frame.surface is −1 (a real recording), depth goes through as it is, but for the new shadows.
 inline cv::Mat sense_depth(const Frame& frame, const std::vector<Surface>& surfaces, const SensorOptions& options,
                            const NormalTable& normal, cfp::Random random) {
   const int width = frame.depth.cols, height = frame.depth.rows;
   cv::Mat image = cv::Mat::zeros(height, width, CV_16U);
   const auto ragged = [&](int x, int y) {  // the same for 3x3 pixels, as correlation windows make edges
-    std::uint64_t h = static_cast<std::uint64_t>(y / 3) * 0x9e3779b97f4a7c15ULL + static_cast<std::uint64_t>(x / 3) * 0xc2b2ae3d27d4eb4fULL;
+    std::uint64_t h = static_cast<std::uint64_t>(y / 3) * 0x9e3779b97f4a7c15ULL +
+                      static_cast<std::uint64_t>(x / 3) * 0xc2b2ae3d27d4eb4fULL;
     h ^= h >> 29U;
     return static_cast<int>((h * 0xbf58476d1ce4e5b9ULL) >> 62U) - 1;  // -1 … 2
   };
@@ -54,7 +56,8 @@ inline cv::Mat sense_depth(const Frame& frame, const std::vector<Surface>& surfa
   for (int y = 0; y < height; ++y) {
     const float* depth = frame.depth.ptr<float>(y);
     const short* ids = frame.surface.ptr<short>(y);
-    // The projector stands to the right and sees x − fb / z: whatever does not move on to the left there is hidden from it.
+    // The projector stands to the right and sees x − fb / z: whatever does not move on to the left there is hidden from
+    // it.
     double leftmost = infinity;
     for (int x = width - 1; x >= 0; --x) {
       const double z = static_cast<double>(depth[x]);
@@ -84,24 +87,28 @@ inline cv::Mat sense_depth(const Frame& frame, const std::vector<Surface>& surfa
       if (z > options.fading_m) failure += (z - options.fading_m) / (options.range_m - options.fading_m);
       if (!(z > options.min_depth_m && z < options.range_m)) continue;
       // Failures come in spots, not as salt.
-      const std::uint64_t spot = cfp::Random(spots + static_cast<std::uint64_t>(y / 4) * 4096 + static_cast<std::uint64_t>(x / 4))();
+      const std::uint64_t spot =
+          cfp::Random(spots + static_cast<std::uint64_t>(y / 4) * 4096 + static_cast<std::uint64_t>(x / 4))();
       if (static_cast<double>(spot >> 40U) * 0x1.0p-24 < failure) continue;
       z += depth_sigma(z) * static_cast<double>(normal(bits));
-      const double disparity = std::round(options.focal_baseline / z / options.disparity_step_px) * options.disparity_step_px;
-      image.at<std::uint16_t>(y, x) =
-          static_cast<std::uint16_t>(std::clamp(options.focal_baseline / disparity * options.depth_units_per_metre, 0.0, 65535.0));
+      const double disparity =
+          std::round(options.focal_baseline / z / options.disparity_step_px) * options.disparity_step_px;
+      image.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(
+          std::clamp(options.focal_baseline / disparity * options.depth_units_per_metre, 0.0, 65535.0));
     }
   }
   return image;
 }
 
-/// Relative exposure at a time: a slow swing and now and then a jump, as automatic exposure does when a person fills the image.
+/// Relative exposure at a time: a slow swing and now and then a jump, as automatic exposure does when a person fills
+/// the image.
 inline double exposure(const SensorOptions& options, double time, double people_part) {
   return 1 + options.exposure_swing * std::sin(0.9 * time) + 0.12 * people_part;
 }
 
 /// 8-bit colour image. Only pixels of rendered surfaces change; a real recording behind them has its own noise.
-inline cv::Mat sense_color(const Frame& frame, const SensorOptions& options, double gain, const NormalTable& normal, cfp::Random random) {
+inline cv::Mat sense_color(const Frame& frame, const SensorOptions& options, double gain, const NormalTable& normal,
+                           cfp::Random random) {
   cv::Mat image(frame.color.size(), CV_8UC3);
   for (int y = 0; y < image.rows; ++y) {
     const cv::Vec3f* in = frame.color.ptr<cv::Vec3f>(y);
@@ -110,8 +117,9 @@ inline cv::Mat sense_color(const Frame& frame, const SensorOptions& options, dou
     for (int x = 0; x < image.cols; ++x) {
       std::uint64_t bits = random();
       for (int c = 0; c < 3; ++c, bits >>= 16U) {
-        const double value = ids[x] < 0 ? static_cast<double>(in[x][c])
-                                        : static_cast<double>(in[x][c]) * gain + options.image_noise * static_cast<double>(normal(bits));
+        const double value =
+            ids[x] < 0 ? static_cast<double>(in[x][c])
+                       : static_cast<double>(in[x][c]) * gain + options.image_noise * static_cast<double>(normal(bits));
         out[x][c] = cv::saturate_cast<unsigned char>(value);
       }
     }

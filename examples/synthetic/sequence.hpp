@@ -70,7 +70,10 @@ struct RenderedFrame {
 class Sequence {
  public:
   explicit Sequence(const SequenceOptions& options, std::shared_ptr<const Recording> recording = nullptr)
-      : options_(options), recording_(std::move(recording)), normal_(options.seed), motion_(options.motion, options.seed) {
+      : options_(options),
+        recording_(std::move(recording)),
+        normal_(options.seed),
+        motion_(options.motion, options.seed) {
     const bool furnished = recording_ == nullptr;
     if (recording_ != nullptr) {
       options_.camera = recording_->camera;
@@ -78,7 +81,8 @@ class Sequence {
       options_.frames = std::min(options_.frames, static_cast<int>(recording_->views.size()));
     }
     scene_ = SceneBuilder(options_.seed).build(furnished);
-    const double seconds = recording_ != nullptr ? time_of(options_.frames) + 1 : options_.frames / options_.rate_hz + 1;
+    const double seconds =
+        recording_ != nullptr ? time_of(options_.frames) + 1 : options_.frames / options_.rate_hz + 1;
     for (int person = 0; person < 2; ++person) {
       cfp::Random random(options_.seed, person == 0 ? "first person" : "second person");
       scripts_[person] = options_.scenario == Scenario::sitting ? sitting_script(random, person, seconds)
@@ -94,14 +98,18 @@ class Sequence {
     const auto last = recording_->views.size() - 1;
     return recording_->views[std::min(static_cast<std::size_t>(frame), last)].time_s - recording_->views[0].time_s;
   }
-  [[nodiscard]] double stamp_of(int frame) const { return (recording_ == nullptr ? 1000.0 : recording_->views[0].time_s) + time_of(frame); }
+  [[nodiscard]] double stamp_of(int frame) const {
+    return (recording_ == nullptr ? 1000.0 : recording_->views[0].time_s) + time_of(frame);
+  }
   /// The camera in the frame of scene.hpp.
   [[nodiscard]] cfp::SE3<double> T_stage_cam(int frame) const {
-    return recording_ == nullptr ? motion_(time_of(frame)) : recording_->views[static_cast<std::size_t>(frame)].T_stage_cam;
+    return recording_ == nullptr ? motion_(time_of(frame))
+                                 : recording_->views[static_cast<std::size_t>(frame)].T_stage_cam;
   }
   /// The camera as groundtruth.txt has it: a recording keeps its own world.
   [[nodiscard]] cfp::SE3<double> T_world_cam(int frame) const {
-    return recording_ == nullptr ? motion_(time_of(frame)) : recording_->views[static_cast<std::size_t>(frame)].T_world_cam;
+    return recording_ == nullptr ? motion_(time_of(frame))
+                                 : recording_->views[static_cast<std::size_t>(frame)].T_world_cam;
   }
   [[nodiscard]] double rotation_rate(int frame) const {
     const int other = frame == 0 ? std::min(1, options_.frames - 1) : frame - 1;
@@ -111,7 +119,8 @@ class Sequence {
   /// Everything in the scene at a time, people last.
   [[nodiscard]] std::vector<Surface> surfaces_at(double time) const {
     std::vector<Surface> surfaces = scene_.surfaces;
-    for (int person = 0; person < 2; ++person) append_person(scene_, scripts_[person], person, time, options_.render.frame_s, surfaces);
+    for (int person = 0; person < 2; ++person)
+      append_person(scene_, scripts_[person], person, time, options_.render.frame_s, surfaces);
     return surfaces;
   }
 
@@ -151,8 +160,10 @@ class Sequence {
     const cv::Mat depth = cv::imread(view.depth.string(), cv::IMREAD_UNCHANGED);
     const cv::Size size(options_.camera.width, options_.camera.height);
     if (b.color.empty()) throw std::runtime_error("cannot read the image " + view.color.string());
-    if (depth.empty() || depth.type() != CV_16U) throw std::runtime_error("cannot read a 16-bit depth image from " + view.depth.string());
-    if (b.color.size() != size || depth.size() != size) throw std::runtime_error(view.color.string() + ": size differs from camera.txt");
+    if (depth.empty() || depth.type() != CV_16U)
+      throw std::runtime_error("cannot read a 16-bit depth image from " + view.depth.string());
+    if (b.color.size() != size || depth.size() != size)
+      throw std::runtime_error(view.color.string() + ": size differs from camera.txt");
     depth.convertTo(b.depth, CV_32F, 1 / recording_->depth_units_per_metre);
     return b;
   }
@@ -165,9 +176,9 @@ class Sequence {
   Script scripts_[2];
 };
 
-/// Reads rgb.txt, depth.txt, groundtruth.txt (or pseudo_groundtruth.txt) and camera.txt. Frames without depth or pose within 20 ms are left
-/// out. The stage is put before the first camera: `camera_height_m` above the floor, looking the way it looks on average, upright along the
-/// mean −y axis of the cameras (nobody films upside down).
+/// Reads rgb.txt, depth.txt, groundtruth.txt (or pseudo_groundtruth.txt) and camera.txt. Frames without depth or pose
+/// within 20 ms are left out. The stage is put before the first camera: `camera_height_m` above the floor, looking the
+/// way it looks on average, upright along the mean −y axis of the cameras (nobody films upside down).
 inline Recording read_recording(const std::filesystem::path& folder, double camera_height_m) {
   Recording recording;
   const cfp_examples::TumCamera camera = cfp_examples::read_tum_camera(folder / "camera.txt");
@@ -179,8 +190,10 @@ inline Recording read_recording(const std::filesystem::path& folder, double came
   recording.camera.height = camera.height;
   recording.depth_units_per_metre = camera.depth_units_per_metre;
   const bool pseudo = !std::filesystem::exists(folder / "groundtruth.txt");
-  const auto poses = cfp_examples::read_tum_trajectory(folder / (pseudo ? "pseudo_groundtruth.txt" : "groundtruth.txt"));
-  const auto colors = cfp_examples::read_tum_list(folder / "rgb.txt"), depths = cfp_examples::read_tum_list(folder / "depth.txt");
+  const auto poses =
+      cfp_examples::read_tum_trajectory(folder / (pseudo ? "pseudo_groundtruth.txt" : "groundtruth.txt"));
+  const auto colors = cfp_examples::read_tum_list(folder / "rgb.txt"),
+             depths = cfp_examples::read_tum_list(folder / "depth.txt");
   // Lists and trajectory are all stamped; the association of the evaluation does for both.
   const auto stamped = [](const std::vector<cfp_examples::TumImage>& images) {
     std::vector<cfp::StampedPose<double>> stamps;

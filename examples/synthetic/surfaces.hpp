@@ -1,5 +1,5 @@
-// What a ray can hit: boxes (furniture), the inside of one (the room) and capsules under an affine map (limbs, torsos, heads). Each is
-// intersected in its own frame, where it is axis-aligned.
+// What a ray can hit: boxes (furniture), the inside of one (the room) and capsules under an affine map (limbs, torsos,
+// heads). Each is intersected in its own frame, where it is axis-aligned.
 #pragma once
 
 #include <algorithm>
@@ -24,19 +24,22 @@ struct Surface {
   Shape shape = Shape::box;
   Matrix3d A = Matrix3d::Identity();
   Vector3d centre = Vector3d::Zero();
-  Vector3d half = Vector3d::Ones();  ///< box, room: half extents; capsule along z: (radius, radius, half length of its axis)
+  Vector3d half =
+      Vector3d::Ones();  ///< box, room: half extents; capsule along z: (radius, radius, half length of its axis)
   int texture = 0;
   double tile_m = 1;                  ///< edge of one texture tile; capsules with tile_m = 0 are wrapped once (heads)
   Vector3d shift = Vector3d::Zero();  ///< of the texture, m, so that equal textures do not look equal
   int person = -1;                    ///< index, −1 for the room
   bool absorbs_infrared = false;      ///< black glossy things have no depth
-  Vector3d moved = Vector3d::Zero();  ///< people: A and centre a frame earlier, as world_before = inverse_before local + moved
+  Vector3d moved =
+      Vector3d::Zero();  ///< people: A and centre a frame earlier, as world_before = inverse_before local + moved
   Matrix3d inverse_before = Matrix3d::Zero();
 };
 
 struct Hit {
-  double depth = infinity;  ///< multiple of the ray direction; the directions have z = 1 in the camera, so it is the depth
-  int face = 0;             ///< box, room: 2 axis + (positive side)
+  double depth =
+      infinity;  ///< multiple of the ray direction; the directions have z = 1 in the camera, so it is the depth
+  int face = 0;  ///< box, room: 2 axis + (positive side)
 };
 
 inline Hit hit_box(const Vector3d& origin, const Vector3d& direction, const Vector3d& half, bool from_inside) {
@@ -62,7 +65,8 @@ inline Hit hit_box(const Vector3d& origin, const Vector3d& direction, const Vect
 
 inline Hit hit_capsule(const Vector3d& o, const Vector3d& d, const Vector3d& half) {
   const double r = half.x(), h = half.z();
-  const double a = d.x() * d.x() + d.y() * d.y(), b = o.x() * d.x() + o.y() * d.y(), c = o.x() * o.x() + o.y() * o.y() - r * r;
+  const double a = d.x() * d.x() + d.y() * d.y(), b = o.x() * d.x() + o.y() * d.y(),
+               c = o.x() * o.x() + o.y() * o.y() - r * r;
   const double discriminant = b * b - a * c;
   if (!(discriminant > 0) || !(a > 0)) return {};
   const double t = (-b - std::sqrt(discriminant)) / a;
@@ -122,6 +126,8 @@ inline Eigen::Vector2d texture_coordinates(const Surface& surface, const Vector3
 }
 
 /// Edge of a texture tile in metres, for choosing the mip level.
-inline double tile_size(const Surface& surface) { return surface.tile_m > 0 ? surface.tile_m : 6.283185307179586 * surface.half.x(); }
+inline double tile_size(const Surface& surface) {
+  return surface.tile_m > 0 ? surface.tile_m : 6.283185307179586 * surface.half.x();
+}
 
 }  // namespace synthetic

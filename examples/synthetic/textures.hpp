@@ -1,4 +1,5 @@
-// Procedural textures with mip levels. Everything is drawn from a seeded generator: no image files, the same room on every machine.
+// Procedural textures with mip levels. Everything is drawn from a seeded generator: no image files, the same room on
+// every machine.
 #pragma once
 
 #include <algorithm>
@@ -42,7 +43,8 @@ class Texture {
     const double x = (u - std::floor(u)) * n - 0.5, y = (v - std::floor(v)) * n - 0.5;
     const double fx = std::floor(x), fy = std::floor(y);
     const auto a = static_cast<float>(x - fx), b = static_cast<float>(y - fy);
-    const int x0 = static_cast<int>(fx) & (n - 1), x1 = (x0 + 1) & (n - 1), y0 = static_cast<int>(fy) & (n - 1), y1 = (y0 + 1) & (n - 1);
+    const int x0 = static_cast<int>(fx) & (n - 1), x1 = (x0 + 1) & (n - 1), y0 = static_cast<int>(fy) & (n - 1),
+              y1 = (y0 + 1) & (n - 1);
     const auto at = [&](int row, int column) {
       const cv::Vec4b& p = level.at<cv::Vec4b>(row, column);
       return Color(p[0], p[1], p[2]);
@@ -76,31 +78,35 @@ inline void add_grain(cfp::Random& random, cv::Mat& image, double strength) {
   }
 }
 
-/// Rectangles, discs, lines and letters of many sizes on a ground colour: posters, papers, labels, clutter. Shapes get smaller as they
-/// go, so every distance finds corners. size in texels, a power of two; contrast in (0, 1] draws the colours towards the ground's.
-inline cv::Mat collage(cfp::Random& random, int size, const cv::Scalar& ground, int shapes, double largest, double contrast) {
+/// Rectangles, discs, lines and letters of many sizes on a ground colour: posters, papers, labels, clutter. Shapes get
+/// smaller as they go, so every distance finds corners. size in texels, a power of two; contrast in (0, 1] draws the
+/// colours towards the ground's.
+inline cv::Mat collage(cfp::Random& random, int size, const cv::Scalar& ground, int shapes, double largest,
+                       double contrast) {
   cv::Mat image(size, size, CV_8UC3, ground);
   const auto any_color = [&]() -> cv::Scalar { return ground + contrast * (random_color(random) - ground); };
   for (int i = 0; i < shapes; ++i) {
     const double scale = size * largest * std::pow(0.05, static_cast<double>(i) / shapes);
     const cv::Point at(static_cast<int>(random.index(static_cast<std::uint32_t>(size))),
                        static_cast<int>(random.index(static_cast<std::uint32_t>(size))));
-    const cv::Size extent(static_cast<int>(scale * random.uniform(0.3, 1)) + 2, static_cast<int>(scale * random.uniform(0.3, 1)) + 2);
+    const cv::Size extent(static_cast<int>(scale * random.uniform(0.3, 1)) + 2,
+                          static_cast<int>(scale * random.uniform(0.3, 1)) + 2);
     const cv::Scalar color = any_color();
     const double kind = random.uniform();
     if (kind < 0.45) {
       cv::rectangle(image, cv::Rect(at, extent), color, cv::FILLED);
       cv::rectangle(image, cv::Rect(at, extent), any_color(), std::max(1, extent.width / 20));
     } else if (kind < 0.6) {
-      cv::circle(image, at, extent.width / 2 + 1, color, random.uniform() < 0.6 ? cv::FILLED : std::max(1, extent.width / 12), cv::LINE_AA);
+      cv::circle(image, at, extent.width / 2 + 1, color,
+                 random.uniform() < 0.6 ? cv::FILLED : std::max(1, extent.width / 12), cv::LINE_AA);
     } else if (kind < 0.72) {
       cv::line(image, at, at + cv::Point(extent.width, random.uniform() < 0.5 ? extent.height : -extent.height), color,
                std::max(1, size / 256), cv::LINE_AA);
     } else {
       std::string word;
       for (int c = 0; c < 7; ++c) word += static_cast<char>('A' + random.index(26));
-      cv::putText(image, word, at, cv::FONT_HERSHEY_DUPLEX, std::max(0.3, scale / 110), color, std::max(1, static_cast<int>(scale / 60)),
-                  cv::LINE_AA);
+      cv::putText(image, word, at, cv::FONT_HERSHEY_DUPLEX, std::max(0.3, scale / 110), color,
+                  std::max(1, static_cast<int>(scale / 60)), cv::LINE_AA);
     }
   }
   add_grain(random, image, 4);
@@ -113,7 +119,8 @@ inline cv::Mat plaid(cfp::Random& random, int size, const cv::Scalar& ground) {
   for (int direction = 0; direction < 2; ++direction) {
     for (int at = 0; at < size;) {
       const int width = size / 64 + static_cast<int>(random.index(static_cast<std::uint32_t>(size / 20)));
-      cv::Mat stripe = direction == 0 ? image.colRange(at, std::min(size, at + width)) : image.rowRange(at, std::min(size, at + width));
+      cv::Mat stripe = direction == 0 ? image.colRange(at, std::min(size, at + width))
+                                      : image.rowRange(at, std::min(size, at + width));
       const cv::Mat color(stripe.size(), CV_8UC3, random_color(random, 0, 255));
       cv::addWeighted(stripe, 0.45, color, 0.55, 0, stripe);
       at += width + size / 48 + static_cast<int>(random.index(static_cast<std::uint32_t>(size / 24)));
@@ -148,7 +155,9 @@ inline cv::Mat plain(cfp::Random& random, int size, const cv::Scalar& color, dou
 /// A head unrolled: u is the angle around it (the face at u = 0.25), v runs from chin (0) to crown (1).
 inline cv::Mat head(cfp::Random& random, int size, const cv::Scalar& skin, const cv::Scalar& hair) {
   cv::Mat image = plain(random, size, skin, 3);
-  const auto at = [size](double u, double v) { return cv::Point(static_cast<int>(u * size), static_cast<int>(v * size)); };
+  const auto at = [size](double u, double v) {
+    return cv::Point(static_cast<int>(u * size), static_cast<int>(v * size));
+  };
   cv::rectangle(image, at(0, 0.72), at(1, 1), hair, cv::FILLED);
   cv::rectangle(image, at(0.45, 0.35), at(1, 1), hair, cv::FILLED);
   cv::rectangle(image, at(0, 0.4), at(0.04, 1), hair, cv::FILLED);

@@ -22,7 +22,8 @@ class Track {
   }
   [[nodiscard]] double last() const { return keys_.back().value; }
   [[nodiscard]] double operator()(double time) const {
-    const auto next = std::upper_bound(keys_.begin(), keys_.end(), time, [](double t, const Key& key) { return t < key.time; });
+    const auto next =
+        std::upper_bound(keys_.begin(), keys_.end(), time, [](double t, const Key& key) { return t < key.time; });
     if (next == keys_.begin()) return keys_.front().value;
     const Key& before = *(next - 1);
     if (next == keys_.end()) return before.value;
@@ -107,7 +108,8 @@ class Director {
 inline Script sitting_script(cfp::Random& random, int person, double seconds) {
   const double inward = chair_heading[person];
   const double feet = 0.42;  // in front of the chair's middle
-  Director d(chair_x[person] + feet * std::cos(inward), chair_y + feet * std::sin(inward), inward, 1, person == 0 ? 1.80 : 1.74);
+  Director d(chair_x[person] + feet * std::cos(inward), chair_y + feet * std::sin(inward), inward, 1,
+             person == 0 ? 1.80 : 1.74);
   d.wait(person == 0 ? 0.3 : 1.2);
   while (d.now() < seconds) {
     const double choice = random.uniform();

@@ -28,8 +28,8 @@ std::string text(const char* format, Values... values) {
   return buffer;
 }
 
-/// Writes the sequence into a folder, which is made when missing. progress(frames done) is called from the rendering threads, one at a
-/// time. The files do not depend on the number of threads.
+/// Writes the sequence into a folder, which is made when missing. progress(frames done) is called from the rendering
+/// threads, one at a time. The files do not depend on the number of threads.
 inline void write_sequence(const Sequence& sequence, const std::filesystem::path& folder, int threads,
                            const std::function<void(int)>& progress) {
   const SequenceOptions& options = sequence.options();
@@ -69,11 +69,13 @@ inline void write_sequence(const Sequence& sequence, const std::filesystem::path
   for (std::thread& thread : pool) thread.join();
   if (failure) std::rethrow_exception(failure);
 
-  std::ofstream rgb(folder / "rgb.txt"), depth(folder / "depth.txt"), labels(folder / "labels.txt"), truth(folder / "groundtruth.txt"),
-      boxes(folder / "boxes.txt"), detections(folder / "detections.txt"), camera(folder / "camera.txt");
+  std::ofstream rgb(folder / "rgb.txt"), depth(folder / "depth.txt"), labels(folder / "labels.txt"),
+      truth(folder / "groundtruth.txt"), boxes(folder / "boxes.txt"), detections(folder / "detections.txt"),
+      camera(folder / "camera.txt");
   const ImageCamera& c = options.camera;
   camera << "# fx fy cx cy width height depth_units_per_metre; images are undistorted\n"
-         << text("%.6g %.6g %.6g %.6g %d %d %.6g\n", c.fx, c.fy, c.cx, c.cy, c.width, c.height, options.sensor.depth_units_per_metre);
+         << text("%.6g %.6g %.6g %.6g %d %d %.6g\n", c.fx, c.fy, c.cx, c.cy, c.width, c.height,
+                 options.sensor.depth_units_per_metre);
   rgb << "# color images: timestamp filename\n";
   depth << "# depth maps, 16-bit, 0 = none: timestamp filename\n";
   labels << "# labels, 8-bit, 0 = static, 1 = moving, 2 = part of a person but still: timestamp filename\n";
@@ -92,12 +94,14 @@ inline void write_sequence(const Sequence& sequence, const std::filesystem::path
       const Sighting& s = seen[who];
       if (s.pixels > 0) {
         boxes << stamp
-              << text(" %d %.0f %.0f %.0f %.0f %.3f %d\n", static_cast<int>(who) + 1, s.box.x1, s.box.y1, s.box.x2, s.box.y2, s.visible,
-                      s.pixels);
+              << text(" %d %.0f %.0f %.0f %.0f %.3f %d\n", static_cast<int>(who) + 1, s.box.x1, s.box.y1, s.box.x2,
+                      s.box.y2, s.visible, s.pixels);
       }
     }
-    for (const Detection& d : detector.detect(seen, sequence.rotation_rate(k), options.blur_samples > 1, c.width, c.height)) {
-      detections << stamp << text(" person %.4f %.2f %.2f %.2f %.2f\n", d.score, d.box.x1, d.box.y1, d.box.x2, d.box.y2);
+    for (const Detection& d :
+         detector.detect(seen, sequence.rotation_rate(k), options.blur_samples > 1, c.width, c.height)) {
+      detections << stamp
+                 << text(" person %.4f %.2f %.2f %.2f %.2f\n", d.score, d.box.x1, d.box.y1, d.box.x2, d.box.y2);
     }
   }
   for (std::ofstream* file : {&rgb, &depth, &labels, &truth, &boxes, &detections, &camera}) {

@@ -15,11 +15,44 @@
 #endif
 
 #if CFP_CPLUSPLUS < 201703L
-#error "cfp needs C++17: compile with -std=c++17 or newer (a -std=c++11 or -std=c++14 in CMAKE_CXX_FLAGS wins over CMake's own setting)."
+#error \
+    "cfp needs C++17: compile with -std=c++17 or newer (a -std=c++11 or -std=c++14 in CMAKE_CXX_FLAGS wins over CMake's own setting)."
+#endif
+
+// Functions stand in the inline namespace CFP_ISA, types do not: units compiled with different vector flags share
+// types, and never a function, whose instructions the other unit's machine might not have.
+#if defined(EIGEN_DONT_VECTORIZE)
+#define CFP_ISA isa_scalar
+#elif defined(__AVX512F__) && defined(__AVX512DQ__) && defined(__AVX512BW__) && defined(__AVX512VL__)
+#define CFP_ISA isa_avx512
+#elif defined(__AVX512F__)
+#define CFP_ISA isa_avx512f
+#elif defined(__AVX2__) && defined(__FMA__)
+#define CFP_ISA isa_avx2_fma
+#elif defined(__AVX2__)
+#define CFP_ISA isa_avx2
+#elif defined(__AVX__) && defined(__FMA__)
+#define CFP_ISA isa_avx_fma
+#elif defined(__AVX__)
+#define CFP_ISA isa_avx
+#elif defined(__SSE4_1__)
+#define CFP_ISA isa_sse4
+#else
+#define CFP_ISA isa_base
+#endif
+
+// Member functions of shared types that compute are inlined everywhere, for the same reason.
+#if defined(__GNUC__)
+#define CFP_INLINE inline __attribute__((always_inline))
+#elif defined(_MSC_VER)
+#define CFP_INLINE __forceinline
+#else
+#define CFP_INLINE inline
 #endif
 
 #if defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
 #if defined(__GNUC__)
-#pragma GCC warning "cfp: -ffinite-math-only (part of -ffast-math) removes the NaN checks that cfp's guarantees rest on; it is not supported."
+#pragma GCC warning \
+    "cfp: -ffinite-math-only (part of -ffast-math) removes the NaN checks that cfp's guarantees rest on; it is not supported."
 #endif
 #endif

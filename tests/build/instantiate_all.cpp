@@ -1,5 +1,6 @@
 // Every template of the public headers, instantiated for float and double, so that nothing rots uncompiled. One section
-// per folder: class templates by explicit instantiation, function templates by taking their address in the section of their folder.
+// per folder: class templates by explicit instantiation, function templates by taking their address in the section of
+// their folder.
 #include "cfp/cfp.hpp"
 
 namespace {
@@ -170,11 +171,10 @@ template struct cfp::RobustLoss<float>;
 template struct cfp::RobustLoss<double>;
 template struct cfp::PoseObservations<float>;
 template struct cfp::PoseObservations<double>;
-template struct cfp::WeightedPnPWorkspace<float>;
-template struct cfp::WeightedPnPWorkspace<double>;
+template struct cfp::PoseWorkspace<float>;
+template struct cfp::PoseWorkspace<double>;
 template <typename Scalar>
-static void instantiate_optimization() noexcept {
-}
+static void instantiate_optimization() noexcept {}
 
 // ---- evaluation ----
 template struct cfp::StampedPose<float>;

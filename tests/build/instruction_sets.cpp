@@ -1,5 +1,6 @@
-// The batch functions on seeded arrays. Compiled once for each set of vector flags; `write FILE` keeps the results of one build,
-// `compare FILE` holds another build to them: equal up to rounding, and exactly where the result is a choice.
+// The batch functions on seeded arrays. Compiled once for each set of vector flags; `write FILE` keeps the results of
+// one build, `compare FILE` holds another build to them: equal up to rounding, and exactly where the result is a
+// choice.
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -7,14 +8,14 @@
 #include <vector>
 
 #include "cfp/clustering/depth_foreground.hpp"
-#include "cfp/core/packet.hpp"
 #include "cfp/core/random.hpp"
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/reprojection.hpp"
 #include "cfp/math/chi_squared.hpp"
 #include "cfp/math/order_statistic.hpp"
-#include "cfp/probability/constraint.hpp"
+#include "cfp/probability/distance_sigmoid.hpp"
 #include "cfp/probability/object.hpp"
+#include "cfp/simd/packet.hpp"
 
 namespace {
 
@@ -27,7 +28,8 @@ class Results {
   /// `scale`: the size of what the result is summed from.
   template <typename Scalar>
   void add(Scalar value, double scale) {
-    all_.push_back({static_cast<double>(value), 64.0 * static_cast<double>(std::numeric_limits<Scalar>::epsilon()) * scale});
+    all_.push_back(
+        {static_cast<double>(value), 64.0 * static_cast<double>(std::numeric_limits<Scalar>::epsilon()) * scale});
   }
   template <typename Scalar>
   void add(const std::vector<Scalar>& values, double scale) {
@@ -48,7 +50,8 @@ void run(Results& results) {
   cfp::Vector6<double> xi;
   xi << 0.05, -0.02, 0.03, 0.01, -0.02, 0.005;
   const cfp::SE3<double> T = cfp::se3_exp(xi);
-  const cfp::Matrix3<Scalar> F = cfp::fundamental_from_pose(cfp::PinholeCamera<double>{535.4, 539.2, 320.1, 247.6}, T).cast<Scalar>();
+  const cfp::Matrix3<Scalar> F =
+      cfp::fundamental_from_pose(cfp::PinholeCamera<double>{535.4, 539.2, 320.1, 247.6}, T).cast<Scalar>();
   std::vector<cfp::Vector2<Scalar>> previous, current;
   std::vector<Scalar> depth, projection(n), epipolar(n), k(n), scratch(n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -72,7 +75,8 @@ void run(Results& results) {
   results.add(k, 1);
   cfp::chi_squared_survival(span<const Scalar>(drawn), 2, span<Scalar>(k));
   results.add(k, 1);
-  results.add(cfp::object_probability(span<const Scalar>(drawn), span<Scalar>(scratch), cfp::ObjectProbabilityOptions{}).static_probability,
+  results.add(cfp::object_probability(span<const Scalar>(drawn), span<Scalar>(scratch), cfp::ObjectProbabilityOptions{})
+                  .static_probability,
               1);
   for (const double q : {0.1, 0.5, 0.95}) {
     scratch = drawn;
@@ -80,7 +84,8 @@ void run(Results& results) {
   }
 
   std::vector<Scalar> depths(n);
-  for (Scalar& z : depths) z = Scalar(random.uniform() < 0.5 ? 2 + 0.12 * random.normal() : 3.5 + 0.05 * random.normal());
+  for (Scalar& z : depths)
+    z = Scalar(random.uniform() < 0.5 ? 2 + 0.12 * random.normal() : 3.5 + 0.05 * random.normal());
   std::vector<char> foreground(n);
   cfp::ForegroundWorkspace<Scalar> work;
   cfp::depth_foreground<Scalar>(depths, cfp::ForegroundOptions{}, work, foreground);
@@ -120,9 +125,11 @@ int main(int argc, char** argv) {
     double expected = 0;
     read += std::fscanf(file, "%la", &expected) == 1 ? 1U : 0U;
     if (std::abs(r.value - expected) <= r.tolerance) continue;
-    if (++different <= 10) std::printf("result %td: %.17g, with the other flags %.17g\n", &r - results.all().data(), r.value, expected);
+    if (++different <= 10)
+      std::printf("result %td: %.17g, with the other flags %.17g\n", &r - results.all().data(), r.value, expected);
   }
   std::fclose(file);
-  std::printf("%zu results, %d floats at once, %zu differences\n", results.all().size(), cfp::native_lanes<float>, different);
+  std::printf("%zu results, %d floats at once, %zu differences\n", results.all().size(), cfp::native_lanes<float>,
+              different);
   return writes || (read == results.all().size() && different == 0) ? 0 : 1;
 }

@@ -18,8 +18,8 @@ int main() {
         control_moved |= !same;
       } else if (!same) {
         ++differences;
-        std::printf("%s: size %zu, alignment %zu, last member at %zu; with other flags %zu, %zu, %zu\n", a.type, a.size, a.alignment,
-                    a.last_offset, b.size, b.alignment, b.last_offset);
+        std::printf("%s: size %zu, alignment %zu, last member at %zu; with other flags %zu, %zu, %zu\n", a.type, a.size,
+                    a.alignment, a.last_offset, b.size, b.alignment, b.last_offset);
       }
     }
   }

@@ -1,6 +1,7 @@
 // Every public struct, one line each: CFP_LAYOUT(type, last data member) or, where the members are private or there are
 // none, CFP_LAYOUT_OPAQUE(type). check_layout_list.cmake names those that are missing.
-// Left out because they are registers, made to follow the flags, and never stored: cfp::PacketMask, cfp::BasicPacket, of core/packet.hpp.
+// Left out because they are registers, made to follow the flags, and never stored: cfp::PacketMask, cfp::BasicPacket,
+// of simd/packet.hpp.
 #pragma once
 
 #include "cfp/cfp.hpp"
@@ -102,12 +103,12 @@
   CFP_LAYOUT(cfp::RobustLoss<float>, delta)                              \
   CFP_LAYOUT(cfp::RobustLoss<double>, delta)                             \
   CFP_LAYOUT(cfp::PoseRound, min_mean_decrease)                          \
-  CFP_LAYOUT(cfp::WeightedPnPOptions, round_count)                       \
+  CFP_LAYOUT(cfp::PoseOptions, round_count)                       \
   CFP_LAYOUT(cfp::PoseObservations<float>, baseline_fx)                  \
   CFP_LAYOUT(cfp::PoseObservations<double>, baseline_fx)                 \
-  CFP_LAYOUT(cfp::WeightedPnPResult, reason)                             \
-  CFP_LAYOUT(cfp::WeightedPnPWorkspace<float>, indices)                  \
-  CFP_LAYOUT(cfp::WeightedPnPWorkspace<double>, indices)                 \
+  CFP_LAYOUT(cfp::PoseResult, reason)                             \
+  CFP_LAYOUT(cfp::PoseWorkspace<float>, indices)                  \
+  CFP_LAYOUT(cfp::PoseWorkspace<double>, indices)                 \
   CFP_LAYOUT(cfp::ConstraintOptions, min_samples)                        \
   CFP_LAYOUT(cfp::ConstraintModel<float>, status)                        \
   CFP_LAYOUT(cfp::ConstraintModel<double>, status)                       \
@@ -120,11 +121,11 @@
   CFP_LAYOUT(cfp::ObjectProbability, status)                             \
   CFP_LAYOUT(cfp::P3PSolutions<float>, status)                           \
   CFP_LAYOUT(cfp::P3PSolutions<double>, status)                          \
-  CFP_LAYOUT(cfp::BaObservations<float>, weights)                        \
-  CFP_LAYOUT(cfp::BaObservations<double>, weights)                       \
-  CFP_LAYOUT(cfp::BaProblem<>, baseline_fx)                              \
-  CFP_LAYOUT(cfp::WeightedBaOptions, chi2_stereo)                        \
-  CFP_LAYOUT(cfp::WeightedBaResult, factor_blocks)                       \
+  CFP_LAYOUT(cfp::BundleObservations<float>, weights)                        \
+  CFP_LAYOUT(cfp::BundleObservations<double>, weights)                       \
+  CFP_LAYOUT(cfp::BundleProblem<>, baseline_fx)                              \
+  CFP_LAYOUT(cfp::BundleOptions, chi2_stereo)                        \
+  CFP_LAYOUT(cfp::BundleResult, factor_blocks)                       \
   CFP_LAYOUT_OPAQUE(cfp::SingleThread)                                   \
   CFP_LAYOUT_OPAQUE(cfp::BlockCholesky)                                  \
   CFP_LAYOUT(cfp::LevenbergMarquardtOptions, min_absolute_decrease)      \
@@ -133,7 +134,7 @@
   CFP_LAYOUT(cfp::PnpRansacOptions, seed)                                \
   CFP_LAYOUT(cfp::PnpRansacResult<float>, inlier_share)                  \
   CFP_LAYOUT(cfp::PnpRansacResult<double>, inlier_share)                 \
-  CFP_LAYOUT_OPAQUE(cfp::WeightedBaWorkspace)                            \
+  CFP_LAYOUT_OPAQUE(cfp::BundleWorkspace)                            \
   CFP_LAYOUT(cfp::FirstStageInput<float>, fundamental)                   \
   CFP_LAYOUT(cfp::FirstStageInput<double>, fundamental)                  \
   CFP_LAYOUT(cfp::FirstStageOutput<float>, objects)                      \

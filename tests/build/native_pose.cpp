@@ -1,20 +1,21 @@
-// Poses by the machine's own instruction set against poses by the distribution's baseline. The same source is compiled with and
-// without -march=native into two programs, since units of one program must not mix such flags:
+// Poses by the machine's own instruction set against poses by the distribution's baseline. The same source is compiled
+// with and without -march=native into two programs, since units of one program must not mix such flags:
 //   cfp_build_pose_baseline <file>   writes its poses;   cfp_build_pose_native <file>   compares with them.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <vector>
 
-#include "cfp/optimization/weighted_ba.hpp"
-#include "cfp/optimization/weighted_pnp.hpp"
+#include "cfp/optimization/bundle/bundle_adjustment.hpp"
+#include "cfp/optimization/pose/pose_refinement.hpp"
 #include "support/ba_scene.hpp"
 #include "support/pose_scene.hpp"
 
 namespace {
 
 struct Answers {
-  std::vector<double> fine, drafted, coarse;  // of double arithmetic, of double after drafts in float, of float arithmetic
+  std::vector<double> fine, drafted,
+      coarse;  // of double arithmetic, of double after drafts in float, of float arithmetic
 };
 
 void append(std::vector<double>& list, const cfp::SE3<double>& T) {
@@ -23,8 +24,9 @@ void append(std::vector<double>& list, const cfp::SE3<double>& T) {
 }
 
 template <typename Scalar>
-void append_refined(std::vector<double>& list, std::uint64_t seed, const cfp_test::PoseSceneOptions& scene_options, const cfp::WeightedPnPOptions& options) {
-  static cfp::WeightedPnPWorkspace<Scalar> workspace;
+void append_refined(std::vector<double>& list, std::uint64_t seed, const cfp_test::PoseSceneOptions& scene_options,
+                    const cfp::PoseOptions& options) {
+  static cfp::PoseWorkspace<Scalar> workspace;
   const auto scene = cfp_test::make_pose_scene<Scalar>(seed, scene_options);
   const auto result = cfp::refine_pose(scene.observations(), scene.camera, scene.start, options, workspace);
   append(list, result.T_cam_world);
@@ -32,9 +34,10 @@ void append_refined(std::vector<double>& list, std::uint64_t seed, const cfp_tes
 }
 
 /// The default rounds, each until the next step promises less than this.
-cfp::WeightedPnPOptions down_to(double min_decrease) {
-  cfp::WeightedPnPOptions options;
-  for (std::size_t r = 0; r < options.round_count; ++r) options.rounds[r].min_mean_decrease = 0, options.rounds[r].min_decrease = min_decrease;
+cfp::PoseOptions down_to(double min_decrease) {
+  cfp::PoseOptions options;
+  for (std::size_t r = 0; r < options.round_count; ++r)
+    options.rounds[r].min_mean_decrease = 0, options.rounds[r].min_decrease = min_decrease;
   return options;
 }
 
@@ -51,7 +54,7 @@ Answers compute() {
     append_refined<double>(answers.drafted, seed, options, cfp::orb_slam2_pose_options());
     append_refined<float>(answers.coarse, seed, options, down_to(1e-3));
   }
-  cfp::WeightedBaWorkspace workspace;
+  cfp::BundleWorkspace workspace;
   for (std::uint64_t seed = 0; seed < 3; ++seed) {
     cfp_test::BaSceneOptions options;
     options.points = 200;
@@ -82,12 +85,15 @@ int main(int argc, char** argv) {
 #ifdef CFP_NATIVE
   std::FILE* file = std::fopen(argv[1], "r");
   if (file == nullptr) return std::printf("%s cannot be opened\n", argv[1]), 1;
-  const double fine = largest_difference(answers.fine, file), drafted = largest_difference(answers.drafted, file), coarse = largest_difference(answers.coarse, file);
+  const double fine = largest_difference(answers.fine, file), drafted = largest_difference(answers.drafted, file),
+               coarse = largest_difference(answers.coarse, file);
   std::fclose(file);
   // Double: rounding, amplified by the condition of the problem. Rounds that end earlier, at 0.1 sigma of the pose
-  // or, ORB-SLAM2's, at 1e-4 sigma: the rounding of the drafts' float, as far as the last steps have shrunk it. Float: its rounding, and steps that end a round earlier or later.
-  std::printf("lanes: %d double, %d float; largest difference of a pose: %.2g in double, %.2g after drafts, %.2g in float\n", cfp::native_lanes<double>,
-              cfp::native_lanes<float>, fine, drafted, coarse);
+  // or, ORB-SLAM2's, at 1e-4 sigma: the rounding of the drafts' float, as far as the last steps have shrunk it. Float:
+  // its rounding, and steps that end a round earlier or later.
+  std::printf(
+      "lanes: %d double, %d float; largest difference of a pose: %.2g in double, %.2g after drafts, %.2g in float\n",
+      cfp::native_lanes<double>, cfp::native_lanes<float>, fine, drafted, coarse);
   return fine < 1e-8 && drafted < 1e-6 && coarse < 1e-4 ? 0 : 1;
 #else
   std::FILE* file = std::fopen(argv[1], "w");

@@ -13,11 +13,13 @@
 namespace {
 
 constexpr cfp::AdaptiveRule rules[] = {cfp::AdaptiveRule::foreground_density, cfp::AdaptiveRule::k_distance_median,
-                                       cfp::AdaptiveRule::k_distance_knee, cfp::AdaptiveRule::kann, cfp::AdaptiveRule::fixed};
+                                       cfp::AdaptiveRule::k_distance_knee, cfp::AdaptiveRule::kann,
+                                       cfp::AdaptiveRule::fixed};
 
 std::vector<double> random_depths(cfp::Random& random, std::size_t n) {
   std::vector<double> depths;
-  for (std::size_t i = 0; i < n; ++i) depths.push_back(random.index(2) == 0 ? 2 + 0.1 * random.normal() : random.uniform(0.5, 6));
+  for (std::size_t i = 0; i < n; ++i)
+    depths.push_back(random.index(2) == 0 ? 2 + 0.1 * random.normal() : random.uniform(0.5, 6));
   std::sort(depths.begin(), depths.end());
   return depths;
 }
@@ -52,7 +54,8 @@ TEST_CASE("k-distances agree with sorting all distances", "[clustering]") {
 }
 
 TEST_CASE("The knee is the corner of a two-slope curve", "[clustering]") {
-  // Twenty values 0.01 apart, then five 1 apart: with k = 1 the curve is flat at 0.01, then at 1; its corner is the last small one.
+  // Twenty values 0.01 apart, then five 1 apart: with k = 1 the curve is flat at 0.01, then at 1; its corner is the
+  // last small one.
   std::vector<double> values;
   for (int i = 0; i < 20; ++i) values.push_back(1 + 0.01 * i);
   for (int i = 0; i < 5; ++i) values.push_back(3 + i);
@@ -60,7 +63,8 @@ TEST_CASE("The knee is the corner of a two-slope curve", "[clustering]") {
   CHECK_THAT(cfp::knee_k_distance<double>(values, 1, workspace), WithinAbs(0.01, 1e-9));
 }
 
-TEST_CASE("KANN-DBSCAN takes mean k-distance and mean neighbour count of the largest K of the first stable run", "[clustering]") {
+TEST_CASE("KANN-DBSCAN takes mean k-distance and mean neighbour count of the largest K of the first stable run",
+          "[clustering]") {
   cfp::Random random(22, "kann");
   cfp::KDistanceWorkspace<double> workspace;
   cfp::DbscanWorkspace<double> dbscan_workspace;
@@ -96,14 +100,16 @@ TEST_CASE("The default's min_pts grows with n at unchanged shape", "[clustering]
   std::size_t before = 0;
   for (const int copies : {1, 2, 4, 8}) {
     std::vector<double> depths;
-    for (int i = 0; i < 60; ++i) depths.insert(depths.end(), static_cast<std::size_t>(copies), i < 40 ? 2 + 0.01 * i : 5 + 0.01 * i);
+    for (int i = 0; i < 60; ++i)
+      depths.insert(depths.end(), static_cast<std::size_t>(copies), i < 40 ? 2 + 0.01 * i : 5 + 0.01 * i);
     const cfp::DbscanOptions chosen = cfp::adaptive_options<double>(depths, {}, workspace);
     CHECK(chosen.min_pts > before);
     before = chosen.min_pts;
   }
 }
 
-TEMPLATE_TEST_CASE("Every rule keeps eps above the sensor's noise and survives hostile depths", "[clustering]", float, double) {
+TEMPLATE_TEST_CASE("Every rule keeps eps above the sensor's noise and survives hostile depths", "[clustering]", float,
+                   double) {
   cfp::AdaptiveWorkspace<TestType> workspace;
   const TestType big = (std::numeric_limits<TestType>::max)(), tiny = std::numeric_limits<TestType>::denorm_min();
   const std::vector<std::vector<TestType>> inputs{{},

@@ -27,7 +27,8 @@ TEMPLATE_TEST_CASE("DBSCAN gives scikit-learn's clusters", "[clustering]", float
     cfp::DbscanWorkspace<TestType> workspace;
     const cfp::DbscanResult result = cfp::dbscan<TestType>(values, options, workspace, ours);
     INFO("case " << cases << " n " << n << " eps " << options.eps << " min_pts " << options.min_pts);
-    // Theirs is a DBSCAN labelling but for the freedoms of the definition: numbering, and which cluster gets a border point.
+    // Theirs is a DBSCAN labelling but for the freedoms of the definition: numbering, and which cluster gets a border
+    // point.
     CHECK(cfp::verify_dbscan<TestType>(values, options, theirs, {false, false}).fault == cfp::DbscanFault::none);
     CHECK(cfp::verify_dbscan<TestType>(values, options, ours).fault == cfp::DbscanFault::none);
     std::map<int, int> partner;
@@ -36,7 +37,8 @@ TEMPLATE_TEST_CASE("DBSCAN gives scikit-learn's clusters", "[clustering]", float
       CHECK((theirs[i] < 0) == (ours[i] < 0));
       std::size_t neighbours = 0;
       for (const TestType other : values)
-        neighbours += (other < values[i] ? values[i] - other : other - values[i]) <= static_cast<TestType>(options.eps) ? 1U : 0U;
+        neighbours +=
+            (other < values[i] ? values[i] - other : other - values[i]) <= static_cast<TestType>(options.eps) ? 1U : 0U;
       if (neighbours < options.min_pts) continue;
       ++their_core;
       CHECK(partner.emplace(theirs[i], ours[i]).first->second == ours[i]);

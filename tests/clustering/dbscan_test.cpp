@@ -56,17 +56,20 @@ TEMPLATE_TEST_CASE("DBSCAN agrees with the definition", "[clustering]", float, d
     INFO("round " << round << " n " << n << " eps " << eps << " min_pts " << min_pts << " at " << verdict.index);
     REQUIRE(verdict.fault == cfp::DbscanFault::none);
     REQUIRE(out.result.status == cfp::Status::ok);
-    REQUIRE(out.result.noise == static_cast<std::size_t>(std::count(out.labels.begin(), out.labels.end(), cfp::dbscan_noise)));
+    REQUIRE(out.result.noise ==
+            static_cast<std::size_t>(std::count(out.labels.begin(), out.labels.end(), cfp::dbscan_noise)));
     const int highest = out.labels.empty() ? -1 : *std::max_element(out.labels.begin(), out.labels.end());
     REQUIRE(out.result.clusters == static_cast<std::size_t>(highest + 1));
   }
 }
 
-TEMPLATE_TEST_CASE("DBSCAN agrees with the definition where each way of sorting is used", "[clustering]", float, double) {
+TEMPLATE_TEST_CASE("DBSCAN agrees with the definition where each way of sorting is used", "[clustering]", float,
+                   double) {
   cfp::Random random(12, "sizes");
   for (const std::size_t n : std::vector<std::size_t>{39, 40, 41, 300, 1499, 1500, 2500}) {
     std::vector<TestType> values = random_values<TestType>(random, n);
-    if (n == 300) values[7] = static_cast<TestType>(1e30);  // presses all others into one position: std::sort takes over
+    if (n == 300)
+      values[7] = static_cast<TestType>(1e30);  // presses all others into one position: std::sort takes over
     const auto out = cluster(values, 0.05, 4);
     CHECK(cfp::verify_dbscan<TestType>(values, {0.05, 4}, out.labels).fault == cfp::DbscanFault::none);
   }
@@ -92,8 +95,10 @@ TEST_CASE("The point counts itself in min_pts", "[clustering]") {
 
 TEMPLATE_TEST_CASE("DBSCAN survives hostile input", "[clustering]", float, double) {
   using Limits = std::numeric_limits<TestType>;
-  const TestType nan = Limits::quiet_NaN(), inf = Limits::infinity(), big = (Limits::max)(), tiny = Limits::denorm_min();
-  const std::vector<TestType> values{nan, 1, inf, big, -big, -inf, 1, TestType(0), TestType(-0.0), tiny, -tiny, 1, nan, big, 2};
+  const TestType nan = Limits::quiet_NaN(), inf = Limits::infinity(), big = (Limits::max)(),
+                 tiny = Limits::denorm_min();
+  const std::vector<TestType> values{nan,  1,     inf, big, -big, -inf, 1, TestType(0), TestType(-0.0),
+                                     tiny, -tiny, 1,   nan, big,  2};
   const auto out = cluster(values, 0.5, 2);
   CHECK(out.result.invalid == 4);
   CHECK(cfp::verify_dbscan<TestType>(values, {0.5, 2}, out.labels).fault == cfp::DbscanFault::none);
@@ -101,7 +106,8 @@ TEMPLATE_TEST_CASE("DBSCAN survives hostile input", "[clustering]", float, doubl
 
   std::vector<TestType> repeated;
   for (int i = 0; i < 20; ++i) repeated.insert(repeated.end(), values.begin(), values.end());
-  CHECK(cfp::verify_dbscan<TestType>(repeated, {0.5, 30}, cluster(repeated, 0.5, 30).labels).fault == cfp::DbscanFault::none);
+  CHECK(cfp::verify_dbscan<TestType>(repeated, {0.5, 30}, cluster(repeated, 0.5, 30).labels).fault ==
+        cfp::DbscanFault::none);
   const std::vector<TestType> equal(500, TestType(1.7));
   CHECK(cluster(equal, 0.0, 500).labels == std::vector<int>(500, 0));
   CHECK(cluster(equal, 0.0, 501).result.noise == 500);
@@ -130,11 +136,13 @@ TEMPLATE_TEST_CASE("DBSCAN allocates nothing after warm-up", "[clustering]", flo
   cfp::DbscanWorkspace<TestType> workspace;
   std::vector<int> labels(3000);
   std::vector<std::vector<TestType>> inputs;
-  for (const std::size_t n : std::vector<std::size_t>{3000, 40, 2999, 0, 700}) inputs.push_back(random_values<TestType>(random, n));
+  for (const std::size_t n : std::vector<std::size_t>{3000, 40, 2999, 0, 700})
+    inputs.push_back(random_values<TestType>(random, n));
   inputs.back()[3] = TestType(1e25);
   cfp::dbscan<TestType>(inputs[0], {0.1, 5}, workspace, labels);
   const std::size_t allocations = cfp_test::allocations_in([&] {
-    for (const auto& input : inputs) cfp::dbscan<TestType>(input, {0.1, 5}, workspace, cfp::span<int>(labels.data(), input.size()));
+    for (const auto& input : inputs)
+      cfp::dbscan<TestType>(input, {0.1, 5}, workspace, cfp::span<int>(labels.data(), input.size()));
   });
   CHECK(allocations == 0);
 }
@@ -144,7 +152,8 @@ TEST_CASE("float and double give the same labels where rounding cannot decide", 
   for (int round = 0; round < 300; ++round) {
     // Values and eps on a grid that both types hold exactly, eps off the grid: no distance equals it.
     std::vector<float> values;
-    for (const double value : random_values<double>(random, 80)) values.push_back(static_cast<float>(std::round(value * 1024) / 1024));
+    for (const double value : random_values<double>(random, 80))
+      values.push_back(static_cast<float>(std::round(value * 1024) / 1024));
     const double eps = (random.index(300) + 0.5) / 1024;
     CHECK(cluster(values, eps, 4).labels == cluster(std::vector<double>(values.begin(), values.end()), eps, 4).labels);
   }

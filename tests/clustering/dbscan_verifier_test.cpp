@@ -9,8 +9,10 @@ namespace {
 
 using cfp::DbscanFault;
 
-// Core points at 0, 0.25, 0.5 and 2, 2.25, 2.5; border points 0.75 and 1.75; noise 1.25 and 9; eps 0.25, min_pts 3 counts the point itself.
-const std::vector<double> values{0, 0.25, 0.5, 0.75, 1.25, 1.75, 2, 2.25, 2.5, 9, 0, 2.5, std::numeric_limits<double>::quiet_NaN()};
+// Core points at 0, 0.25, 0.5 and 2, 2.25, 2.5; border points 0.75 and 1.75; noise 1.25 and 9; eps 0.25, min_pts 3
+// counts the point itself.
+const std::vector<double> values{
+    0, 0.25, 0.5, 0.75, 1.25, 1.75, 2, 2.25, 2.5, 9, 0, 2.5, std::numeric_limits<double>::quiet_NaN()};
 const std::vector<int> right{0, 0, 0, 0, -1, 1, 1, 1, 1, -1, 0, 1, -1};
 const cfp::DbscanOptions options{0.25, 3};
 

@@ -34,8 +34,8 @@ void add_layer(std::vector<double>& depths, std::size_t n, double from, double s
 }
 
 std::size_t kept(const std::vector<char>& mask, std::size_t first, std::size_t count) {
-  return static_cast<std::size_t>(
-      std::count(mask.begin() + static_cast<std::ptrdiff_t>(first), mask.begin() + static_cast<std::ptrdiff_t>(first + count), 1));
+  return static_cast<std::size_t>(std::count(mask.begin() + static_cast<std::ptrdiff_t>(first),
+                                             mask.begin() + static_cast<std::ptrdiff_t>(first + count), 1));
 }
 
 cfp::ForegroundOptions fixed(double eps, std::size_t min_pts) {
@@ -111,7 +111,8 @@ TEST_CASE("A body is parted from a slanted plane that begins at its back", "[clu
   CHECK(kept(out.mask, 100, 100) <= 10);
 }
 
-TEMPLATE_TEST_CASE("Points without a valid depth follow the documented rule and change nothing else", "[clustering]", float, double) {
+TEMPLATE_TEST_CASE("Points without a valid depth follow the documented rule and change nothing else", "[clustering]",
+                   float, double) {
   std::vector<double> valid;
   add_layer(valid, 30, 2.0, 0.01);
   add_layer(valid, 30, 4.0, 0.01);
@@ -168,14 +169,23 @@ TEMPLATE_TEST_CASE("Depth foreground survives hostile depths", "[clustering]", f
   for (int round = 0; round < 300; ++round) {
     std::vector<TestType> depths(random.index(80));
     for (TestType& depth : depths) {
-      const TestType choices[] = {
-          nan, 0, -1, big, -big, tiny, TestType(2), TestType(2.1), TestType(1e30F), static_cast<TestType>(random.uniform(0.5, 6))};
+      const TestType choices[] = {nan,
+                                  0,
+                                  -1,
+                                  big,
+                                  -big,
+                                  tiny,
+                                  TestType(2),
+                                  TestType(2.1),
+                                  TestType(1e30F),
+                                  static_cast<TestType>(random.uniform(0.5, 6))};
       depth = choices[random.index(10)];
     }
     const Outcome out = run(depths);
     CHECK(out.result.foreground + out.result.background + out.result.invalid == depths.size());
     CHECK(std::all_of(out.mask.begin(), out.mask.end(), [](char m) { return m == 0 || m == 1; }));
-    CHECK((out.result.near_m <= out.result.far_m && cfp::is_finite(out.result.near_m) && cfp::is_finite(out.result.far_m)));
+    CHECK((out.result.near_m <= out.result.far_m && cfp::is_finite(out.result.near_m) &&
+           cfp::is_finite(out.result.far_m)));
     CHECK(invalid_field(out.result.dbscan) == nullptr);
   }
 }

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "cfp/core/chunk.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/status.hpp"
+#include "cfp/simd/chunk.hpp"
 #include "support/catch.hpp"
 #include "support/numbers.hpp"
 

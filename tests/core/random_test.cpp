@@ -42,6 +42,14 @@ TEST_CASE("Streams of one seed differ by name and repeat by name", "[core]") {
 }
 
 TEST_CASE("The allocation counter sees vectors and Eigen storage", "[core]") {
-  CHECK(cfp_test::allocations_in([] { std::vector<int> v(100, 1); volatile int keep = v[5]; (void)keep; }) >= 1);
-  CHECK(cfp_test::allocations_in([] { cfp::Random random(3); volatile double keep = random.normal(); (void)keep; }) == 0);
+  CHECK(cfp_test::allocations_in([] {
+          std::vector<int> v(100, 1);
+          volatile int keep = v[5];
+          (void)keep;
+        }) >= 1);
+  CHECK(cfp_test::allocations_in([] {
+          cfp::Random random(3);
+          volatile double keep = random.normal();
+          (void)keep;
+        }) == 0);
 }

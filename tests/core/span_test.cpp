@@ -59,9 +59,10 @@ TEST_CASE("PointSpan reads packed points, points in records, and one array per c
     planes[i] = u;
     planes[5 + i] = v;
   }
-  const std::array<PointSpan<float, 2>, 5> views = {PointSpan<float, 2>(&keypoints[0].x, 5, sizeof(KeyPoint)), PointSpan<float, 2>(pairs),
-                                                    PointSpan<float, 2>(vectors), PointSpan<float, 2>(columns),
-                                                    PointSpan<float, 2>(planes.data(), 5, sizeof(float), 5 * sizeof(float))};
+  const std::array<PointSpan<float, 2>, 5> views = {
+      PointSpan<float, 2>(&keypoints[0].x, 5, sizeof(KeyPoint)), PointSpan<float, 2>(pairs),
+      PointSpan<float, 2>(vectors), PointSpan<float, 2>(columns),
+      PointSpan<float, 2>(planes.data(), 5, sizeof(float), 5 * sizeof(float))};
   for (const PointSpan<float, 2>& view : views) {
     REQUIRE(view.size() == 5);
     for (std::size_t i = 0; i < 5; ++i) {

@@ -30,12 +30,21 @@ std::vector<Scalar> random_costs(cfp::Random& random, std::size_t size, Kind kin
   std::vector<Scalar> costs(size);
   for (Scalar& c : costs) {
     switch (kind) {
-      case Kind::uniform: c = Scalar(random.uniform()); break;
-      case Kind::integer_ties: c = Scalar(random.index(4)); break;
-      case Kind::overlap: c = random.uniform() < 0.7 ? Scalar(1) : Scalar(random.uniform()); break;
-      case Kind::negative: c = Scalar(random.normal()); break;
+      case Kind::uniform:
+        c = Scalar(random.uniform());
+        break;
+      case Kind::integer_ties:
+        c = Scalar(random.index(4));
+        break;
+      case Kind::overlap:
+        c = random.uniform() < 0.7 ? Scalar(1) : Scalar(random.uniform());
+        break;
+      case Kind::negative:
+        c = Scalar(random.normal());
+        break;
       case Kind::sparse:
-        c = random.uniform() < 0.6 ? Scalar(inf) : (random.uniform() < 0.2 ? Scalar(nan_value) : Scalar(random.uniform()));
+        c = random.uniform() < 0.6 ? Scalar(inf)
+                                   : (random.uniform() < 0.2 ? Scalar(nan_value) : Scalar(random.uniform()));
         break;
     }
   }
@@ -62,7 +71,8 @@ TEMPLATE_TEST_CASE("The assignment is optimal: brute force up to 6 x 7, all gate
           REQUIRE(result.pairs == best.pairs);
           REQUIRE_THAT(result.cost, WithinAbs(best.cost, 1e-12));
         } else if (gate > -inf) {
-          REQUIRE_THAT(objective(result.cost, result.pairs, gate), WithinAbs(objective(best.cost, best.pairs, gate), 1e-12));
+          REQUIRE_THAT(objective(result.cost, result.pairs, gate),
+                       WithinAbs(objective(best.cost, best.pairs, gate), 1e-12));
         } else {
           REQUIRE(result.pairs == 0);
         }
@@ -81,7 +91,8 @@ TEMPLATE_TEST_CASE("The assignment is optimal: brute force up to 6 x 7, all gate
 }
 
 TEST_CASE("The optimum is scipy's", "[detection]") {
-  std::ifstream file(std::string(CFP_SOURCE_DIR) + "/tests/data/assignment_scipy.csv");  // tests/data/generate_assignment_scipy.py
+  std::ifstream file(std::string(CFP_SOURCE_DIR) +
+                     "/tests/data/assignment_scipy.csv");  // tests/data/generate_assignment_scipy.py
   REQUIRE(file);
   cfp::AssignmentWorkspace workspace;
   int problems = 0;
@@ -95,7 +106,8 @@ TEST_CASE("The optimum is scipy's", "[detection]") {
     const std::vector<double> values(numbers.begin() + 4, numbers.end());
     REQUIRE(values.size() == rows * cols);
     std::vector<int> columns(rows);
-    const cfp::AssignmentResult result = cfp::solve_assignment(cfp::CostMatrix(values, rows, cols), gate, columns, workspace);
+    const cfp::AssignmentResult result =
+        cfp::solve_assignment(cfp::CostMatrix(values, rows, cols), gate, columns, workspace);
     const double left_out = static_cast<double>((std::min)(rows, cols) - result.pairs);
     CAPTURE(problems, rows, cols, gate);
     CHECK_THAT(result.cost + (left_out > 0 ? gate * left_out : 0.0), WithinAbs(numbers[3], 1e-12));
@@ -107,7 +119,8 @@ TEST_CASE("The optimum is scipy's", "[detection]") {
 TEST_CASE("Large assignments carry a proof: the duality gap vanishes", "[detection]") {
   cfp::Random random(2, "assignment duality");
   cfp::AssignmentWorkspace workspace;
-  for (const auto& [rows, cols] : {std::pair<std::size_t, std::size_t>{60, 60}, {40, 90}, {90, 40}, {200, 200}, {1, 300}, {300, 1}}) {
+  for (const auto& [rows, cols] :
+       {std::pair<std::size_t, std::size_t>{60, 60}, {40, 90}, {90, 40}, {200, 200}, {1, 300}, {300, 1}}) {
     for (const Kind kind : {Kind::uniform, Kind::integer_ties, Kind::overlap, Kind::negative, Kind::sparse}) {
       const std::vector<double> values = random_costs<double>(random, rows * cols, kind);
       const cfp::CostMatrix costs(values, rows, cols);
@@ -130,7 +143,9 @@ TEST_CASE("The verifier refuses what is not optimal or not an assignment", "[det
   cfp::solve_assignment(costs, 1.0, columns, workspace);
   CHECK(columns == std::array<int, 2>{0, 1});  // 0.1 + 0.8 equals 0.2 + 0.9 - 0.2
   CHECK(cfp::assignment_gap(costs, 1.0, columns, workspace.column_saving) < 1e-15);
-  const auto gap = [&](int a, int b) { return cfp::assignment_gap(costs, 1.0, std::array<int, 2>{a, b}, workspace.column_saving); };
+  const auto gap = [&](int a, int b) {
+    return cfp::assignment_gap(costs, 1.0, std::array<int, 2>{a, b}, workspace.column_saving);
+  };
   CHECK_THAT(gap(0, -1), WithinAbs(0.2, 1e-12));
   CHECK_THAT(gap(1, 0), WithinAbs(0.5, 1e-12));
   CHECK_THAT(gap(-1, -1), WithinAbs(1.1, 1e-12));
@@ -161,7 +176,8 @@ TEST_CASE("The gate is the price of a pair left out", "[detection]") {
 TEST_CASE("Hostile costs end: NaN, infinities, extremes, empty", "[detection]") {
   cfp::AssignmentWorkspace workspace;
   cfp::Random random(3, "assignment hostile");
-  const std::array<double, 13> extremes{nan_value, inf, -inf, 1.7e308, -1.7e308, 1e200, -1e200, 5e-324, -5e-324, 0.0, -0.0, 1.0, 1e-300};
+  const std::array<double, 13> extremes{nan_value, inf,     -inf, 1.7e308, -1.7e308, 1e200, -1e200,
+                                        5e-324,    -5e-324, 0.0,  -0.0,    1.0,      1e-300};
   for (int repetition = 0; repetition < 2000; ++repetition) {
     const std::size_t rows = random.index(6), cols = random.index(6);
     std::vector<double> values(rows * cols);
@@ -180,7 +196,8 @@ TEST_CASE("Hostile costs end: NaN, infinities, extremes, empty", "[detection]") 
     REQUIRE(cfp::is_finite(result.cost));
     const std::size_t most = cfp_test::brute_force_assignment(costs, inf).pairs;
     cfp::solve_assignment(costs, inf, columns, workspace);
-    REQUIRE(static_cast<std::size_t>(std::count_if(columns.begin(), columns.end(), [](int j) { return j >= 0; })) == most);
+    REQUIRE(static_cast<std::size_t>(std::count_if(columns.begin(), columns.end(), [](int j) { return j >= 0; })) ==
+            most);
   }
 }
 
@@ -188,10 +205,12 @@ TEST_CASE("Empty matrices need no memory", "[detection]") {
   for (const auto& [rows, cols] : {std::pair<std::size_t, std::size_t>{0, 0}, {0, 3}, {3, 0}}) {
     cfp::AssignmentWorkspace fresh;
     std::vector<int> columns(rows, 5);
-    const cfp::AssignmentResult result = cfp::solve_assignment(cfp::CostMatrix(std::vector<double>{}, rows, cols), 1.0, columns, fresh);
+    const cfp::AssignmentResult result =
+        cfp::solve_assignment(cfp::CostMatrix(std::vector<double>{}, rows, cols), 1.0, columns, fresh);
     CHECK(result.status == cfp::Status::ok);
     CHECK(columns == std::vector<int>(rows, cfp::unassigned));
-    CHECK(cfp::assignment_gap(cfp::CostMatrix(std::vector<double>{}, rows, cols), 1.0, columns, fresh.column_saving) == 0);
+    CHECK(cfp::assignment_gap(cfp::CostMatrix(std::vector<double>{}, rows, cols), 1.0, columns, fresh.column_saving) ==
+          0);
   }
 }
 

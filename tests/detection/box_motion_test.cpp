@@ -35,8 +35,8 @@ struct DenseBoxFilter {
   void predict(Scalar dt, const cfp::BoxMotionOptions& o) {
     Matrix8 Q = Matrix8::Zero();
     const Scalar w = std::exp(state.mean[2]), h = std::exp(state.mean[3]);
-    const std::array<Scalar, 4> q{Scalar(o.centre_acceleration) * w, Scalar(o.centre_acceleration) * h, Scalar(o.size_acceleration),
-                                  Scalar(o.size_acceleration)};
+    const std::array<Scalar, 4> q{Scalar(o.centre_acceleration) * w, Scalar(o.centre_acceleration) * h,
+                                  Scalar(o.size_acceleration), Scalar(o.size_acceleration)};
     for (int i = 0; i < 4; ++i) {
       const Scalar d = q[static_cast<std::size_t>(i)] * q[static_cast<std::size_t>(i)];
       Q(i, i) = d * dt * dt * dt / 3;
@@ -51,7 +51,8 @@ struct DenseBoxFilter {
     REQUIRE(cfp::ekf_predict(state, motion, Q));
   }
   void update(const cfp::Box<Scalar>& b, const cfp::BoxMotionOptions& o) {
-    const Scalar sx = Scalar(o.edge_noise) * std::exp(state.mean[2]), sy = Scalar(o.edge_noise) * std::exp(state.mean[3]);
+    const Scalar sx = Scalar(o.edge_noise) * std::exp(state.mean[2]),
+                 sy = Scalar(o.edge_noise) * std::exp(state.mean[3]);
     const Eigen::Matrix<Scalar, 4, 4> R = Eigen::Matrix<Scalar, 4, 1>(sx * sx, sx * sx, sy * sy, sy * sy).asDiagonal();
     const Eigen::Matrix<Scalar, 4, 1> z(b.x1, b.x2, b.y1, b.y2);
     REQUIRE(cfp::ekf_update(
@@ -65,9 +66,11 @@ void require_equal(const cfp::BoxFilter<Scalar>& split, const DenseBoxFilter<Sca
   const DenseBoxFilter<Scalar> other(split);
   for (int i = 0; i < 8; ++i) {
     const double scale = 1 + std::abs(static_cast<double>(dense.state.mean[i]));
-    REQUIRE_THAT(static_cast<double>(other.state.mean[i]), WithinAbs(static_cast<double>(dense.state.mean[i]), tolerance * scale));
+    REQUIRE_THAT(static_cast<double>(other.state.mean[i]),
+                 WithinAbs(static_cast<double>(dense.state.mean[i]), tolerance * scale));
     for (int j = 0; j < 8; ++j) {
-      const double size = std::sqrt(static_cast<double>(dense.state.covariance(i, i)) * static_cast<double>(dense.state.covariance(j, j)));
+      const double size = std::sqrt(static_cast<double>(dense.state.covariance(i, i)) *
+                                    static_cast<double>(dense.state.covariance(j, j)));
       REQUIRE_THAT(static_cast<double>(other.state.covariance(i, j)),
                    WithinAbs(static_cast<double>(dense.state.covariance(i, j)), tolerance * size + 1e-12));
     }
@@ -139,7 +142,8 @@ TEST_CASE("One step of 2 dt equals two steps of dt", "[detection]") {
   CHECK_THAT(once.var_value, WithinAbs(3 + 0.2 * 2 * 0.5 + 0.04 * 4 + 1.7 * 1.7 * 0.008 / 3, 1e-14));
 }
 
-TEMPLATE_TEST_CASE("Sizes stay positive and everything finite for any number of predictions", "[detection]", float, double) {
+TEMPLATE_TEST_CASE("Sizes stay positive and everything finite for any number of predictions", "[detection]", float,
+                   double) {
   const cfp::BoxMotionOptions options;
   for (const TestType rate : {TestType(-50), TestType(50), TestType(-1e30), TestType(1e30)}) {
     cfp::BoxFilter<TestType> filter = cfp::make_box_filter(cfp::Box<TestType>{10, 20, 60, 200}, options);
@@ -185,7 +189,8 @@ TEST_CASE("An image motion moves the box as the homography moves its points", "[
   CHECK(filter.box().width() < 1.5 * box.width());
   CHECK_THAT(filter.u.value, WithinAbs(130, 1e-6));
 
-  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e300, 0.0}) {
+  for (const double bad :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e300, 0.0}) {
     cfp::BoxFilter<double> kept = filter;
     CHECK_FALSE(cfp::warp(kept, cfp::Matrix3<double>(cfp::Matrix3<double>::Constant(bad))));
     CHECK(kept.u.value == filter.u.value);

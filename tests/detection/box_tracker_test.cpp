@@ -23,9 +23,9 @@ Box shifted(const Box& b, double dx, double dy = 0) { return {b.x1 + dx, b.y1 + 
 Boxes copy(const cfp::BoxTrackerResult<double>& result) { return {result.boxes.begin(), result.boxes.end()}; }
 bool same(const Boxes& a, const Boxes& b) {
   return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), [](const auto& p, const auto& q) {
-           return p.box.x1 == q.box.x1 && p.box.y1 == q.box.y1 && p.box.x2 == q.box.x2 && p.box.y2 == q.box.y2 && p.id == q.id &&
-                  p.class_id == q.class_id && p.score == q.score && p.age == q.age && p.missed == q.missed &&
-                  p.associated == q.associated && p.compensated() == q.compensated();
+           return p.box.x1 == q.box.x1 && p.box.y1 == q.box.y1 && p.box.x2 == q.box.x2 && p.box.y2 == q.box.y2 &&
+                  p.id == q.id && p.class_id == q.class_id && p.score == q.score && p.age == q.age &&
+                  p.missed == q.missed && p.associated == q.associated && p.compensated() == q.compensated();
          });
 }
 
@@ -43,7 +43,8 @@ Detections scene(cfp::Random& random, int n, int k) {
     const double x = 20 + 590.0 / n * i + 40 * std::sin(0.05 * k + i), y = 150 + 30 * std::cos(0.03 * k + 2 * i);
     if (random.uniform() < 0.15) continue;
     const auto jitter = [&] { return random.normal(); };
-    detections.push_back({{x + jitter(), y + jitter(), x + 60 + jitter(), y + 180 + jitter()}, i % 2, random.uniform(0.4, 1)});
+    detections.push_back(
+        {{x + jitter(), y + jitter(), x + 60 + jitter(), y + 180 + jitter()}, i % 2, random.uniform(0.4, 1)});
   }
   return detections;
 }
@@ -59,7 +60,8 @@ TEST_CASE("Bursts of one to six missed frames are compensated where the box real
         const double t = k / rate_hz;
         const Box truth = shifted(start, 60 * t, -10 * t);
         const bool missed = k >= 20 && k < 20 + burst;
-        const auto result = tracker.update(missed ? Detections{} : Detections{{truth, 7, 0.9}}, k == 0 ? 0.0 : 1 / rate_hz);
+        const auto result =
+            tracker.update(missed ? Detections{} : Detections{{truth, 7, 0.9}}, k == 0 ? 0.0 : 1 / rate_hz);
         CAPTURE(rate_hz, burst, k);
         if (k >= 26 && burst == 7) {
           CHECK(result.boxes.empty() == missed);
@@ -130,9 +132,10 @@ TEST_CASE("A given image motion carries predictions through violent rotation", "
       cfp::Matrix3<double> motion = cfp::Matrix3<double>::Identity();
       if (k > 0 && k % 3 == 0) motion(0, 2) = (k / 3) % 2 == 0 ? -60 : 60;
       const bool missed = k > 6 && k % 3 != 2;
-      const auto result =
-          tracker.update(missed ? Detections{} : Detections{{shifted(start, shift), 0, 1}}, 1.0 / 30, given ? &motion : nullptr);
-      kept = kept && result.boxes.size() == 1 && result.boxes[0].id == 1 && cfp::iou(result.boxes[0].box, shifted(start, shift)) > 0.8;
+      const auto result = tracker.update(missed ? Detections{} : Detections{{shifted(start, shift), 0, 1}}, 1.0 / 30,
+                                         given ? &motion : nullptr);
+      kept = kept && result.boxes.size() == 1 && result.boxes[0].id == 1 &&
+             cfp::iou(result.boxes[0].box, shifted(start, shift)) > 0.8;
     }
     CHECK(kept == given);
   }
@@ -146,7 +149,8 @@ TEST_CASE("A given image motion carries predictions through violent rotation", "
 
 TEST_CASE("Compensated boxes are clipped to the image and dropped when nearly outside", "[detection]") {
   cfp::BoxTracker<double> tracker(in_image());
-  for (int k = 0; k < 10; ++k) tracker.update(Detections{{shifted({400, 100, 500, 300}, 15 * k), 0, 1}}, 0.1);  // right edge at 635
+  for (int k = 0; k < 10; ++k)
+    tracker.update(Detections{{shifted({400, 100, 500, 300}, 15 * k), 0, 1}}, 0.1);  // right edge at 635
   std::size_t frames = 0;
   for (int k = 0; k < 6; ++k) {
     const auto result = tracker.update(Detections{}, 0.1);
@@ -199,10 +203,12 @@ TEST_CASE("A long gap ends all tracks", "[detection]") {
   CHECK(tracker.update(Detections{{box, 0, 1}}, 0.1).boxes[0].id == 1);
 }
 
-TEMPLATE_TEST_CASE("Hostile detections, dt and image motion leave finite boxes and a count", "[detection]", float, double) {
+TEMPLATE_TEST_CASE("Hostile detections, dt and image motion leave finite boxes and a count", "[detection]", float,
+                   double) {
   const TestType inf = std::numeric_limits<TestType>::infinity(), nan_ = std::numeric_limits<TestType>::quiet_NaN();
-  const std::vector<TestType> values{nan_, inf, -inf, 0,  TestType(1e-40), TestType(1e30), (std::numeric_limits<TestType>::max)(), -1,
-                                     10,   50,  100,  400};
+  const std::vector<TestType> values{
+      nan_, inf, -inf, 0,  TestType(1e-40), TestType(1e30), (std::numeric_limits<TestType>::max)(), -1,
+      10,   50,  100,  400};
   cfp::Random random(1, "hostile tracker");
   const auto pick = [&] { return values[random.index(static_cast<std::uint32_t>(values.size()))]; };
   cfp::BoxTracker<TestType> tracker(in_image());
@@ -217,7 +223,8 @@ TEMPLATE_TEST_CASE("Hostile detections, dt and image motion leave finite boxes a
     Eigen::Matrix<TestType, 3, 3> motion = Eigen::Matrix<TestType, 3, 3>::Identity();
     if (random.uniform() < 0.3) motion(static_cast<int>(random.index(3)), static_cast<int>(random.index(3))) = pick();
     const TestType dt = random.uniform() < 0.5 ? TestType(0.03) : pick();
-    const auto result = random.uniform() < 0.1 ? tracker.skip(dt, &motion) : tracker.update(detections, dt, k % 2 == 0 ? &motion : nullptr);
+    const auto result = random.uniform() < 0.1 ? tracker.skip(dt, &motion)
+                                               : tracker.update(detections, dt, k % 2 == 0 ? &motion : nullptr);
     REQUIRE((result.status == cfp::Status::invalid_input) == !(dt >= 0 && dt < inf));
     REQUIRE(result.skipped <= detections.size());
     for (const auto& box : result.boxes) {

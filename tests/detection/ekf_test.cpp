@@ -46,8 +46,9 @@ TEMPLATE_TEST_CASE("On a linear model the EKF is the textbook Kalman filter", "[
 
     // The oracle, in double, with explicit inverses: information form of the update.
     Eigen::Vector4d x = F.template cast<double>() * state.mean.template cast<double>();
-    Eigen::Matrix4d P = F.template cast<double>() * state.covariance.template cast<double>() * F.template cast<double>().transpose() +
-                        Q.template cast<double>();
+    Eigen::Matrix4d P =
+        F.template cast<double>() * state.covariance.template cast<double>() * F.template cast<double>().transpose() +
+        Q.template cast<double>();
     const Eigen::Matrix<double, 2, 4> Hd = H.template cast<double>();
     const Eigen::Matrix2d Rd = R.template cast<double>();
     const Eigen::Vector2d r = z.template cast<double>() - Hd * x;
@@ -81,13 +82,16 @@ TEST_CASE("The covariance stays positive semi-definite over thousands of nearly 
   Q(1, 1) = 1e-6F;
   const Eigen::Matrix<float, 1, 1> R(1e-6F), z(1.0F);
   for (int k = 0; k < 5000; ++k) {
-    REQUIRE(cfp::ekf_predict(state, [&](const Eigen::Vector2f& m, Eigen::Matrix2f& J) -> Eigen::Vector2f { return (J = F) * m; }, Q));
+    REQUIRE(cfp::ekf_predict(
+        state, [&](const Eigen::Vector2f& m, Eigen::Matrix2f& J) -> Eigen::Vector2f { return (J = F) * m; }, Q));
     const auto measure = [](const Eigen::Vector2f& m, Eigen::Matrix<float, 1, 2>& H) {
       H << 1, 0;
       return Eigen::Matrix<float, 1, 1>(m[0]);
     };
     REQUIRE(cfp::ekf_update(state, z, measure, R).status == cfp::Status::ok);
-    REQUIRE(Eigen::SelfAdjointEigenSolver<Eigen::Matrix2f>(Eigen::Matrix2f(state.covariance)).eigenvalues().minCoeff() >= -1e-9F);
+    REQUIRE(
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix2f>(Eigen::Matrix2f(state.covariance)).eigenvalues().minCoeff() >=
+        -1e-9F);
   }
 }
 

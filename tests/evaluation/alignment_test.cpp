@@ -94,7 +94,8 @@ TEST_CASE("Points that do not fix the rotation give a proper minimiser and the s
   CHECK(align<double>({}, {}, true).status == cfp::Status::not_enough_data);
 }
 
-TEMPLATE_TEST_CASE("Hostile points are skipped or scaled away, and the result is finite", "[evaluation]", float, double) {
+TEMPLATE_TEST_CASE("Hostile points are skipped or scaled away, and the result is finite", "[evaluation]", float,
+                   double) {
   constexpr TestType nan = std::numeric_limits<TestType>::quiet_NaN(), inf = std::numeric_limits<TestType>::infinity();
   constexpr TestType huge = (std::numeric_limits<TestType>::max)(), tiny = std::numeric_limits<TestType>::denorm_min();
   for (const TestType size : {huge, tiny, TestType(1)}) {
@@ -122,7 +123,8 @@ TEST_CASE("Alignment reads strided points and allocates nothing", "[evaluation]"
   const Points<double> to{{1, 0, 0}, {1, 1, 0}, {0, 0, 0}};
   cfp::AlignmentResult result;
   const auto work = [&] {
-    result = cfp::align_points(cfp::PointSpan<double, 3>(&from[0].x, from.size(), sizeof(Record)), cfp::PointSpan<double, 3>(to));
+    result = cfp::align_points(cfp::PointSpan<double, 3>(&from[0].x, from.size(), sizeof(Record)),
+                               cfp::PointSpan<double, 3>(to));
   };
   CHECK(cfp_test::allocations_in(work) == 0);
   CHECK_THAT((result.S_to_from * cfp::Vector3<double>(1, 0, 0) - to[1]).norm(), WithinAbs(0, 1e-12));

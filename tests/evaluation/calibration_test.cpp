@@ -62,7 +62,9 @@ TEST_CASE("Perfect, reversed and constant scores have AUC 1, 0 and one half", "[
   cfp::CalibrationWorkspace workspace;
   const std::vector<double> rising{0.1, 0.2, 0.8, 0.9}, falling{9, 8, -2, -3}, same(4, 0.3);
   const std::vector<char> labels{0, 0, 1, 1};
-  const auto auc = [&](const std::vector<double>& scores) { return cfp::area_under_curve<double>(scores, labels, {}, workspace).auc; };
+  const auto auc = [&](const std::vector<double>& scores) {
+    return cfp::area_under_curve<double>(scores, labels, {}, workspace).auc;
+  };
   CHECK(auc(rising) == 1);
   CHECK(auc(falling) == 0);
   CHECK(auc(same) == 0.5);
@@ -119,12 +121,14 @@ TEST_CASE("Whole-number weights act as repetitions", "[evaluation]") {
   CHECK_THAT(a.expected_calibration_error, WithinAbs(b.expected_calibration_error, 1e-12));
 }
 
-TEMPLATE_TEST_CASE("Hostile probabilities and weights are skipped, and everything stays finite", "[evaluation]", float, double) {
+TEMPLATE_TEST_CASE("Hostile probabilities and weights are skipped, and everything stays finite", "[evaluation]", float,
+                   double) {
   constexpr TestType nan = std::numeric_limits<TestType>::quiet_NaN(), inf = std::numeric_limits<TestType>::infinity();
   constexpr TestType huge = (std::numeric_limits<TestType>::max)(), tiny = std::numeric_limits<TestType>::denorm_min();
-  const Samples<TestType> s{{nan, inf, -1, 2, TestType(0.5), TestType(0.5), TestType(0.5), 0, 1, 0, tiny, TestType(0.7)},
-                            {1, 1, 1, 1, nan, -1, inf, huge, huge, huge, tiny, 0},
-                            {0, 1, 0, 1, 0, 1, 0, 1, 0, 0, 1, 1}};
+  const Samples<TestType> s{
+      {nan, inf, -1, 2, TestType(0.5), TestType(0.5), TestType(0.5), 0, 1, 0, tiny, TestType(0.7)},
+      {1, 1, 1, 1, nan, -1, inf, huge, huge, huge, tiny, 0},
+      {0, 1, 0, 1, 0, 1, 0, 1, 0, 0, 1, 1}};
   cfp::CalibrationWorkspace workspace;
   const auto r = cfp::evaluate_calibration(s.p(), s.y(), s.w(), workspace);
   CHECK(r.skipped == 7);
@@ -132,7 +136,8 @@ TEMPLATE_TEST_CASE("Hostile probabilities and weights are skipped, and everythin
   for (const double x : {r.auc, r.brier, r.expected_calibration_error, r.largest_calibration_error, r.static_fraction})
     CHECK((x >= 0 && x <= 1));
   CHECK((r.log_loss >= 0 && r.log_loss < 34.6));
-  for (const auto& bin : r.table) CHECK((cfp::is_finite(bin.weight) && bin.static_fraction >= 0 && bin.static_fraction <= 1));
+  for (const auto& bin : r.table)
+    CHECK((cfp::is_finite(bin.weight) && bin.static_fraction >= 0 && bin.static_fraction <= 1));
 
   const auto none = cfp::evaluate_calibration<10, TestType>({}, {}, {}, workspace);
   CHECK(none.status == cfp::Status::not_enough_data);

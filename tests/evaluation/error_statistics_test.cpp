@@ -30,8 +30,10 @@ TEST_CASE("rmse squared is mean squared plus S.D. squared, and the median splits
     for (double& error : errors) error = std::abs(random.normal());
     const auto s = cfp::error_statistics(errors);
     CHECK_THAT(s.rmse * s.rmse, WithinAbs(s.mean * s.mean + s.standard_deviation * s.standard_deviation, 1e-12));
-    CHECK(std::count_if(errors.begin(), errors.end(), [&](double e) { return e < s.median; }) <= static_cast<std::ptrdiff_t>(n / 2));
-    CHECK(std::count_if(errors.begin(), errors.end(), [&](double e) { return e > s.median; }) <= static_cast<std::ptrdiff_t>(n / 2));
+    CHECK(std::count_if(errors.begin(), errors.end(), [&](double e) { return e < s.median; }) <=
+          static_cast<std::ptrdiff_t>(n / 2));
+    CHECK(std::count_if(errors.begin(), errors.end(), [&](double e) { return e > s.median; }) <=
+          static_cast<std::ptrdiff_t>(n / 2));
   }
 }
 

@@ -39,7 +39,8 @@ void check(const std::map<std::string, double>& expected, const std::string& pre
 }
 
 /// evaluate_rpe.py for exact stamps k / 4 and equal lengths, written with 4x4 matrices as the script does.
-std::vector<std::pair<double, double>> relative_errors_by_matrices(const Trajectory<double>& truth, const Trajectory<double>& estimate,
+std::vector<std::pair<double, double>> relative_errors_by_matrices(const Trajectory<double>& truth,
+                                                                   const Trajectory<double>& estimate,
                                                                    std::size_t step) {
   std::vector<std::pair<double, double>> errors;
   const auto matrix = [](const cfp::SE3<double>& T) {
@@ -88,11 +89,13 @@ TEST_CASE("ATE and RPE equal the TUM scripts' output on fr3_walking_xyz", "[eval
   check(expected, "rotational_error", rpe.rotation_deg);
 }
 
-TEMPLATE_TEST_CASE("A rigidly moved truth has no error after rigid alignment and its own motion without", "[evaluation]", float, double) {
+TEMPLATE_TEST_CASE("A rigidly moved truth has no error after rigid alignment and its own motion without",
+                   "[evaluation]", float, double) {
   cfp::Random random(41, "rigid");
   const auto truth = cfp_test::random_walk(random, 200, 100, 0.03);
   const cfp::SE3<double> T{cfp::so3_exp<double>(cfp::Vector3<double>(0, 0, 0.5)), {3, 4, 0}};
-  const auto estimate = cfp_test::cast<TestType>(cfp_test::moved(T, truth)), reference = cfp_test::cast<TestType>(truth);
+  const auto estimate = cfp_test::cast<TestType>(cfp_test::moved(T, truth)),
+             reference = cfp_test::cast<TestType>(truth);
   const double tolerance = std::is_same_v<TestType, float> ? 1e-5 : 1e-12;
   cfp::TrajectoryErrorWorkspace workspace;
   for (const auto mode : {cfp::AlignmentMode::rigid, cfp::AlignmentMode::similarity, cfp::AlignmentMode::first_pose}) {
@@ -129,7 +132,8 @@ TEST_CASE("Only the similarity alignment removes a wrong scale", "[evaluation]")
   CHECK_THAT(ate.S_truth_estimate.scale, WithinAbs(2, 1e-12));
   cfp::RelativeErrorOptions relative;
   relative.scale = 2;
-  CHECK_THAT(cfp::relative_pose_error(view(truth), view(estimate), relative, workspace).translation_m.rmse, WithinAbs(0, 1e-12));
+  CHECK_THAT(cfp::relative_pose_error(view(truth), view(estimate), relative, workspace).translation_m.rmse,
+             WithinAbs(0, 1e-12));
 }
 
 TEST_CASE("RPE in seconds and in frames equals the definition written with 4x4 matrices", "[evaluation]") {
@@ -178,7 +182,8 @@ TEST_CASE("Coverage tells of lost frames, gaps and late starts", "[evaluation]")
     truth.push_back({0.1 * k, {cfp::Matrix3<double>::Identity(), {std::sin(0.1 * k), std::cos(0.2 * k), 0.1 * k}}});
   for (int k = 20; k <= 60; ++k) {
     if (k <= 30 || k >= 50)
-      estimate.push_back({truth[static_cast<std::size_t>(k)].time_s + 0.004, truth[static_cast<std::size_t>(k)].T_world_cam});
+      estimate.push_back(
+          {truth[static_cast<std::size_t>(k)].time_s + 0.004, truth[static_cast<std::size_t>(k)].T_world_cam});
   }
   cfp::TrajectoryErrorWorkspace workspace;
   cfp::AbsoluteErrorOptions options;
@@ -202,13 +207,13 @@ TEMPLATE_TEST_CASE("Hostile trajectories and options give finite results and a s
   cfp::TrajectoryErrorWorkspace workspace;
   for (const auto& a : {none, one, far, broken}) {
     for (const auto& b : {none, one, far, broken}) {
-      for (const auto mode :
-           {cfp::AlignmentMode::none, cfp::AlignmentMode::first_pose, cfp::AlignmentMode::rigid, cfp::AlignmentMode::similarity}) {
+      for (const auto mode : {cfp::AlignmentMode::none, cfp::AlignmentMode::first_pose, cfp::AlignmentMode::rigid,
+                              cfp::AlignmentMode::similarity}) {
         cfp::AbsoluteErrorOptions options;
         options.alignment = mode;
         const auto ate = cfp::absolute_trajectory_error(view(a), view(b), options, workspace);
-        for (const double x : {ate.translation_m.rmse, ate.translation_m.mean, ate.rotation_deg.rmse, ate.coverage.largest_gap_s,
-                               ate.coverage.time_fraction}) {
+        for (const double x : {ate.translation_m.rmse, ate.translation_m.mean, ate.rotation_deg.rmse,
+                               ate.coverage.largest_gap_s, ate.coverage.time_fraction}) {
           CHECK(cfp::is_finite(x));
         }
         CHECK((ate.status == cfp::Status::not_enough_data) == (ate.coverage.matched == 0));
@@ -229,7 +234,8 @@ TEMPLATE_TEST_CASE("Hostile trajectories and options give finite results and a s
 
 TEST_CASE("Both errors allocate nothing the second time", "[evaluation]") {
   cfp::Random random(45, "allocation");
-  const auto truth = cfp_test::random_walk(random, 300, 0, 0.01), estimate = cfp_test::random_walk(random, 100, 0, 0.03);
+  const auto truth = cfp_test::random_walk(random, 300, 0, 0.01),
+             estimate = cfp_test::random_walk(random, 100, 0, 0.03);
   cfp::TrajectoryErrorWorkspace workspace;
   const auto work = [&] {
     (void)cfp::absolute_trajectory_error(view(truth), view(estimate), {}, workspace);

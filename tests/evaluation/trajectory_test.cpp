@@ -20,8 +20,9 @@ Trajectory<double> at(const std::vector<double>& stamps) {
 }
 
 /// associate.py word for word: every pair below max_difference, sorted, taken greedily.
-std::vector<std::pair<double, double>> associate_by_brute_force(const std::vector<double>& first, const std::vector<double>& second,
-                                                                double offset, double max_difference) {
+std::vector<std::pair<double, double>> associate_by_brute_force(const std::vector<double>& first,
+                                                                const std::vector<double>& second, double offset,
+                                                                double max_difference) {
   std::vector<std::tuple<double, double, double>> potential;
   for (const double a : first) {
     for (const double b : second) {
@@ -45,7 +46,8 @@ std::vector<std::pair<double, double>> associate_by_brute_force(const std::vecto
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("time_order sorts, keeps the last of equal stamps and drops broken poses", "[evaluation]", float, double) {
+TEMPLATE_TEST_CASE("time_order sorts, keeps the last of equal stamps and drops broken poses", "[evaluation]", float,
+                   double) {
   Trajectory<TestType> poses(8);
   const double stamps[] = {3, 1, 2, 1, std::numeric_limits<double>::quiet_NaN(), 5, 6, 7};
   for (std::size_t i = 0; i < 8; ++i) poses[i].time_s = stamps[i];
@@ -84,7 +86,8 @@ TEST_CASE("Association equals the TUM script's, ties and offsets included", "[ev
 
 TEST_CASE("Association does not depend on the order of the arrays", "[evaluation]") {
   cfp::Random random(12, "order");
-  auto first = cfp_test::random_walk(random, 300, 1.3e9, 0.01), second = cfp_test::random_walk(random, 100, 1.3e9, 0.03);
+  auto first = cfp_test::random_walk(random, 300, 1.3e9, 0.01),
+       second = cfp_test::random_walk(random, 100, 1.3e9, 0.03);
   cfp::AssociationWorkspace workspace;
   std::vector<cfp::TimeMatch> matches, shuffled_matches;
   cfp::associate(view(first), view(second), {}, workspace, matches);

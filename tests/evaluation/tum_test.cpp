@@ -48,11 +48,13 @@ TEST_CASE("A bad line is refused with file and line", "[evaluation]") {
     const TemporaryFile file("# header\n0 0 0 0 0 0 0 1\n" + std::string(bad) + "\n");
     CHECK(error_of([&] { (void)cfp_examples::read_tum_trajectory(file.path); }).find(file.path.string() + ":3: ") == 0);
   }
-  CHECK(error_of([] { (void)cfp_examples::read_tum_trajectory("/nowhere/at/all.txt"); }).find("/nowhere/at/all.txt") != std::string::npos);
+  CHECK(error_of([] { (void)cfp_examples::read_tum_trajectory("/nowhere/at/all.txt"); }).find("/nowhere/at/all.txt") !=
+        std::string::npos);
   const TemporaryFile list("0.1 a.png b\n");
   CHECK(error_of([&] { (void)cfp_examples::read_tum_list(list.path); }).find(":1: ") != std::string::npos);
   const TemporaryFile camera("525 525 320 240 640 0 5000\n");
-  CHECK(error_of([&] { (void)cfp_examples::read_tum_camera(camera.path); }).find(":1: '0' out of range") != std::string::npos);
+  CHECK(error_of([&] { (void)cfp_examples::read_tum_camera(camera.path); }).find(":1: '0' out of range") !=
+        std::string::npos);
   const TemporaryFile empty("# nothing\n");
   CHECK(!error_of([&] { (void)cfp_examples::read_tum_camera(empty.path); }).empty());
 }

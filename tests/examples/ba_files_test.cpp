@@ -16,7 +16,9 @@ namespace {
 /// A file of the build folder that is gone with the object.
 class File {
  public:
-  File(const std::string& name, const std::string& content) : name_("cfp_ba_files_test_" + name) { std::ofstream(name_, std::ios::binary) << content; }
+  File(const std::string& name, const std::string& content) : name_("cfp_ba_files_test_" + name) {
+    std::ofstream(name_, std::ios::binary) << content;
+  }
   ~File() { std::remove(name_.c_str()); }
   File(const File&) = delete;
   File& operator=(const File&) = delete;
@@ -113,8 +115,10 @@ TEST_CASE("BAL text: damage is reported with its line", "[examples]") {
   CHECK(complaint("txt", "2 x 2\n") == "line 1: number of points is not a number: 'x'");
   CHECK(complaint("txt", "2 -1 2\n") == "line 1: number of points is not a whole number from 0 to below 100000000");
   CHECK(complaint("txt", "2 1.5 2\n") == "line 1: number of points is not a whole number from 0 to below 100000000");
-  CHECK(complaint("txt", replaced(bal, "1 0 3 4", "2 0 3 4")) == "line 3: camera index is not a whole number from 0 to below 2");
-  CHECK(complaint("txt", replaced(bal, "1 0 3 4", "1 1 3 4")) == "line 3: point index is not a whole number from 0 to below 1");
+  CHECK(complaint("txt", replaced(bal, "1 0 3 4", "2 0 3 4")) ==
+        "line 3: camera index is not a whole number from 0 to below 2");
+  CHECK(complaint("txt", replaced(bal, "1 0 3 4", "1 1 3 4")) ==
+        "line 3: point index is not a whole number from 0 to below 1");
   CHECK(complaint("txt", replaced(bal, "1 0 3 4", "1 0 nan 4")) == "line 3: x is not a number: 'nan'");
   CHECK(complaint("txt", replaced(bal, "1 0 3 4", "1 0 3 4px")) == "line 3: y is not a number: '4px'");
   CHECK(complaint("txt", replaced(bal, "500 0.01", "500 1e999")) == "line 6: camera 0, k1 is not a number: '1e999'");
@@ -142,7 +146,8 @@ TEST_CASE("libmv binary: damage is reported with its byte", "[examples]") {
   CHECK(complaint("bin", "") == "byte 0: the file ends before the byte order");
   CHECK(complaint("bin", "x" + whole.substr(1)) == "byte 0: the byte order is neither 'V' nor 'v'");
   CHECK(complaint("bin", "vX" + whole.substr(2)) == "byte 1: the marker space is neither 'P' nor 'N'");
-  CHECK(complaint("bin", libmv(false, 3, std::numeric_limits<float>::infinity())) == "byte 2: intrinsic f is not finite");
+  CHECK(complaint("bin", libmv(false, 3, std::numeric_limits<float>::infinity())) ==
+        "byte 2: intrinsic f is not finite");
   std::string negative = whole;
   negative[37] = static_cast<char>(0x80);  // the highest byte of the number of cameras
   CHECK(complaint("bin", negative) == "byte 34: number of cameras is negative");
@@ -157,5 +162,6 @@ TEST_CASE("libmv binary: damage is reported with its byte", "[examples]") {
 }
 
 TEST_CASE("A file that is not there is named", "[examples]") {
-  for (const std::string name : {"no_such_file.txt", "no_such_file.bin"}) CHECK_THROWS_WITH(ba_files::read(name), name + ": cannot be opened");
+  for (const std::string name : {"no_such_file.txt", "no_such_file.bin"})
+    CHECK_THROWS_WITH(ba_files::read(name), name + ": cannot be opened");
 }

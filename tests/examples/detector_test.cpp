@@ -16,8 +16,8 @@ namespace {
 
 bool same(const Detections& a, const Detections& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const auto& x, const auto& y) {
-    return x.class_id == y.class_id && x.score == y.score && x.box.x1 == y.box.x1 && x.box.y1 == y.box.y1 && x.box.x2 == y.box.x2 &&
-           x.box.y2 == y.box.y2;
+    return x.class_id == y.class_id && x.score == y.score && x.box.x1 == y.box.x1 && x.box.y1 == y.box.y1 &&
+           x.box.x2 == y.box.x2 && x.box.y2 == y.box.y2;
   });
 }
 
@@ -48,8 +48,9 @@ TEST_CASE("An image fitted into a network's input maps back to where it was", "[
 
 TEST_CASE("Boxes of a text file come by time stamp, clipped to the image", "[detector]") {
   const cfp_test::TemporaryFolder folder;
-  const auto detector = make_detector(folder.write(
-      "d.txt", "# boxes\n1.0 person 0.9 -10 5 50 700\n1.0 cup 0.3 1 1 9 9\n2.0 person 0.8 900 5 950 70\n3.0 person 0.5 1 2 3 4\n"));
+  const auto detector = make_detector(folder.write("d.txt",
+                                                   "# boxes\n1.0 person 0.9 -10 5 50 700\n1.0 cup 0.3 1 1 9 9\n2.0 "
+                                                   "person 0.8 900 5 950 70\n3.0 person 0.5 1 2 3 4\n"));
   const cv::Mat image(480, 640, CV_8UC3);
   CHECK(detector->class_of("person") == 0);
   CHECK(detector->class_of("cup") == 1);
@@ -95,7 +96,9 @@ TEST_CASE("The size an ONNX file states is found between its weights", "[detecto
     return bytes + static_cast<char>(n) + content;
   };
   const auto dim = [&](const std::string& varint) { return field(1, "\x08" + varint); };
-  const auto value = [&](const std::string& dims) { return field(11, field(1, "name") + field(2, field(1, "\x08\x01" + field(2, dims)))); };
+  const auto value = [&](const std::string& dims) {
+    return field(11, field(1, "name") + field(2, field(1, "\x08\x01" + field(2, dims))));
+  };
   const std::string weights = field(5, std::string(100000, '\x7f'));
   const std::string kernel = value(dim("\x20") + dim("\x03") + dim("\x03") + dim("\x03"));
   const std::string image = value(dim("\x01") + dim("\x03") + dim("\xe0\x03") + dim("\x80\x05"));  // 480 x 640
@@ -104,7 +107,8 @@ TEST_CASE("The size an ONNX file states is found between its weights", "[detecto
   CHECK(onnx_input_size(folder.write("b", field(7, weights + kernel))).empty());
   CHECK(onnx_input_size(folder.path / "absent").empty());
   const std::string whole = "\x08\x07" + field(7, kernel + image);
-  for (std::size_t n = 0; n < whole.size(); ++n) CHECK(onnx_input_size(folder.write("cut", whole.substr(0, n))).empty());
+  for (std::size_t n = 0; n < whole.size(); ++n)
+    CHECK(onnx_input_size(folder.write("cut", whole.substr(0, n))).empty());
 }
 
 TEST_CASE("The networks find the two men of a real recording, in a thread of its own as well", "[detector]") {
@@ -121,13 +125,14 @@ TEST_CASE("The networks find the two men of a real recording, in a thread of its
       const cv::Mat image = cv::imread((folder / images[i].file).string());
       const Detections found = detector->detect(image, images[i].time_s);
       if (i == 0) CHECK(same(found, std::async(std::launch::async, [&] { return detector->detect(image, 0); }).get()));
-      for (const auto& d : found) CHECK((cfp::is_proper(d.box) && d.box.x1 >= 0 && d.box.y1 >= 0 && d.box.x2 <= 640 && d.box.y2 <= 480));
+      for (const auto& d : found)
+        CHECK((cfp::is_proper(d.box) && d.box.x1 >= 0 && d.box.y1 >= 0 && d.box.x2 <= 640 && d.box.y2 <= 480));
       for (const auto& d : list->detect(image, images[i].time_s)) {
         ++listed;
-        common +=
-            std::any_of(found.begin(), found.end(), [&](const auto& f) { return f.class_id == person && cfp::iou(f.box, d.box) >= 0.5F; })
-                ? 1
-                : 0;
+        common += std::any_of(found.begin(), found.end(),
+                              [&](const auto& f) { return f.class_id == person && cfp::iou(f.box, d.box) >= 0.5F; })
+                      ? 1
+                      : 0;
       }
     }
     INFO(file << ": " << common << " of " << listed);
@@ -140,10 +145,12 @@ TEST_CASE("The networks find the two men of a real recording, in a thread of its
 TEST_CASE("The built-in people detector yields proper boxes or none", "[detector]") {
   const auto detector = make_detector("hog");
   CHECK(detector->class_of("person") == 0);
-  for (const cv::Size size : {cv::Size(0, 0), cv::Size(1, 1), cv::Size(64, 128), cv::Size(63, 500), cv::Size(320, 240)}) {
+  for (const cv::Size size :
+       {cv::Size(0, 0), cv::Size(1, 1), cv::Size(64, 128), cv::Size(63, 500), cv::Size(320, 240)}) {
     cv::Mat image(size, CV_8UC3);
     if (!image.empty()) cv::RNG(5).fill(image, cv::RNG::UNIFORM, 0, 256);
-    for (const auto& d : detector->detect(image, 0)) CHECK((cfp::is_proper(d.box) && d.box.x2 <= static_cast<float>(size.width)));
+    for (const auto& d : detector->detect(image, 0))
+      CHECK((cfp::is_proper(d.box) && d.box.x2 <= static_cast<float>(size.width)));
   }
   CHECK(make_detector("none")->detect(cv::Mat(480, 640, CV_8UC3), 0).empty());
 }

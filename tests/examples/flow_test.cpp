@@ -32,7 +32,9 @@ std::vector<cv::KeyPoint> keypoints_of(const cv::Mat& image) {
   return keypoints;
 }
 
-bool near(const cv::Point2f& a, const cv::Point2f& b, float distance) { return std::hypot(a.x - b.x, a.y - b.y) <= distance; }
+bool near(const cv::Point2f& a, const cv::Point2f& b, float distance) {
+  return std::hypot(a.x - b.x, a.y - b.y) <= distance;
+}
 
 }  // namespace
 

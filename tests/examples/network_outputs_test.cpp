@@ -15,7 +15,8 @@ const cv::Size input{320, 256};
 constexpr int classes = 7;
 
 cv::Mat tensor(std::initializer_list<int> shape, float value = 0) {
-  return cv::Mat(static_cast<int>(shape.size()), std::vector<int>(shape).data(), CV_32F, cv::Scalar(static_cast<double>(value)));
+  return cv::Mat(static_cast<int>(shape.size()), std::vector<int>(shape).data(), CV_32F,
+                 cv::Scalar(static_cast<double>(value)));
 }
 
 // The outputs of every family, all zero.
@@ -105,8 +106,8 @@ void put(NetworkFamily family, std::vector<cv::Mat>& outputs, int at, const floa
     case NetworkFamily::fastestdet: {
       const int x = static_cast<int>(cx / 16), y = static_cast<int>(cy / 16), cell = y * 20 + x;
       const auto logit = [](float p) { return std::log(p / (1 - p)); };
-      const float values[] = {score, std::atanh(cx / 16 - static_cast<float>(x)), std::atanh(cy / 16 - static_cast<float>(y)), logit(w / W),
-                              logit(h / H)};
+      const float values[] = {score, std::atanh(cx / 16 - static_cast<float>(x)),
+                              std::atanh(cy / 16 - static_cast<float>(y)), logit(w / W), logit(h / H)};
       for (int c = 0; c < 5; ++c) data[c * 320 + cell] = values[c];
       data[(5 + id) * 320 + cell] = score;
       break;
@@ -114,8 +115,8 @@ void put(NetworkFamily family, std::vector<cv::Mat>& outputs, int at, const floa
   }
 }
 
-const NetworkFamily families[] = {NetworkFamily::yolov5, NetworkFamily::yolov8, NetworkFamily::darknet, NetworkFamily::nanodet,
-                                  NetworkFamily::fastestdet};
+const NetworkFamily families[] = {NetworkFamily::yolov5, NetworkFamily::yolov8, NetworkFamily::darknet,
+                                  NetworkFamily::nanodet, NetworkFamily::fastestdet};
 
 }  // namespace
 
@@ -184,14 +185,17 @@ TEST_CASE("Garbage in a tensor yields nothing but proper boxes", "[detector]") {
           const auto low = static_cast<std::uint32_t>(bits);
           float any = 0;
           std::memcpy(&any, &low, sizeof any);
-          output.ptr<float>()[i] = round < 11 ? oddities[round] : (bits >> 32U) % 3 == 0 ? any : oddities[(bits >> 34U) % 11];
+          output.ptr<float>()[i] = round < 11               ? oddities[round]
+                                   : (bits >> 32U) % 3 == 0 ? any
+                                                            : oddities[(bits >> 34U) % 11];
         }
       }
       Detections found = decode(family, outputs, 0.3F);
       suppress(found, 0.5F);
       bool good = found.size() <= 1000;
       for (const auto& d : found)
-        good = good && cfp::is_proper(d.box) && d.score >= 0.3F && cfp::is_finite(d.score) && d.class_id >= 0 && d.class_id < classes;
+        good = good && cfp::is_proper(d.box) && d.score >= 0.3F && cfp::is_finite(d.score) && d.class_id >= 0 &&
+               d.class_id < classes;
       CHECK(good);
     }
   }

@@ -22,8 +22,12 @@ std::string png(const cv::Mat& image) {
   cv::imencode(".png", image, bytes);
   return {bytes.begin(), bytes.end()};
 }
-std::string color_png(int value, cv::Size size = {32, 24}) { return png(cv::Mat(size, CV_8UC3, cv::Scalar::all(value))); }
-std::string depth_png(int value, cv::Size size = {32, 24}) { return png(cv::Mat(size, CV_16UC1, cv::Scalar::all(value))); }
+std::string color_png(int value, cv::Size size = {32, 24}) {
+  return png(cv::Mat(size, CV_8UC3, cv::Scalar::all(value)));
+}
+std::string depth_png(int value, cv::Size size = {32, 24}) {
+  return png(cv::Mat(size, CV_16UC1, cv::Scalar::all(value)));
+}
 
 // Images 0 ... n - 1 at i / 10 s, depth 3 ms later; image i has value 10 i + 10, its depth 1000 i + 1000.
 void write_recording(const TemporaryFolder& folder, int n) {
@@ -54,7 +58,8 @@ TEST_CASE("A sound recording reads frame by frame, the same ahead or not", "[seq
   const TemporaryFolder folder;
   write_recording(folder, 6);
   const Sequence sequence(folder.path);
-  CHECK((sequence.size() == 6 && sequence.notes().empty() && sequence.truth().empty() && sequence.true_boxes(0).empty()));
+  CHECK(
+      (sequence.size() == 6 && sequence.notes().empty() && sequence.truth().empty() && sequence.true_boxes(0).empty()));
   CHECK((sequence.camera().fx == 50 && sequence.camera().k1 == 0));
   PrefetchingReader reader(sequence);
   for (const std::size_t i : {0U, 1U, 2U, 4U, 3U, 4U, 5U, 5U, 0U}) {
@@ -96,17 +101,22 @@ TEST_CASE("A frame that cannot be read is noted with file and line and costs no 
     CHECK(frame.usable == (i == 0 || i == 13));
     CHECK(frame.note.empty() == frame.usable);
     const bool colour = i < 7 || i > 10;
-    if (!frame.usable) CHECK(frame.note.find((colour ? "rgb.txt:" : "depth.txt:") + std::to_string(i + 2) + ": ") != std::string::npos);
+    if (!frame.usable)
+      CHECK(frame.note.find((colour ? "rgb.txt:" : "depth.txt:") + std::to_string(i + 2) + ": ") != std::string::npos);
     CHECK(frame.bgr.empty() == (colour && !frame.usable));
   }
 }
 
-TEST_CASE("Lists out of order, repeated stamps and images without a partner leave the others as they were", "[sequence]") {
+TEST_CASE("Lists out of order, repeated stamps and images without a partner leave the others as they were",
+          "[sequence]") {
   const TemporaryFolder folder;
   write_recording(folder, 6);
-  folder.write("rgb.txt", "0.3 rgb/3.png\n0.0 rgb/0.png\n\n0.1 rgb/1.png\n0.1 rgb/5.png\n0.2 rgb/2.png\n9e9 rgb/4.png\n-5 rgb/5.png\n");
+  folder.write(
+      "rgb.txt",
+      "0.3 rgb/3.png\n0.0 rgb/0.png\n\n0.1 rgb/1.png\n0.1 rgb/5.png\n0.2 rgb/2.png\n9e9 rgb/4.png\n-5 rgb/5.png\n");
   folder.write("depth.txt",
-               "0.2199 depth/2.png\n0.003 depth/0.png\n0.004 depth/4.png\n0.1201 depth/1.png\n0.29 depth/3.png\n0.301 depth/5.png\n");
+               "0.2199 depth/2.png\n0.003 depth/0.png\n0.004 depth/4.png\n0.1201 depth/1.png\n0.29 depth/3.png\n0.301 "
+               "depth/5.png\n");
   const Sequence sequence(folder.path);
   REQUIRE(sequence.size() == 6);
   CHECK(sequence.notes().size() == 3);
@@ -193,16 +203,21 @@ TEST_CASE("What cannot be parsed refuses the recording with file and line", "[se
   refused("boxes.txt", "0 1 2 3 4 5 1\n", "boxes.txt:1: ");
   refused("boxes.txt", "0 1e20 2 3 4 5 1 9\n", "boxes.txt:1: ");
   refused("labels.txt", "0\n", "labels.txt:1: ");
-  CHECK(error_of([] { (void)Sequence("/nowhere/rgbd_dataset_freiburg3_walking_xyz"); }).find("rgb.txt") != std::string::npos);
+  CHECK(error_of([] { (void)Sequence("/nowhere/rgbd_dataset_freiburg3_walking_xyz"); }).find("rgb.txt") !=
+        std::string::npos);
   CHECK(error_of([] { (void)Sequence("/nowhere/mine"); }).find("no camera.txt") != std::string::npos);
 }
 
 TEST_CASE("A camera is told from camera.txt with its distortion, or from the folder's name", "[sequence]") {
   const TemporaryFolder folder;
-  const auto distortion = [](const cfp_examples::TumCamera& c) { return std::vector<double>{c.k1, c.k2, c.p1, c.p2, c.k3}; };
+  const auto distortion = [](const cfp_examples::TumCamera& c) {
+    return std::vector<double>{c.k1, c.k2, c.p1, c.p2, c.k3};
+  };
   const std::vector<double> fr1{0.2624, -0.9531, -0.0054, 0.0026, 1.1633};
   const std::string line = "517.3 516.5 318.6 255.3 640 480 5000";
-  const auto read = [&](const std::string& text) { return distortion(cfp_examples::read_tum_camera(folder.write("camera.txt", text))); };
+  const auto read = [&](const std::string& text) {
+    return distortion(cfp_examples::read_tum_camera(folder.write("camera.txt", text)));
+  };
   CHECK(read(line + " 0.2624 -0.9531 -0.0054 0.0026 1.1633\n") == fr1);
   CHECK(read("# (distorted images, k1 k2 p1 p2 k3 = 0.2624 -0.9531 -0.0054 0.0026 1.1633)\n" + line + "\n") == fr1);
   CHECK(read("# undistorted\n" + line + "\n") == std::vector<double>(5, 0));
@@ -221,7 +236,8 @@ TEST_CASE("Labels, true boxes and truth come with the frames they belong to", "[
   folder.write("pseudo_groundtruth.txt", "0.1 1 2 3 0 0 0 1\n");
   const Sequence sequence(folder.path);
   CHECK((sequence.truth().size() == 1 && sequence.truth_file() == "pseudo_groundtruth.txt"));
-  CHECK((sequence.load(0).labels.empty() && sequence.load(0).usable && sequence.load(0).note.find("labels.txt:1: ") != std::string::npos));
+  CHECK((sequence.load(0).labels.empty() && sequence.load(0).usable &&
+         sequence.load(0).note.find("labels.txt:1: ") != std::string::npos));
   CHECK(value_of(sequence.load(1).labels) == 2);
   CHECK((sequence.load(2).labels.empty() && sequence.load(2).note.empty()));
   CHECK((sequence.true_boxes(0).empty() && sequence.true_boxes(1).size() == 2 && sequence.true_boxes(2).size() == 1));

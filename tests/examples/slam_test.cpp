@@ -30,7 +30,8 @@ const std::filesystem::path& rendered() {
   return folder.path;
 }
 
-RunRecord run(const std::filesystem::path& folder, cfp::Variant variant = cfp::Variant::cfp, bool threads = false, std::size_t pictures = 0) {
+RunRecord run(const std::filesystem::path& folder, cfp::Variant variant = cfp::Variant::cfp, bool threads = false,
+              std::size_t pictures = 0) {
   FileDetector detector((folder / "detections.txt").string(), {});
   RunOptions options;
   options.variant = variant;
@@ -40,7 +41,8 @@ RunRecord run(const std::filesystem::path& folder, cfp::Variant variant = cfp::V
 }
 
 std::size_t count(const RunRecord& run, Outcome outcome) {
-  return static_cast<std::size_t>(std::count_if(run.frames.begin(), run.frames.end(), [=](const FrameRecord& f) { return f.outcome == outcome; }));
+  return static_cast<std::size_t>(
+      std::count_if(run.frames.begin(), run.frames.end(), [=](const FrameRecord& f) { return f.outcome == outcome; }));
 }
 
 /// The rendered sequence with other images in some places.
@@ -68,7 +70,8 @@ TEST_CASE("A sequence with walking people: every frame is tracked, to a centimet
 }
 
 TEST_CASE("Threads change the time, not a bit of the trajectory", "[slam]") {
-  const std::vector<cfp::StampedPose<double>> one = run(rendered()).trajectory(), many = run(rendered(), cfp::Variant::cfp, true).trajectory();
+  const std::vector<cfp::StampedPose<double>> one = run(rendered()).trajectory(),
+                                              many = run(rendered(), cfp::Variant::cfp, true).trajectory();
   REQUIRE(one.size() == many.size());
   for (std::size_t k = 0; k < one.size(); ++k) {
     CHECK(one[k].T_world_cam.rotation == many[k].T_world_cam.rotation);
@@ -118,7 +121,8 @@ TEST_CASE("Damaged frames are skipped with their line; the others are tracked", 
   CHECK(r.absolute.translation_m.rmse < 0.01);
 }
 
-TEST_CASE("Two men stand up in a real clip: every frame has a pose, within centimetres of a published estimate", "[slam]") {
+TEST_CASE("Two men stand up in a real clip: every frame has a pose, within centimetres of a published estimate",
+          "[slam]") {
   CFP_REQUIRE_DATA(folder, "tum_fr3_walking_halfsphere_30");
   const RunRecord r = run(folder);
   CHECK(count(r, Outcome::tracked) == 30);

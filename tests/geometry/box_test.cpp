@@ -9,7 +9,8 @@
 
 using cfp::Box;
 
-static_assert(std::is_aggregate_v<Box<float>> && sizeof(Box<float>) == 16 && alignof(Box<float>) == 4, "four plain scalars");
+static_assert(std::is_aggregate_v<Box<float>> && sizeof(Box<float>) == 16 && alignof(Box<float>) == 4,
+              "four plain scalars");
 
 namespace {
 /// Intersection over union by counting the cells of a grid, for boxes with whole coordinates.
@@ -30,7 +31,8 @@ TEST_CASE("iou equals the count of grid cells", "[geometry]") {
   cfp::Random random(1, "boxes");
   const auto coordinate = [&] { return static_cast<double>(random.index(30)) - 15; };
   for (int i = 0; i < 500; ++i) {
-    const Box<double> a{coordinate(), coordinate(), coordinate(), coordinate()}, b{coordinate(), coordinate(), coordinate(), coordinate()};
+    const Box<double> a{coordinate(), coordinate(), coordinate(), coordinate()},
+        b{coordinate(), coordinate(), coordinate(), coordinate()};
     const double expected = cfp::is_proper(a) && cfp::is_proper(b) ? counted_iou(a, b) : 0.0;
     CHECK_THAT(cfp::iou(a, b), WithinAbs(expected, 1e-15));
     CHECK(cfp::iou(a, b) == cfp::iou(b, a));

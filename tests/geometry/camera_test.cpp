@@ -52,7 +52,8 @@ std::vector<Vector3<Scalar>> points() {
   std::vector<Vector3<Scalar>> grid;
   for (const double x : {-1.5, -0.4, 0.0, 0.3, 1.0}) {
     for (const double y : {-0.8, 0.0, 0.5, 1.2}) {
-      for (const double z : {-3.0, -1e-3, 0.0, 1e-9, 0.5, 1.0, 2.5, 40.0}) grid.push_back(Vector3<double>(x, y, z).cast<Scalar>());
+      for (const double z : {-3.0, -1e-3, 0.0, 1e-9, 0.5, 1.0, 2.5, 40.0})
+        grid.push_back(Vector3<double>(x, y, z).cast<Scalar>());
     }
   }
   return grid;
@@ -60,8 +61,9 @@ std::vector<Vector3<Scalar>> points() {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("project agrees with finite differences and rejects what is behind", "[geometry]", PinholeCamera<float>,
-                   PinholeCamera<double>, RadialTangentialCamera<float>, RadialTangentialCamera<double>) {
+TEMPLATE_TEST_CASE("project agrees with finite differences and rejects what is behind", "[geometry]",
+                   PinholeCamera<float>, PinholeCamera<double>, RadialTangentialCamera<float>,
+                   RadialTangentialCamera<double>) {
   using Scalar = typename TestType::ScalarType;
   const auto camera = make<TestType>();
   int valid = 0;
@@ -96,8 +98,8 @@ TEMPLATE_TEST_CASE("project agrees with finite differences and rejects what is b
   CHECK(valid >= 40);
 }
 
-TEMPLATE_TEST_CASE("unproject inverts project", "[geometry]", PinholeCamera<float>, PinholeCamera<double>, RadialTangentialCamera<float>,
-                   RadialTangentialCamera<double>) {
+TEMPLATE_TEST_CASE("unproject inverts project", "[geometry]", PinholeCamera<float>, PinholeCamera<double>,
+                   RadialTangentialCamera<float>, RadialTangentialCamera<double>) {
   using Scalar = typename TestType::ScalarType;
   const auto camera = make<TestType>();
   for (int u = 0; u <= 640; u += 40) {
@@ -116,15 +118,17 @@ TEMPLATE_TEST_CASE("unproject inverts project", "[geometry]", PinholeCamera<floa
   }
 }
 
-TEMPLATE_TEST_CASE("cameras answer hostile input with false and leave the outputs alone", "[geometry]", PinholeCamera<float>,
-                   PinholeCamera<double>, RadialTangentialCamera<float>, RadialTangentialCamera<double>) {
+TEMPLATE_TEST_CASE("cameras answer hostile input with false and leave the outputs alone", "[geometry]",
+                   PinholeCamera<float>, PinholeCamera<double>, RadialTangentialCamera<float>,
+                   RadialTangentialCamera<double>) {
   using Scalar = typename TestType::ScalarType;
   const auto camera = make<TestType>();
   for (const Scalar a : cfp_test::hostile_numbers<Scalar>()) {
     for (const Scalar b : cfp_test::hostile_numbers<Scalar>()) {
       CAPTURE(a, b);
       Vector2<Scalar> pixel(-7, -7);
-      for (const Vector3<Scalar>& point : {Vector3<Scalar>(a, b, 1), Vector3<Scalar>(a, 1, b), Vector3<Scalar>(1, a, b)}) {
+      for (const Vector3<Scalar>& point :
+           {Vector3<Scalar>(a, b, 1), Vector3<Scalar>(a, 1, b), Vector3<Scalar>(1, a, b)}) {
         pixel << -7, -7;
         if (camera.project(point, pixel)) {
           CHECK((cfp::is_finite(pixel.x()) && cfp::is_finite(pixel.y())));

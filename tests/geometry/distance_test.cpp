@@ -26,7 +26,8 @@ TEMPLATE_TEST_CASE("copy_distances keeps what has_distance accepts, in order", "
       }
       std::vector<TestType> to(n, TestType(-7));
       std::size_t kept = 0;
-      CHECK(cfp_test::allocations_in([&] { kept = cfp::copy_distances(span<const TestType>(from), span<TestType>(to)); }) == 0);
+      CHECK(cfp_test::allocations_in(
+                [&] { kept = cfp::copy_distances(span<const TestType>(from), span<TestType>(to)); }) == 0);
       to.resize(kept);
       CHECK(to == expected);
       kept = cfp::copy_distances(span<const TestType>(from), span<TestType>(from));

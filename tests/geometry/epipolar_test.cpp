@@ -21,7 +21,8 @@ TEMPLATE_TEST_CASE("exact correspondences lie on their epipolar lines", "[geomet
   const Matrix3<TestType> E = cfp::essential_from_pose(views.T_cur_prev);
   for (std::size_t i = 0; i < views.prev.size(); ++i) {
     CHECK_THAT(cfp::epipolar_distance(F, views.prev[i], views.cur[i]), WithinAbs(0, pixel_tolerance<TestType>));
-    CHECK_THAT(cfp::symmetric_epipolar_distance(F, views.prev[i], views.cur[i]), WithinAbs(0, pixel_tolerance<TestType>));
+    CHECK_THAT(cfp::symmetric_epipolar_distance(F, views.prev[i], views.cur[i]),
+               WithinAbs(0, pixel_tolerance<TestType>));
     CHECK_THAT(cfp::sampson_distance(F, views.prev[i], views.cur[i]), WithinAbs(0, pixel_tolerance<TestType>));
     Vector3<TestType> ray_prev = Vector3<TestType>::Zero(), ray_cur = Vector3<TestType>::Zero();
     REQUIRE(views.camera_prev.unproject(views.prev[i], ray_prev));
@@ -31,7 +32,8 @@ TEMPLATE_TEST_CASE("exact correspondences lie on their epipolar lines", "[geomet
 }
 
 TEST_CASE("a sideways motion of equal cameras leaves rows as epipolar lines", "[geometry]") {
-  // With R = I and t = (b, 0, 0) the line of (u, v) is the row v: the distance is the difference of rows, whatever b is.
+  // With R = I and t = (b, 0, 0) the line of (u, v) is the row v: the distance is the difference of rows, whatever b
+  // is.
   const cfp::PinholeCamera<double> camera{500, 500, 320, 240};
   for (const double baseline : {1e-9, 0.1, 3e5}) {
     cfp::SE3<double> T;
@@ -50,7 +52,8 @@ TEST_CASE("the epipolar distance is the distance to the foot of the perpendicula
     const Vector2<double> point = views.cur[i] + Vector2<double>(3, -7);
     const Vector3<double> line = cfp::epipolar_line(F, views.prev[i]);
     const Vector2<double> direction = Vector2<double>(-line.y(), line.x()).normalized();
-    const Vector2<double> foot = views.cur[i] + direction * direction.dot(point - views.cur[i]);  // cur lies on the line
+    const Vector2<double> foot =
+        views.cur[i] + direction * direction.dot(point - views.cur[i]);  // cur lies on the line
     CHECK_THAT(cfp::epipolar_distance(F, views.prev[i], point), WithinAbs((point - foot).norm(), 1e-9));
     CHECK_THAT(cfp::point_line_distance(line, point), WithinAbs((point - foot).norm(), 1e-9));
   }
@@ -59,13 +62,15 @@ TEST_CASE("the epipolar distance is the distance to the foot of the perpendicula
 TEST_CASE("distances do not depend on the scale of F, the symmetric ones not on the order of the views", "[geometry]") {
   const TwoViews<double> views(50);
   const Matrix3<double> F = cfp::fundamental_from_pose(views.camera_prev, views.camera_cur, views.T_cur_prev);
-  const Matrix3<double> F_swapped = cfp::fundamental_from_pose(views.camera_cur, views.camera_prev, views.T_cur_prev.inverse());
+  const Matrix3<double> F_swapped =
+      cfp::fundamental_from_pose(views.camera_cur, views.camera_prev, views.T_cur_prev.inverse());
   for (std::size_t i = 0; i < views.prev.size(); ++i) {
     const Vector2<double> a = views.prev[i], b = views.cur[i] + Vector2<double>(2, 5);
     const double d = cfp::epipolar_distance(F, a, b);
     for (const double scale : {-1.0, 1e-200, 1e200})
       CHECK_THAT(cfp::epipolar_distance(Matrix3<double>(scale * F), a, b), WithinAbs(d, 1e-9));
-    CHECK_THAT(cfp::symmetric_epipolar_distance(F_swapped, b, a), WithinAbs(cfp::symmetric_epipolar_distance(F, a, b), 1e-9));
+    CHECK_THAT(cfp::symmetric_epipolar_distance(F_swapped, b, a),
+               WithinAbs(cfp::symmetric_epipolar_distance(F, a, b), 1e-9));
     CHECK_THAT(cfp::sampson_distance(F_swapped, b, a), WithinAbs(cfp::sampson_distance(F, a, b), 1e-9));
     CHECK(cfp::sampson_distance(F, a, b) <= d);
   }
@@ -94,7 +99,8 @@ TEMPLATE_TEST_CASE("epipolar distances of arrays equal the scalar function", "[g
   TwoViews<TestType> views(200);
   const Matrix3<TestType> F = cfp::fundamental_from_pose(views.camera_prev, views.camera_cur, views.T_cur_prev);
   const auto hostile = cfp_test::hostile_numbers<TestType>();
-  for (std::size_t i = 0; i < views.cur.size(); ++i) views.cur[i] += Vector2<TestType>(TestType(i % 7), TestType(i % 11) / 2);
+  for (std::size_t i = 0; i < views.cur.size(); ++i)
+    views.cur[i] += Vector2<TestType>(TestType(i % 7), TestType(i % 11) / 2);
   for (std::size_t i = 0; i < hostile.size(); ++i) {
     views.prev[3 * i].x() = hostile[i];
     views.cur[3 * i + 1].y() = hostile[i];

@@ -38,8 +38,8 @@ TEMPLATE_TEST_CASE("Eight points recover the exact F", "[geometry]", float, doub
     REQUIRE(cfp::fundamental_8point<TestType>(scene.prev, scene.cur, {}, F) == Status::ok);
     // Float pixels carry 3e-5 px of rounding, which eight points alone may amplify.
     for (std::size_t i = 0; i < scene.prev.size(); ++i) {
-      const double distance =
-          double(cfp::sampson_distance<TestType>(F, {scene.prev[i][0], scene.prev[i][1]}, {scene.cur[i][0], scene.cur[i][1]}));
+      const double distance = double(
+          cfp::sampson_distance<TestType>(F, {scene.prev[i][0], scene.prev[i][1]}, {scene.cur[i][0], scene.cur[i][1]}));
       CHECK(distance >= 0);
       CHECK(distance < (std::is_same_v<TestType, float> ? 5e-2 : 1e-6));
     }
@@ -67,7 +67,8 @@ TEMPLATE_TEST_CASE("Seven points give the true F among their solutions", "[geome
       if (!std::is_same_v<TestType, double>) continue;
       CHECK(std::abs(F.determinant()) < 1e-12);
       for (std::size_t i = 0; i < 7; ++i) {
-        CHECK(cfp::sampson_distance<double>(F, {scene.prev[i][0], scene.prev[i][1]}, {scene.cur[i][0], scene.cur[i][1]}) < 1e-5);
+        CHECK(cfp::sampson_distance<double>(F, {scene.prev[i][0], scene.prev[i][1]},
+                                            {scene.cur[i][0], scene.cur[i][1]}) < 1e-5);
       }
     }
     found += best < (std::is_same_v<TestType, float> ? 0.02 : 1e-6) ? 1 : 0;
@@ -163,7 +164,8 @@ TEST_CASE("Pairs that do not determine F are reported", "[geometry]") {
   const std::vector<std::array<double, 2>> few(7, {3.0, 4.0});
   CHECK(cfp::fundamental_8point<double>(few, few, {}, F) == Status::not_enough_data);
   CHECK(cfp::fundamental_7point<double>(few, few, solutions) == 0);
-  CHECK(cfp::fundamental_8point<double>(PointSpan<double, 2>(), PointSpan<double, 2>(), {}, F) == Status::not_enough_data);
+  CHECK(cfp::fundamental_8point<double>(PointSpan<double, 2>(), PointSpan<double, 2>(), {}, F) ==
+        Status::not_enough_data);
   for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e300}) {
     std::vector<std::array<double, 2>> hostile(20, {bad, 1.0});
     CHECK(cfp::fundamental_8point<double>(hostile, hostile, {}, F) == Status::not_enough_data);

@@ -14,7 +14,8 @@ TEST_CASE("the cameras' Jacobians equal automatic differentiation", "[geometry]"
   const cfp::RadialTangentialCamera<double> camera{520.9, 521, 325.1, 249.7, 0.2312, -0.7849, -0.0033, -0.0001, 0.9172};
   const cfp::RadialTangentialCamera<Jet> dual_camera{Jet(520.9),   Jet(521.0),   Jet(325.1),   Jet(249.7), Jet(0.2312),
                                                      Jet(-0.7849), Jet(-0.0033), Jet(-0.0001), Jet(0.9172)};
-  for (const Vector3<double>& point : {Vector3<double>(0.3, -0.4, 1.5), Vector3<double>(-1, 0.6, 2), Vector3<double>(0, 0, 0.7)}) {
+  for (const Vector3<double>& point :
+       {Vector3<double>(0.3, -0.4, 1.5), Vector3<double>(-1, 0.6, 2), Vector3<double>(0, 0, 0.7)}) {
     Vector2<double> pixel = Vector2<double>::Zero();
     cfp::Matrix23<double> jacobian = cfp::Matrix23<double>::Zero();
     REQUIRE(camera.project(point, pixel, &jacobian));
@@ -39,7 +40,8 @@ TEST_CASE("epipolar and reprojection distances differentiate with respect to the
   for (int c = 0; c < 3; ++c) dual_T.translation[c] = Jet(T.translation[c], c);
   const Vector2<double> prev(100, 150), cur(140, 120);
   const Vector2<Jet> dual_prev(Jet(100.0), Jet(150.0)), dual_cur(Jet(140.0), Jet(120.0));
-  const auto distances = [&](const auto& c, const auto& pose, const auto& x_prev, const auto& x_cur, const auto& depth) {
+  const auto distances = [&](const auto& c, const auto& pose, const auto& x_prev, const auto& x_cur,
+                             const auto& depth) {
     const auto F = cfp::fundamental_from_pose(c, pose);
     return Eigen::Matrix<std::decay_t<decltype(depth)>, 4, 1>(
         cfp::epipolar_distance(F, x_prev, x_cur), cfp::symmetric_epipolar_distance(F, x_prev, x_cur),
@@ -51,7 +53,8 @@ TEST_CASE("epipolar and reprojection distances differentiate with respect to the
     cfp::SE3<double> plus = T, minus = T;
     plus.translation[c] += 1e-6;
     minus.translation[c] -= 1e-6;
-    const Eigen::Vector4d slope = (distances(camera, plus, prev, cur, 2.0) - distances(camera, minus, prev, cur, 2.0)) / 2e-6;
+    const Eigen::Vector4d slope =
+        (distances(camera, plus, prev, cur, 2.0) - distances(camera, minus, prev, cur, 2.0)) / 2e-6;
     for (int i = 0; i < 4; ++i) {
       CAPTURE(i, c);
       CHECK(value[i] > 0);

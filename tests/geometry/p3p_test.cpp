@@ -35,7 +35,8 @@ Problem<Scalar> make_problem(cfp::Random& random) {
 
 template <typename Scalar>
 double pose_error(const SE3<Scalar>& T, const SE3<double>& truth) {
-  return (T.rotation.template cast<double>() - truth.rotation).norm() + (T.translation.template cast<double>() - truth.translation).norm();
+  return (T.rotation.template cast<double>() - truth.rotation).norm() +
+         (T.translation.template cast<double>() - truth.translation).norm();
 }
 
 }  // namespace
@@ -81,7 +82,8 @@ TEST_CASE("All four solutions of a regular case are found", "[geometry]") {
   const auto solutions = p3p<double>(rays, world);
   REQUIRE(solutions.count == 4);
   for (int a = 0; a < 4; ++a) {
-    for (int b = 0; b < a; ++b) CHECK(pose_error(solutions.T_cam_world[std::size_t(a)], solutions.T_cam_world[std::size_t(b)]) > 1e-3);
+    for (int b = 0; b < a; ++b)
+      CHECK(pose_error(solutions.T_cam_world[std::size_t(a)], solutions.T_cam_world[std::size_t(b)]) > 1e-3);
   }
 }
 

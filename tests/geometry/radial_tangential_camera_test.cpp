@@ -11,9 +11,11 @@ using cfp::Vector3;
 
 TEMPLATE_TEST_CASE("without coefficients the distorted camera is the pinhole camera", "[geometry]", float, double) {
   const RadialTangentialCamera<TestType> camera{500, 510, 320, 240};
-  for (const Vector3<TestType>& point : {Vector3<TestType>(0, 0, 1), Vector3<TestType>(-1, 2, 3), Vector3<TestType>(9, 9, TestType(0.1))}) {
+  for (const Vector3<TestType>& point :
+       {Vector3<TestType>(0, 0, 1), Vector3<TestType>(-1, 2, 3), Vector3<TestType>(9, 9, TestType(0.1))}) {
     Vector2<TestType> distorted = Vector2<TestType>::Zero(), plain = Vector2<TestType>::Zero();
-    cfp::Matrix23<TestType> distorted_jacobian = cfp::Matrix23<TestType>::Zero(), plain_jacobian = cfp::Matrix23<TestType>::Zero();
+    cfp::Matrix23<TestType> distorted_jacobian = cfp::Matrix23<TestType>::Zero(),
+                            plain_jacobian = cfp::Matrix23<TestType>::Zero();
     REQUIRE(camera.project(point, distorted, &distorted_jacobian));
     REQUIRE(camera.pinhole().project(point, plain, &plain_jacobian));
     CHECK((distorted - plain).norm() <= TestType(1e-6) * plain.norm());
@@ -68,7 +70,8 @@ TEST_CASE("stays_positive agrees with sampling the polynomial", "[geometry]") {
   int positive = 0;
   for (int i = 0; i < 20000; ++i) {
     const double scale = i % 3 == 0 ? 0.0 : 1.0;
-    const double a = random.uniform(-6, 6), b = random.uniform(-9, 9) * (i % 5 == 0 ? 0.0 : 1.0), c = random.uniform(-6, 6) * scale;
+    const double a = random.uniform(-6, 6), b = random.uniform(-9, 9) * (i % 5 == 0 ? 0.0 : 1.0),
+                 c = random.uniform(-6, 6) * scale;
     const double end = random.uniform(0, 2);
     double least = 1;
     for (int j = 0; j <= 400; ++j) {

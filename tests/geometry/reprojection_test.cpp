@@ -31,8 +31,9 @@ TEST_CASE("the reprojection distance is the offset from the exact match", "[geom
     Vector2<double> exact = Vector2<double>::Zero();
     REQUIRE(views.camera_prev.unproject(views.prev[i], ray));
     REQUIRE(views.camera_prev.project(views.T_cur_prev * Vector3<double>(ray * views.depth_prev[i]), exact));
-    CHECK_THAT(cfp::reprojection_distance(views.camera_prev, views.T_cur_prev, views.prev[i], views.depth_prev[i], exact),
-               WithinAbs(0, 1e-12));
+    CHECK_THAT(
+        cfp::reprojection_distance(views.camera_prev, views.T_cur_prev, views.prev[i], views.depth_prev[i], exact),
+        WithinAbs(0, 1e-12));
     CHECK_THAT(cfp::reprojection_distance(views.camera_prev, views.T_cur_prev, views.prev[i], views.depth_prev[i],
                                           Vector2<double>(exact + Vector2<double>(3, -4))),
                WithinAbs(5, 1e-10));
@@ -51,12 +52,14 @@ TEST_CASE("a hand-computed reprojection", "[geometry]") {
 TEMPLATE_TEST_CASE("scaling the scene leaves reprojection distances as they are", "[geometry]", float, double) {
   TwoViews<TestType> views(60);
   for (std::size_t i = 0; i < views.prev.size(); ++i) {
-    const TestType d = cfp::reprojection_distance(views.camera_prev, views.T_cur_prev, views.prev[i], views.depth_prev[i], views.cur[i]);
+    const TestType d = cfp::reprojection_distance(views.camera_prev, views.T_cur_prev, views.prev[i],
+                                                  views.depth_prev[i], views.cur[i]);
     for (const TestType scale : {TestType(0.01), TestType(300)}) {
       cfp::SE3<TestType> T = views.T_cur_prev;
       T.translation *= scale;
-      CHECK_THAT(cfp::reprojection_distance(views.camera_prev, T, views.prev[i], views.depth_prev[i] * scale, views.cur[i]),
-                 WithinAbs(d, pixel_tolerance<TestType>));
+      CHECK_THAT(
+          cfp::reprojection_distance(views.camera_prev, T, views.prev[i], views.depth_prev[i] * scale, views.cur[i]),
+          WithinAbs(d, pixel_tolerance<TestType>));
     }
   }
 }
@@ -65,8 +68,8 @@ TEMPLATE_TEST_CASE("no depth, behind the camera, not finite: no distance", "[geo
   const cfp::PinholeCamera<TestType> camera{500, 500, 320, 240};
   cfp::SE3<TestType> T;
   const Vector2<TestType> pixel(300, 200);
-  for (const TestType depth :
-       {TestType(0), TestType(-1), std::numeric_limits<TestType>::quiet_NaN(), std::numeric_limits<TestType>::infinity()}) {
+  for (const TestType depth : {TestType(0), TestType(-1), std::numeric_limits<TestType>::quiet_NaN(),
+                               std::numeric_limits<TestType>::infinity()}) {
     CHECK(cfp::reprojection_distance(camera, T, pixel, depth, pixel) == no_distance<TestType>);
   }
   CHECK_THAT(cfp::reprojection_distance(camera, T, pixel, TestType(2), pixel), WithinAbs(0, pixel_tolerance<TestType>));
@@ -86,11 +89,14 @@ TEMPLATE_TEST_CASE("reprojection distances of arrays equal the scalar function",
   }
   const auto holds = [&](const auto& camera) {
     for (const std::size_t n : {0UL, 1UL, 63UL, 64UL, 65UL, 200UL}) {
-      const std::vector<Vector2<TestType>> prev(views.prev.begin(), views.prev.begin() + static_cast<std::ptrdiff_t>(n));
+      const std::vector<Vector2<TestType>> prev(views.prev.begin(),
+                                                views.prev.begin() + static_cast<std::ptrdiff_t>(n));
       const std::vector<Vector2<TestType>> cur(views.cur.begin(), views.cur.begin() + static_cast<std::ptrdiff_t>(n));
-      const std::vector<TestType> depth(views.depth_prev.begin(), views.depth_prev.begin() + static_cast<std::ptrdiff_t>(n));
+      const std::vector<TestType> depth(views.depth_prev.begin(),
+                                        views.depth_prev.begin() + static_cast<std::ptrdiff_t>(n));
       std::vector<TestType> out(n, TestType(-9));
-      CHECK(cfp_test::allocations_in([&] { cfp::reprojection_distances(camera, views.T_cur_prev, prev, depth, cur, out); }) == 0);
+      CHECK(cfp_test::allocations_in(
+                [&] { cfp::reprojection_distances(camera, views.T_cur_prev, prev, depth, cur, out); }) == 0);
       for (std::size_t i = 0; i < n; ++i) {
         CAPTURE(n, i, prev[i].transpose(), cur[i].transpose(), depth[i]);
         const TestType expected = cfp::reprojection_distance(camera, views.T_cur_prev, prev[i], depth[i], cur[i]);

@@ -25,8 +25,9 @@ std::vector<RunSummary> good_runs() {
     for (const double seed : {1.0, 1.01}) {
       const std::string walking = std::string("walking_") + motion, sitting = std::string("sitting_") + motion;
       for (const auto& [variant, w, s] :
-           {std::make_tuple("plain", 0.3, 0.0101), std::make_tuple("cfp", 0.02, 0.01), std::make_tuple("cfp-minus", 0.022, 0.012),
-            std::make_tuple("no-mdc", 0.2, 0.01), std::make_tuple("only-boxes", 0.05, 0.03)}) {
+           {std::make_tuple("plain", 0.3, 0.0101), std::make_tuple("cfp", 0.02, 0.01),
+            std::make_tuple("cfp-minus", 0.022, 0.012), std::make_tuple("no-mdc", 0.2, 0.01),
+            std::make_tuple("only-boxes", 0.05, 0.03)}) {
         runs.push_back(run_of(walking, variant, seed * w));
         runs.push_back(run_of(sitting, variant, seed * s));
         for (RunSummary* run : {&runs[runs.size() - 1], &runs[runs.size() - 2]}) {
@@ -73,19 +74,22 @@ TEST_CASE("Claims that hold are met", "[slam]") { check_only_unmet(good_runs(), 
 
 TEST_CASE("Without runs nothing is claimed", "[slam]") {
   for (const Verdict v : verdicts({})) CHECK(v == Verdict::not_tested);
-  for (const Verdict v : verdicts({run_of("7scenes", "cfp", 0.01), run_of("7scenes", "plain", 0.01)})) CHECK(v == Verdict::not_tested);
-  for (const Verdict v :
-       verdicts({run_of("tum_fr3_walking_halfsphere_30", "cfp", 0.01), run_of("tum_fr3_walking_halfsphere_30", "plain", 0.01)})) {
+  for (const Verdict v : verdicts({run_of("7scenes", "cfp", 0.01), run_of("7scenes", "plain", 0.01)}))
+    CHECK(v == Verdict::not_tested);
+  for (const Verdict v : verdicts({run_of("tum_fr3_walking_halfsphere_30", "cfp", 0.01),
+                                   run_of("tum_fr3_walking_halfsphere_30", "plain", 0.01)})) {
     CHECK(v == Verdict::not_tested);
   }
-  CHECK(verdicts({run_of("my_walking_xyz", "cfp", 0.01), run_of("my_walking_xyz", "plain", 0.01)})[five_times] == Verdict::not_met);
+  CHECK(verdicts({run_of("my_walking_xyz", "cfp", 0.01), run_of("my_walking_xyz", "plain", 0.01)})[five_times] ==
+        Verdict::not_met);
   CHECK(claims_table({}, "").rows.size() == 7);
 }
 
 TEST_CASE("One sequence that fails decides a claim, and its figures are named", "[slam]") {
   const auto runs = changed("walking_static", "plain", ate(0.09));
   check_only_unmet(runs, {five_times});
-  CHECK(check_claims(runs)[five_times].figures.find("walking_static: cfp 0.0201, plain 0.0900, factor 4.5") != std::string::npos);
+  CHECK(check_claims(runs)[five_times].figures.find("walking_static: cfp 0.0201, plain 0.0900, factor 4.5") !=
+        std::string::npos);
   check_only_unmet(changed("sitting_xyz", "plain", ate(0.0098)), {harmless});
   check_only_unmet(changed("sitting_rpy", "only-boxes", ate(0.0099)), {boxes});
   check_only_unmet(changed("walking_rpy", "only-boxes", ate(0.25)), {mdc});
@@ -100,10 +104,16 @@ TEST_CASE("Overlapping seeds are noise, a plain loss of the camera is not", "[sl
   runs.push_back(run_of("walking_xyz", "cfp-minus", 0.0205));
   check_only_unmet(runs, {});
   // A tiny error over half of the frames makes no variant the best, but loses every comparison of the one that has it.
-  check_only_unmet(changed("walking_xyz", "no-mdc", [](RunSummary& run) { run.ate_rmse_m = 0.001, run.matched = 150; }), {});
-  check_only_unmet(changed("walking_xyz", "plain", [](RunSummary& run) { run.ate_rmse_m = 0.001, run.matched = 150; }), {});
-  check_only_unmet(changed("walking_xyz", "cfp", [](RunSummary& run) { run.ate_rmse_m = 0.001, run.matched = 150; }), {five_times, best});
-  check_only_unmet(changed("sitting_xyz", "cfp", [](RunSummary& run) { run.ate_rmse_m = not_known, run.matched = 0; }), {harmless, boxes});
-  check_only_unmet(changed("walking_rpy", "no-mdc", [](RunSummary& run) { run.ate_rmse_m = 0.001, run.matched = 150; }), {});
-  check_only_unmet(changed("walking_rpy", "only-boxes", [](RunSummary& run) { run.ate_rmse_m = 0.001, run.matched = 150; }), {mdc});
+  check_only_unmet(changed("walking_xyz", "no-mdc", [](RunSummary& run) { run.ate_rmse_m = 0.001, run.matched = 150; }),
+                   {});
+  check_only_unmet(changed("walking_xyz", "plain", [](RunSummary& run) { run.ate_rmse_m = 0.001, run.matched = 150; }),
+                   {});
+  check_only_unmet(changed("walking_xyz", "cfp", [](RunSummary& run) { run.ate_rmse_m = 0.001, run.matched = 150; }),
+                   {five_times, best});
+  check_only_unmet(changed("sitting_xyz", "cfp", [](RunSummary& run) { run.ate_rmse_m = not_known, run.matched = 0; }),
+                   {harmless, boxes});
+  check_only_unmet(changed("walking_rpy", "no-mdc", [](RunSummary& run) { run.ate_rmse_m = 0.001, run.matched = 150; }),
+                   {});
+  check_only_unmet(
+      changed("walking_rpy", "only-boxes", [](RunSummary& run) { run.ate_rmse_m = 0.001, run.matched = 150; }), {mdc});
 }

@@ -100,7 +100,8 @@ TEST_CASE("A metre is as long upwards as sideways in plots of equal scale", "[sl
     y.add(-2);
     y.add(-2 + dy);
     const Plot plot = Plot::equal_scale("t", x, y, "x", "y");
-    const double across = plot.px(1 + 0.5 * dx + 1e-3) - plot.px(1 + 0.5 * dx), up = plot.py(-2 + 0.5 * dy) - plot.py(-2 + 0.5 * dy + 1e-3);
+    const double across = plot.px(1 + 0.5 * dx + 1e-3) - plot.px(1 + 0.5 * dx),
+                 up = plot.py(-2 + 0.5 * dy) - plot.py(-2 + 0.5 * dy + 1e-3);
     CHECK(across > 0);
     CHECK(std::abs(across - up) < 1e-9 * across);
   }
@@ -128,7 +129,8 @@ TEST_CASE("The report survives runs without truth, frames, boxes or finite numbe
   bare.with_truth = true;
   check_page(report_page({cfp_test::fake_run(bare), RunRecord{}}));
 
-  for (const double broken : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e300, -1e300}) {
+  for (const double broken :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e300, -1e300}) {
     auto run = cfp_test::fake_run({});
     run.variant = "</title><script>alert(1)</script>";
     for (std::size_t k = 0; k < run.frames.size(); k += 3) {

@@ -72,7 +72,8 @@ TEST_CASE("A summary holds the record's figures", "[slam]") {
   CHECK(s.second_stage.auc > s.first_stage.auc);
   // Mapping ran in the keyframes alone: its time is that of those frames.
   CHECK(s.median_ms[static_cast<std::size_t>(Module::mapping)] > 3);
-  CHECK(s.p95_ms[static_cast<std::size_t>(Module::tracking)] >= s.median_ms[static_cast<std::size_t>(Module::tracking)]);
+  CHECK(s.p95_ms[static_cast<std::size_t>(Module::tracking)] >=
+        s.median_ms[static_cast<std::size_t>(Module::tracking)]);
 }
 
 TEST_CASE("A run without truth, frames or labels has no errors, not errors of zero", "[slam]") {
@@ -118,7 +119,8 @@ TEST_CASE("A summary survives a line of JSON bit for bit", "[slam]") {
 TEST_CASE("A line that is cut off, incomplete or no summary is refused", "[slam]") {
   const std::string line = to_json_line(full_summary());
   for (std::size_t n = 0; n + 2 < line.size(); ++n) REQUIRE_FALSE(from_json_line(line.substr(0, n)).has_value());
-  for (const char* other : {"", "{}", "[]", "null", "{\"sequence\": \"a\"}", "{\"sequence\"}", "x", "{\"a\": \"\\u00"}) {
+  for (const char* other :
+       {"", "{}", "[]", "null", "{\"sequence\": \"a\"}", "{\"sequence\"}", "x", "{\"a\": \"\\u00"}) {
     CHECK_FALSE(from_json_line(other).has_value());
   }
   CHECK_FALSE(from_json_line(line + line).has_value());

@@ -12,7 +12,8 @@ using namespace cfp_slam;
 
 namespace {
 
-RunSummary run_of(const std::string& sequence, const std::string& variant, std::uint64_t seed, double ate, std::size_t matched = 100) {
+RunSummary run_of(const std::string& sequence, const std::string& variant, std::uint64_t seed, double ate,
+                  std::size_t matched = 100) {
   RunSummary s;
   s.sequence = sequence;
   s.variant = variant;
@@ -74,8 +75,9 @@ TEST_CASE("The published rows are the paper's, figure by figure", "[slam]") {
   check_against_tex(tex, "R-RPE-lable", paper_rpe_deg);
   check_against_tex(tex, "Ab-ATE-lable", paper_ablation_m);
   const std::size_t times = tex.find("THE AVERAGE RUNNING TIME");
-  for (const char* row : {"CFP-SLAM                      & 12.44   & 0.07 & 17.93 & 1.76                        & 3.66 & 42.7 ",
-                          "CFP-SLAM-                     & 12.44   & 0.07 & /     & 1.76                        & 3.66 & 24.77 "}) {
+  for (const char* row :
+       {"CFP-SLAM                      & 12.44   & 0.07 & 17.93 & 1.76                        & 3.66 & 42.7 ",
+        "CFP-SLAM-                     & 12.44   & 0.07 & /     & 1.76                        & 3.66 & 24.77 "}) {
     CHECK(tex.find(row, times) != std::string::npos);
   }
 }
@@ -90,8 +92,9 @@ TEST_CASE("The paper's two frame times differ by its object stage", "[slam]") {
 TEST_CASE("Only TUM's own sequences stand beside published figures", "[slam]") {
   CHECK(paper_sequence(walking_xyz) == 4);
   CHECK(paper_sequence("/data/tum/rgbd_dataset_freiburg3_sitting_rpy/") == 3);
-  for (const char* other : {"walking_xyz", "tum_fr3_walking_halfsphere_30", "rgbd_dataset_freiburg3_walking_xyz_validation", "", "/",
-                            "rgbd_dataset_freiburg1_xyz", "rgbd_dataset_freiburg3_"}) {
+  for (const char* other :
+       {"walking_xyz", "tum_fr3_walking_halfsphere_30", "rgbd_dataset_freiburg3_walking_xyz_validation", "", "/",
+        "rgbd_dataset_freiburg1_xyz", "rgbd_dataset_freiburg3_"}) {
     CHECK(paper_sequence(other) == paper_sequence_count);
   }
   const std::string ours = tables_markdown({run_of("walking_xyz", "cfp", 1, 0.01)}, "");
@@ -172,7 +175,8 @@ TEST_CASE("Every table states its protocol", "[slam]") {
   const auto tables = tables_of(runs, "2 cores");
   CHECK(tables.size() == 11);
   for (const Table& table : tables) {
-    for (const char* part : {"SE(3)", "1.00 s", "n = 1–2 seeds", "90–100 frames", "detector: text", "machine: 2 cores"}) {
+    for (const char* part :
+         {"SE(3)", "1.00 s", "n = 1–2 seeds", "90–100 frames", "detector: text", "machine: 2 cores"}) {
       INFO(table.title << ": " << part);
       CHECK(table.protocol.find(part) != std::string::npos);
     }

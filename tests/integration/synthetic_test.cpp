@@ -82,7 +82,8 @@ TEST_CASE("True depth lies on the nearest surface of the scene", "[synthetic]") 
       for (int x = 1; x < out.truth.depth.cols; x += 5) {
         const double depth = static_cast<double>(out.truth.depth.at<float>(y, x));
         const int id = out.truth.surface.at<short>(y, x) / 8;
-        REQUIRE(std::abs(signed_distance(surfaces[static_cast<std::size_t>(id)], world_point(sequence, frame, x, y, depth))) < 1e-5);
+        REQUIRE(std::abs(signed_distance(surfaces[static_cast<std::size_t>(id)],
+                                         world_point(sequence, frame, x, y, depth))) < 1e-5);
         for (double part = 0.02; part < 1; part += 0.02) {
           const Vector3d before = world_point(sequence, frame, x, y, part * depth);
           for (const Surface& s : surfaces) REQUIRE(signed_distance(s, before) > -1e-5);
@@ -161,11 +162,13 @@ TEST_CASE("Static pixels reprojected with the true poses meet the same depth", "
     for (int y = 0; y < c.height; ++y) {
       for (int x = 0; x < c.width; ++x) {
         if (a.label.at<unsigned char>(y, x) != label_static) continue;
-        const Vector3d p = T_to_world * world_point(sequence, from, x, y, static_cast<double>(a.truth.depth.at<float>(y, x)));
+        const Vector3d p =
+            T_to_world * world_point(sequence, from, x, y, static_cast<double>(a.truth.depth.at<float>(y, x)));
         cfp::Vector2<double> pixel;
         if (!c.project(p, pixel)) continue;
         const int u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
-        if (u < 0 || v < 0 || u >= c.width || v >= c.height || b.label.at<unsigned char>(v, u) != label_static) continue;
+        if (u < 0 || v < 0 || u >= c.width || v >= c.height || b.label.at<unsigned char>(v, u) != label_static)
+          continue;
         const double depth = static_cast<double>(b.truth.depth.at<float>(v, u));
         ++compared;
         if (std::abs(depth - p.z()) < 0.03 * p.z()) ++equal;
@@ -233,11 +236,13 @@ TEST_CASE("The detector misses in bursts, more often where detection is hard", "
     int misses = 0, longest = 0, run = 0;
     for (int k = 0; k < 20000; ++k) {
       const auto found = detector.detect({s, Sighting{}}, rotation, blurred, 640, 480);
-      const bool hit = std::any_of(found.begin(), found.end(), [&](const Detection& d) { return cfp::iou(d.box, s.box) > 0.5; });
+      const bool hit =
+          std::any_of(found.begin(), found.end(), [&](const Detection& d) { return cfp::iou(d.box, s.box) > 0.5; });
       run = hit ? 0 : run + 1;
       misses += hit ? 0 : 1;
       longest = std::max(longest, run);
-      for (const Detection& d : found) REQUIRE((d.score > 0.25 && d.score < 1 && is_proper(d.box) && d.box.x1 >= 0 && d.box.y2 <= 480));
+      for (const Detection& d : found)
+        REQUIRE((d.score > 0.25 && d.score < 1 && is_proper(d.box) && d.box.x1 >= 0 && d.box.y2 <= 480));
     }
     CHECK(longest >= options.longest_burst);
     return misses / 20000.0;
@@ -272,7 +277,8 @@ TEST_CASE("A written folder is the same from one thread and from three, and read
     const auto i = static_cast<std::size_t>(k);
     CHECK_THAT(truth[i].time_s, WithinAbs(images[i].time_s, 1e-9));
     CHECK((truth[i].T_world_cam.translation - sequence.T_world_cam(k).translation).norm() < 1e-8);
-    CHECK(same(cv::imread((folder.path / "one" / images[i].file).string(), cv::IMREAD_UNCHANGED), rendered(sequence, k).color));
+    CHECK(same(cv::imread((folder.path / "one" / images[i].file).string(), cv::IMREAD_UNCHANGED),
+               rendered(sequence, k).color));
   }
 }
 
@@ -289,7 +295,8 @@ TEST_CASE("People put into a recording leave the rest of it alone and are hidden
   for (int k = 0; k < 4; ++k) {
     const auto out = rendered(composed, k);
     const cv::Mat color = cv::imread(recording->views[static_cast<std::size_t>(k)].color.string());
-    const cv::Mat depth = cv::imread(recording->views[static_cast<std::size_t>(k)].depth.string(), cv::IMREAD_UNCHANGED);
+    const cv::Mat depth =
+        cv::imread(recording->views[static_cast<std::size_t>(k)].depth.string(), cv::IMREAD_UNCHANGED);
     int people = 0, kept = 0;
     for (int y = 1; y + 1 < color.rows; ++y) {
       for (int x = 1; x + 1 < color.cols; ++x) {
@@ -297,11 +304,13 @@ TEST_CASE("People put into a recording leave the rest of it alone and are hidden
         people += person ? 1 : 0;
         const double real = depth.at<std::uint16_t>(y, x) / recording->depth_units_per_metre;
         if (person && real > 0) REQUIRE(static_cast<double>(out.truth.depth.at<float>(y, x)) <= real + 1e-4);
-        const bool inside = !person && out.truth.surface.at<short>(y, x - 1) < 0 && out.truth.surface.at<short>(y, x + 1) < 0 &&
-                            out.truth.surface.at<short>(y - 1, x) < 0 && out.truth.surface.at<short>(y + 1, x) < 0;
+        const bool inside = !person && out.truth.surface.at<short>(y, x - 1) < 0 &&
+                            out.truth.surface.at<short>(y, x + 1) < 0 && out.truth.surface.at<short>(y - 1, x) < 0 &&
+                            out.truth.surface.at<short>(y + 1, x) < 0;
         if (!inside) continue;  // the smoothed rim
         REQUIRE(out.color.at<cv::Vec3b>(y, x) == color.at<cv::Vec3b>(y, x));
-        REQUIRE((out.depth.at<std::uint16_t>(y, x) == depth.at<std::uint16_t>(y, x) || out.depth.at<std::uint16_t>(y, x) == 0));
+        REQUIRE((out.depth.at<std::uint16_t>(y, x) == depth.at<std::uint16_t>(y, x) ||
+                 out.depth.at<std::uint16_t>(y, x) == 0));
         ++kept;
       }
     }
@@ -328,7 +337,8 @@ TEST_CASE("A recording with a missing or wrong file is refused with its name", "
   cv::imwrite(recording->views[1].depth.string(), cv::Mat(10, 10, CV_16U, cv::Scalar(0)));
   CHECK_THROWS_WITH(rendered(Sequence(options, recording), 1), Catch::Matchers::Contains("size differs"));
   std::filesystem::remove(recording->views[1].color);
-  CHECK_THROWS_WITH(rendered(Sequence(options, recording), 1), Catch::Matchers::Contains(recording->views[1].color.filename().string()));
+  CHECK_THROWS_WITH(rendered(Sequence(options, recording), 1),
+                    Catch::Matchers::Contains(recording->views[1].color.filename().string()));
   CHECK_THROWS_WITH(write_sequence(Sequence(options, recording), folder.path / "out", 2, [](int) {}),
                     Catch::Matchers::Contains("cannot read"));
   std::filesystem::remove(folder.path / "camera.txt");

@@ -42,7 +42,8 @@ TEST_CASE("Views read OpenCV's points in place", "[interop]") {
 
 TEST_CASE("A keypoint view steps over the other fields", "[interop]") {
   std::vector<cv::KeyPoint> keypoints;
-  for (int i = 0; i < 5; ++i) keypoints.emplace_back(static_cast<float>(i), static_cast<float>(10 * i), 31.0F, 45.0F, 0.5F, 2, 3);
+  for (int i = 0; i < 5; ++i)
+    keypoints.emplace_back(static_cast<float>(i), static_cast<float>(10 * i), 31.0F, 45.0F, 0.5F, 2, 3);
   const cfp::PointSpan<float, 2> view = cfp::view(keypoints);
   REQUIRE(view.size() == 5);
   for (std::size_t i = 0; i < 5; ++i) CHECK(view[i] == Eigen::Vector2f(keypoints[i].pt.x, keypoints[i].pt.y));
@@ -68,14 +69,17 @@ TEST_CASE("Depth is sampled at the nearest pixel, in metres", "[interop]") {
   cv::Mat whole(6, 9, CV_16UC1, cv::Scalar(9999));
   cv::Mat depth = whole(cv::Rect(2, 1, 4, 3));  // rows further apart than they are long
   for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 4; ++column) depth.at<unsigned short>(row, column) = static_cast<unsigned short>(1000 * row + 10 * column + 5000);
+    for (int column = 0; column < 4; ++column)
+      depth.at<unsigned short>(row, column) = static_cast<unsigned short>(1000 * row + 10 * column + 5000);
   }
   depth.at<unsigned short>(0, 0) = 0;
-  const std::vector<cv::Point2f> pixels{{2.4F, 1.4F}, {2.6F, 0.6F}, {-0.5F, 2.0F}, {3.49F, 2.49F}, {0, 0}, {-0.6F, 0}, {3.5F, 0}, {0, 2.5F}};
+  const std::vector<cv::Point2f> pixels{{2.4F, 1.4F}, {2.6F, 0.6F}, {-0.5F, 2.0F}, {3.49F, 2.49F},
+                                        {0, 0},       {-0.6F, 0},   {3.5F, 0},     {0, 2.5F}};
   std::vector<float> metres(pixels.size());
   CHECK(cfp::sample_depth(depth, cfp::view(pixels), 1.0 / 5000, metres) == cfp::Status::ok);
   const std::vector<float> expected{6020.0F / 5000, 6030.0F / 5000, 7000.0F / 5000, 7030.0F / 5000, -1, -1, -1, -1};
-  for (std::size_t i = 0; i < pixels.size(); ++i) CHECK_THAT(metres[i], WithinAbs(static_cast<double>(expected[i]), 1e-6));
+  for (std::size_t i = 0; i < pixels.size(); ++i)
+    CHECK_THAT(metres[i], WithinAbs(static_cast<double>(expected[i]), 1e-6));
 
   cv::Mat in_metres;
   depth.convertTo(in_metres, CV_32F, 1.0 / 5000);
@@ -85,14 +89,16 @@ TEST_CASE("Depth is sampled at the nearest pixel, in metres", "[interop]") {
     cfp::Status status{};
     CHECK(cfp_test::allocations_in([&] { status = cfp::sample_depth(in_metres, cfp::view(pixels), 1.0, again); }) == 0);
     CHECK(status == cfp::Status::ok);
-    for (std::size_t i = 0; i < pixels.size(); ++i) CHECK_THAT(again[i], WithinAbs(static_cast<double>(metres[i]), 1e-6));
+    for (std::size_t i = 0; i < pixels.size(); ++i)
+      CHECK_THAT(again[i], WithinAbs(static_cast<double>(metres[i]), 1e-6));
   }
 }
 
 TEST_CASE("Hostile depth and pixels give -1", "[interop]") {
   constexpr float inf = std::numeric_limits<float>::infinity(), nan = std::numeric_limits<float>::quiet_NaN();
   const cv::Mat depth = (cv::Mat_<float>(1, 6) << nan, inf, -inf, -2.0F, 0.0F, 1e-45F);
-  const std::vector<cv::Point2f> pixels{{0, 0}, {1, 0}, {2, 0}, {3, 0}, {4, 0}, {nan, 0}, {0, inf}, {1e30F, 0}, {-1e30F, 0}};
+  const std::vector<cv::Point2f> pixels{{0, 0},   {1, 0},   {2, 0},     {3, 0},     {4, 0},
+                                        {nan, 0}, {0, inf}, {1e30F, 0}, {-1e30F, 0}};
   std::vector<float> metres(pixels.size(), 5.0F);
   CHECK(cfp::sample_depth(depth, cfp::view(pixels), 1.0, metres) == cfp::Status::not_enough_data);
   for (const float value : metres) CHECK(value == -1.0F);
@@ -109,7 +115,8 @@ TEST_CASE("Hostile depth and pixels give -1", "[interop]") {
     CHECK(cfp::sample_depth(depth, cfp::view(pixels), scale, metres) == cfp::Status::invalid_input);
     for (const float value : metres) CHECK(value == -1.0F);
   }
-  for (const cv::Mat& wrong : {cv::Mat(), cv::Mat(2, 2, CV_8UC1, cv::Scalar(1)), cv::Mat(2, 2, CV_32FC3, cv::Scalar(1))}) {
+  for (const cv::Mat& wrong :
+       {cv::Mat(), cv::Mat(2, 2, CV_8UC1, cv::Scalar(1)), cv::Mat(2, 2, CV_32FC3, cv::Scalar(1))}) {
     CHECK(cfp::sample_depth(wrong, cfp::view(pixels), 1.0, metres) == cfp::Status::invalid_input);
   }
   const std::vector<cv::Point2f> none;
@@ -151,7 +158,8 @@ TEST_CASE("to_se3 normalises drift and refuses what is no pose", "[interop]") {
   cv::Mat scaled = matrix * 1.1, mirrored = matrix.clone(), with_nan = matrix.clone();
   mirrored.row(0) *= -1;
   with_nan.at<double>(1, 3) = std::numeric_limits<double>::quiet_NaN();
-  for (const cv::Mat& wrong : {scaled, mirrored, with_nan, cv::Mat(), cv::Mat(matrix.rowRange(0, 2)), cv::Mat(4, 4, CV_8UC1, cv::Scalar(1))}) {
+  for (const cv::Mat& wrong :
+       {scaled, mirrored, with_nan, cv::Mat(), cv::Mat(matrix.rowRange(0, 2)), cv::Mat(4, 4, CV_8UC1, cv::Scalar(1))}) {
     CHECK(cfp::to_se3(wrong, read) == cfp::Status::invalid_input);
     CHECK(read.rotation == before.rotation);
     CHECK(read.translation == before.translation);

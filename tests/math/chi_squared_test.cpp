@@ -28,7 +28,8 @@ TEST_CASE("chi-squared in float agrees with the reference table", "[math]") {
     CAPTURE(row.k, row.x);
     const double tolerance = 1e-6 + 1e-7 * (row.x + row.k);  // of rounding x to float
     CHECK(relative_difference<double>(chi_squared_density(static_cast<float>(row.x), row.k), row.density) < tolerance);
-    CHECK(relative_difference<double>(chi_squared_survival(static_cast<float>(row.x), row.k), row.survival) < tolerance);
+    CHECK(relative_difference<double>(chi_squared_survival(static_cast<float>(row.x), row.k), row.survival) <
+          tolerance);
   }
 }
 
@@ -39,7 +40,8 @@ TEST_CASE("the density is minus the derivative of the survival function", "[math
       const double h = 1e-5 * x;
       const double slope = (chi_squared_survival(x - h, k) - chi_squared_survival(x + h, k)) / (2 * h);
       CAPTURE(k, x);
-      const double rounding = 4 * std::numeric_limits<double>::epsilon() / (2 * h);  // of the two values, which are near 1
+      const double rounding =
+          4 * std::numeric_limits<double>::epsilon() / (2 * h);  // of the two values, which are near 1
       CHECK_THAT(slope, WithinAbs(chi_squared_density(x, k), 1e-7 * chi_squared_density(x, k) + rounding));
     }
   }
@@ -64,7 +66,8 @@ TEST_CASE("the mode density bounds the density for k >= 2 and is infinite below"
   CHECK(chi_squared_mode_density(1) == std::numeric_limits<double>::infinity());
   CHECK(chi_squared_mode_density(1.999) == std::numeric_limits<double>::infinity());
   for (const double k : {2.0, 2.5, 3.0, 10.0, 32.0, 500.0}) {
-    for (int i = 0; i < 400; ++i) CHECK(chi_squared_density(i * k / 100, k) <= chi_squared_mode_density(k) * (1 + 1e-14));
+    for (int i = 0; i < 400; ++i)
+      CHECK(chi_squared_density(i * k / 100, k) <= chi_squared_mode_density(k) * (1 + 1e-14));
   }
   CHECK(chi_squared_mode_density(std::numeric_limits<double>::quiet_NaN()) == 0);
 }
@@ -89,7 +92,8 @@ TEMPLATE_TEST_CASE("chi-squared at the borders of its domain", "[math]", float, 
       CHECK((density >= 0 && density <= (limits::max)()));
     }
   }
-  for (const double k : {0.0, -1.0, 1.1e8, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+  for (const double k :
+       {0.0, -1.0, 1.1e8, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
     CHECK(chi_squared_survival(TestType(1), k) == 0);
     CHECK(chi_squared_density(TestType(1), k) == 0);
   }
@@ -109,7 +113,8 @@ TEMPLATE_TEST_CASE("chi-squared of an array equals the scalar function", "[math]
     for (std::size_t i = 0; i < x.size(); ++i) {
       CAPTURE(k, x[i]);
       CHECK_THAT(survival[i], WithinAbs(chi_squared_survival(x[i], k), tolerance));
-      if (x[i] != 0 || k != 1) CHECK_THAT(density[i], WithinAbs(chi_squared_density(x[i], k), tolerance * (1 + density[i])));
+      if (x[i] != 0 || k != 1)
+        CHECK_THAT(density[i], WithinAbs(chi_squared_density(x[i], k), tolerance * (1 + density[i])));
     }
     std::vector<TestType> in_place = x;
     chi_squared_survival(cfp::span<const TestType>(in_place), k, cfp::span<TestType>(in_place));

@@ -11,7 +11,8 @@ using cfp::real_cubic_roots;
 TEMPLATE_TEST_CASE("A cubic gives back the roots it was built from", "[math]", float, double) {
   cfp::Random random(11, "cubic");
   for (int trial = 0; trial < 2000; ++trial) {
-    TestType expected[3] = {TestType(random.uniform(-3, 3)), TestType(random.uniform(-3, 3)), TestType(random.uniform(-3, 3))};
+    TestType expected[3] = {TestType(random.uniform(-3, 3)), TestType(random.uniform(-3, 3)),
+                            TestType(random.uniform(-3, 3))};
     std::sort(expected, expected + 3);
     const TestType gap = (std::min)(expected[1] - expected[0], expected[2] - expected[1]);
     if (gap < TestType(0.05)) continue;
@@ -28,9 +29,11 @@ TEMPLATE_TEST_CASE("A cubic gives back the roots it was built from", "[math]", f
 TEMPLATE_TEST_CASE("A cubic with one real root gives that one", "[math]", float, double) {
   cfp::Random random(12, "cubic");
   for (int trial = 0; trial < 2000; ++trial) {
-    const TestType root = TestType(random.uniform(-3, 3)), re = TestType(random.uniform(-3, 3)), im = TestType(random.uniform(0.3, 3));
+    const TestType root = TestType(random.uniform(-3, 3)), re = TestType(random.uniform(-3, 3)),
+                   im = TestType(random.uniform(0.3, 3));
     TestType roots[3];
-    REQUIRE(real_cubic_roots(-root - 2 * re, re * re + im * im + 2 * re * root, -root * (re * re + im * im), roots) == 1);
+    REQUIRE(real_cubic_roots(-root - 2 * re, re * re + im * im + 2 * re * root, -root * (re * re + im * im), roots) ==
+            1);
     CHECK_THAT(double(roots[0]), WithinAbs(double(root), 2000 * double(std::numeric_limits<TestType>::epsilon())));
   }
 }

@@ -39,7 +39,8 @@ Scalar one(Scalar x) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("The exponential of a chunk is within 1.5 units in the last place of the standard one", "[math]", float, double) {
+TEMPLATE_TEST_CASE("The exponential of a chunk is within 1.5 units in the last place of the standard one", "[math]",
+                   float, double) {
   const TestType lowest = cfp::detail::Exponential<TestType>::lowest;
   CHECK(largest_error_ulps(lowest, TestType(0), 1U << 18U) < TestType(1.5));
   CHECK(largest_error_ulps(TestType(-2), TestType(0), 1U << 18U) < TestType(1.5));
@@ -59,8 +60,8 @@ TEMPLATE_TEST_CASE("The exponential of a chunk is exact at the ends and never ou
   CHECK(one(std::nextafter(lowest, -limits::infinity())) == 0);
 }
 
-TEMPLATE_TEST_CASE("The exponential of a chunk never decreases where the argument grows by more than its rounding", "[math]", float,
-                   double) {
+TEMPLATE_TEST_CASE("The exponential of a chunk never decreases where the argument grows by more than its rounding",
+                   "[math]", float, double) {
   TestType previous = 0;
   for (TestType x = TestType(-40); x <= 0; x += TestType(0.00390625)) {
     const TestType e = one(x);

@@ -41,7 +41,8 @@ TEMPLATE_TEST_CASE("logistic of an array equals the scalar function", "[math]", 
       CAPTURE(n, i, x[i]);
       CHECK((out[i] >= 0 && out[i] <= 1));
       CHECK_THAT(out[i], WithinAbs(logistic(x[i]), 4 * std::numeric_limits<TestType>::epsilon()));
-      if (std::abs(x[i]) < 80) CHECK(cfp_test::relative_difference(out[i], logistic(x[i])) <= 8 * std::numeric_limits<TestType>::epsilon());
+      if (std::abs(x[i]) < 80)
+        CHECK(cfp_test::relative_difference(out[i], logistic(x[i])) <= 8 * std::numeric_limits<TestType>::epsilon());
     }
     std::vector<TestType> in_place = x;
     logistic(cfp::span<TestType>(in_place), cfp::span<TestType>(in_place));

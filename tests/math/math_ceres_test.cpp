@@ -27,7 +27,8 @@ TEST_CASE("chi-squared and logistic differentiate", "[math]") {
       check_derivative([&](const auto& t) { return cfp::chi_squared_density(t, k); }, x);
     }
   }
-  for (const double x : {-800.0, -3.0, -0.1, 0.2, 5.0, 800.0}) check_derivative([](const auto& t) { return cfp::logistic(t); }, x);
+  for (const double x : {-800.0, -3.0, -0.1, 0.2, 5.0, 800.0})
+    check_derivative([](const auto& t) { return cfp::logistic(t); }, x);
 }
 
 TEST_CASE("motions differentiate at the identity and away from it", "[math]") {

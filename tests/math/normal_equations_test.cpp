@@ -51,7 +51,8 @@ TEST_CASE("Units of the unknowns do not matter to the step", "[math]") {
   for (int trial = 0; trial < 100; ++trial) {
     const Eigen::Matrix<double, 6, 6> H = random_hessian<6>(random, 0);
     Eigen::Matrix<double, 6, 1> g, unit, step, scaled;
-    for (int i = 0; i < 6; ++i) g[i] = random.normal(), unit[i] = std::ldexp(1.0, static_cast<int>(random.index(80)) - 40);
+    for (int i = 0; i < 6; ++i)
+      g[i] = random.normal(), unit[i] = std::ldexp(1.0, static_cast<int>(random.index(80)) - 40);
     REQUIRE(solve_normal_equations<6>(H, g, 0.1, 0, step));
     const Eigen::Matrix<double, 6, 6> other = unit.asDiagonal() * H * unit.asDiagonal();
     REQUIRE(solve_normal_equations<6>(other, unit.cwiseProduct(g), 0.1, 0, scaled));

@@ -50,7 +50,8 @@ TEMPLATE_TEST_CASE("order_statistic equals the sorted array's element", "[math]"
         scratch = values;
         CAPTURE(n, rank);
         TestType selected{};
-        const std::size_t allocations = cfp_test::allocations_in([&] { selected = cfp::order_statistic(span<TestType>(scratch), rank); });
+        const std::size_t allocations =
+            cfp_test::allocations_in([&] { selected = cfp::order_statistic(span<TestType>(scratch), rank); });
         CHECK(selected == sorted[rank]);
         CHECK(allocations == 0);
       }
@@ -64,7 +65,8 @@ TEMPLATE_TEST_CASE("select_quantiles gives the three values of the object probab
     for (const std::vector<TestType>& values : value_sets<TestType>(n)) {
       std::vector<TestType> sorted = values;
       std::sort(sorted.begin(), sorted.end());
-      for (const std::array<double, 3>& quantiles : {std::array<double, 3>{0.1, 0.2, 0.3}, {0.0, 0.5, 1.0}, {0.8, 0.8, 0.8}}) {
+      for (const std::array<double, 3>& quantiles :
+           {std::array<double, 3>{0.1, 0.2, 0.3}, {0.0, 0.5, 1.0}, {0.8, 0.8, 0.8}}) {
         std::vector<TestType> scratch = values;
         const std::array<TestType, 3> selected = cfp::select_quantiles(span<TestType>(scratch), quantiles);
         for (std::size_t i = 0; i < 3; ++i) CHECK(selected[i] == sorted[cfp::quantile_rank(quantiles[i], n) - 1]);
@@ -88,7 +90,8 @@ TEST_CASE("quantile_rank is the exact ceiling of the decimal product", "[math]")
 
 TEST_CASE("quantile_rank stays within 1 and n for any q", "[math]") {
   for (const double q : cfp_test::hostile_numbers<double>()) {
-    for (const std::size_t n : {std::size_t(1), std::size_t(2), std::size_t(1000), std::numeric_limits<std::size_t>::max()}) {
+    for (const std::size_t n :
+         {std::size_t(1), std::size_t(2), std::size_t(1000), std::numeric_limits<std::size_t>::max()}) {
       const std::size_t rank = cfp::quantile_rank(q, n);
       CHECK((rank >= 1 && rank <= n));
       if (!(q > 0)) CHECK(rank == 1);
@@ -111,10 +114,12 @@ TEMPLATE_TEST_CASE("order_statistic ends and stays in memory when values are NaN
     for (TestType& value : values) {
       value = static_cast<TestType>(random.normal());
       if (random.index(4) < share)
-        value = round % 2 == 0 ? std::numeric_limits<TestType>::quiet_NaN() : -std::numeric_limits<TestType>::quiet_NaN();
+        value =
+            round % 2 == 0 ? std::numeric_limits<TestType>::quiet_NaN() : -std::numeric_limits<TestType>::quiet_NaN();
     }
     const std::size_t rank = random.index(static_cast<std::uint32_t>(values.size()));
-    const std::size_t numbers = static_cast<std::size_t>(std::count_if(values.begin(), values.end(), [](TestType x) { return x == x; }));
+    const std::size_t numbers =
+        static_cast<std::size_t>(std::count_if(values.begin(), values.end(), [](TestType x) { return x == x; }));
     std::vector<TestType> kept = values;
     (void)cfp::order_statistic(span<TestType>(values), rank);
     (void)cfp::select_quantiles(span<TestType>(values), std::array<double, 3>{0.1, 0.5, 0.9});

@@ -28,10 +28,11 @@ struct Limit<float> {
 template <typename Scalar>
 std::vector<Vector3<Scalar>> rotation_vectors() {
   std::vector<Vector3<Scalar>> vectors;
-  for (const Vector3<Scalar>& axis : {Vector3<Scalar>(1, 0, 0), Vector3<Scalar>(0, -1, 0), Vector3<Scalar>(0, 0, 1),
-                                      Vector3<Scalar>(Vector3<Scalar>(1, 2, -2) / 3), Vector3<Scalar>(Vector3<Scalar>(-2, 6, 3) / 7)}) {
-    for (const double angle :
-         {0.0, 1e-30, 1e-8, 1e-6, 0.99e-5, 1.01e-5, 1e-3, 0.0099, 0.0101, 0.099, 0.101, 0.5, 0.9, 1.1, 2.0, 3.0, 3.14, 3.1415926}) {
+  for (const Vector3<Scalar>& axis :
+       {Vector3<Scalar>(1, 0, 0), Vector3<Scalar>(0, -1, 0), Vector3<Scalar>(0, 0, 1),
+        Vector3<Scalar>(Vector3<Scalar>(1, 2, -2) / 3), Vector3<Scalar>(Vector3<Scalar>(-2, 6, 3) / 7)}) {
+    for (const double angle : {0.0, 1e-30, 1e-8, 1e-6, 0.99e-5, 1.01e-5, 1e-3, 0.0099, 0.0101, 0.099, 0.101, 0.5, 0.9,
+                               1.1, 2.0, 3.0, 3.14, 3.1415926}) {
       vectors.push_back(axis * static_cast<Scalar>(angle));
     }
   }
@@ -75,14 +76,16 @@ TEMPLATE_TEST_CASE("so3_log inverts so3_exp from 0 to pi", "[math]", float, doub
     CAPTURE(w.transpose(), back.transpose());
     // Within rounding of pi the two opposite axes are one rotation; in float 3.1415926 is pi.
     const bool opposite = w.norm() > TestType(3.141592) && (back + w).norm() < (back - w).norm();
-    CHECK_THAT((opposite ? Vector3<TestType>(back + w) : Vector3<TestType>(back - w)).norm(), WithinAbs(0, Limit<TestType>::round_trip));
+    CHECK_THAT((opposite ? Vector3<TestType>(back + w) : Vector3<TestType>(back - w)).norm(),
+               WithinAbs(0, Limit<TestType>::round_trip));
     CHECK(back.norm() <= cfp::pi<TestType> * (1 + 2 * std::numeric_limits<TestType>::epsilon()));
   }
 }
 
 TEMPLATE_TEST_CASE("so3_log of half a turn is one of its two vectors", "[math]", float, double) {
-  for (const Vector3<TestType>& axis : {Vector3<TestType>(1, 0, 0), Vector3<TestType>(0, 1, 0), Vector3<TestType>(0, 0, 1),
-                                        Vector3<TestType>(Vector3<TestType>(2, -1, 2) / 3)}) {
+  for (const Vector3<TestType>& axis :
+       {Vector3<TestType>(1, 0, 0), Vector3<TestType>(0, 1, 0), Vector3<TestType>(0, 0, 1),
+        Vector3<TestType>(Vector3<TestType>(2, -1, 2) / 3)}) {
     const Matrix3<TestType> half_turn = 2 * axis * axis.transpose() - Matrix3<TestType>::Identity();
     const Vector3<TestType> w = cfp::so3_log(half_turn);
     CHECK_THAT(w.norm(), WithinAbs(cfp::pi<TestType>, 4 * Limit<TestType>::round_trip));
@@ -98,8 +101,8 @@ TEMPLATE_TEST_CASE("the left Jacobian moves the rotation as stated", "[math]", f
     for (int c = 0; c < 3; ++c) {
       const Vector3<TestType> d = Vector3<TestType>::Unit(c) * h;
       // exp(w + d) exp(w - d)^-1 = exp(2 J d) to third order.
-      const Vector3<TestType> moved =
-          cfp::so3_log(Matrix3<TestType>(cfp::so3_exp(Vector3<TestType>(w + d)) * cfp::so3_exp(Vector3<TestType>(w - d)).transpose()));
+      const Vector3<TestType> moved = cfp::so3_log(Matrix3<TestType>(
+          cfp::so3_exp(Vector3<TestType>(w + d)) * cfp::so3_exp(Vector3<TestType>(w - d)).transpose()));
       CHECK_THAT((moved / (2 * h) - J.col(c)).norm(), WithinAbs(0, Limit<TestType>::derivative));
     }
   }
@@ -146,8 +149,9 @@ TEST_CASE("a left update moves a point by [I, -hat(p)]", "[math]") {
   J << Matrix3<double>::Identity(), -cfp::hat(p);
   for (int c = 0; c < 6; ++c) {
     const Vector6<double> d = Vector6<double>::Unit(c) * 1e-6;
-    const Vector3<double> slope =
-        ((cfp::se3_exp(d) * T) * Vector3<double>(1, 2, 3) - (cfp::se3_exp(Vector6<double>(-d)) * T) * Vector3<double>(1, 2, 3)) / 2e-6;
+    const Vector3<double> slope = ((cfp::se3_exp(d) * T) * Vector3<double>(1, 2, 3) -
+                                   (cfp::se3_exp(Vector6<double>(-d)) * T) * Vector3<double>(1, 2, 3)) /
+                                  2e-6;
     CHECK_THAT((slope - J.col(c)).norm(), WithinAbs(0, 1e-8));
   }
 }

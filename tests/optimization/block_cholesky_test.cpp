@@ -1,4 +1,4 @@
-#include "cfp/optimization/block_cholesky.hpp"
+#include "cfp/optimization/bundle/block_cholesky.hpp"
 
 #include <algorithm>
 #include <limits>
@@ -27,16 +27,20 @@ struct System {
       for (int c = (std::max)(0, r - band); c <= r; ++c) pattern.emplace_back(r, c);
     }
     for (int f = 0; f < far; ++f) {
-      const int r = static_cast<int>(random.index(static_cast<std::uint32_t>(n))), c = static_cast<int>(random.index(static_cast<std::uint32_t>(n)));
-      if (r - c > band && std::find(pattern.begin(), pattern.end(), std::make_pair(r, c)) == pattern.end()) pattern.emplace_back(r, c);
+      const int r = static_cast<int>(random.index(static_cast<std::uint32_t>(n))),
+                c = static_cast<int>(random.index(static_cast<std::uint32_t>(n)));
+      if (r - c > band && std::find(pattern.begin(), pattern.end(), std::make_pair(r, c)) == pattern.end())
+        pattern.emplace_back(r, c);
     }
-    for (std::size_t i = pattern.size(); i > 1; --i) std::swap(pattern[i - 1], pattern[random.index(static_cast<std::uint32_t>(i))]);
+    for (std::size_t i = pattern.size(); i > 1; --i)
+      std::swap(pattern[i - 1], pattern[random.index(static_cast<std::uint32_t>(i))]);
     for (const auto& [r, c] : pattern) {
       rows.push_back(r);
       columns.push_back(c);
       cfp::Matrix6<double> block;
       for (int e = 0; e < 36; ++e) block(e / 6, e % 6) = random.uniform(-1, 1);
-      if (r == c) block = (block + block.transpose()).eval() + 12.0 * (2 * band + 1 + far) * cfp::Matrix6<double>::Identity();
+      if (r == c)
+        block = (block + block.transpose()).eval() + 12.0 * (2 * band + 1 + far) * cfp::Matrix6<double>::Identity();
       dense.block<6, 6>(6 * r, 6 * c) = block;
       dense.block<6, 6>(6 * c, 6 * r) = block.transpose();
       if (r == c) block.triangularView<Eigen::StrictlyUpper>().setConstant(std::numeric_limits<double>::quiet_NaN());
@@ -48,11 +52,13 @@ struct System {
 
 }  // namespace
 
-TEST_CASE("The block factorisation solves as a dense one, in natural and in minimum degree order", "[optimization][block_cholesky]") {
+TEST_CASE("The block factorisation solves as a dense one, in natural and in minimum degree order",
+          "[optimization][block_cholesky]") {
   struct Case {
     int size, band, far;
   };
-  for (const Case c : {Case{0, 0, 0}, Case{1, 0, 0}, Case{2, 1, 0}, Case{9, 8, 0}, Case{40, 2, 15}, Case{80, 79, 0}, Case{100, 4, 30}}) {
+  for (const Case c : {Case{0, 0, 0}, Case{1, 0, 0}, Case{2, 1, 0}, Case{9, 8, 0}, Case{40, 2, 15}, Case{80, 79, 0},
+                       Case{100, 4, 30}}) {
     System system(c.size, c.band, c.far, 5);
     for (const int natural_order_limit : {0, 1000}) {
       CAPTURE(c.size, natural_order_limit);
@@ -81,7 +87,8 @@ TEST_CASE("Minimum degree order keeps an arrow sparse", "[optimization][block_ch
 }
 
 TEST_CASE("A matrix that is not positive definite is refused", "[optimization][block_cholesky]") {
-  for (const double bad : {-1.0, 0.0, std::numeric_limits<double>::quiet_NaN(), -std::numeric_limits<double>::infinity()}) {
+  for (const double bad :
+       {-1.0, 0.0, std::numeric_limits<double>::quiet_NaN(), -std::numeric_limits<double>::infinity()}) {
     System system(5, 1, 0, 6);
     for (std::size_t i = 0; i < system.rows.size(); ++i) {
       if (system.rows[i] == 3 && system.columns[i] == 3) system.blocks[36 * i + 14] = bad;

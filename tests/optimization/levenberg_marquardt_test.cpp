@@ -24,7 +24,8 @@ TEST_CASE("The damping follows Nielsen's rule", "[optimization][levenberg_marqua
   CHECK_FALSE(damping.last_step_rejected());
 }
 
-TEST_CASE("The damping stays in its range and is exhausted only after a refusal at the limit", "[optimization][levenberg_marquardt]") {
+TEST_CASE("The damping stays in its range and is exhausted only after a refusal at the limit",
+          "[optimization][levenberg_marquardt]") {
   cfp::LevenbergMarquardtOptions options;
   options.min_damping = 0.5;
   options.initial_damping = 1;

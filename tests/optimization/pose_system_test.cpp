@@ -1,9 +1,9 @@
-#include "cfp/optimization/pose_system.hpp"
+#include "cfp/optimization/pose/pose_system_impl.hpp"
 
 #include <type_traits>
 #include <vector>
 
-#include "cfp/optimization/weighted_pnp.hpp"
+#include "cfp/optimization/pose/pose_refinement.hpp"
 #include "support/catch.hpp"
 #include "support/pose_scene.hpp"
 
@@ -15,21 +15,24 @@ using cfp::detail::PoseColumns;
 using cfp::detail::PoseSystem;
 
 /// The residual of one observation in pixels, written down once more: u, v and, with a depth, u_right.
-Eigen::Vector3d residual(const cfp::SE3<double>& T, const Eigen::Vector3d& X, const cfp::PinholeCamera<double>& camera, double baseline_fx, bool stereo) {
+Eigen::Vector3d residual(const cfp::SE3<double>& T, const Eigen::Vector3d& X, const cfp::PinholeCamera<double>& camera,
+                         double baseline_fx, bool stereo) {
   const Eigen::Vector3d p = T.rotation * X + T.translation;
   const double u = camera.fx * p.x() / p.z() + camera.cx;
   return {u, camera.fy * p.y() / p.z() + camera.cy, stereo ? u - baseline_fx / p.z() : 0.0};
 }
 
-/// Normal equations of one observation (residual r, information W) from central differences through the library's update.
-PoseSystem numeric_system(const cfp::SE3<double>& T, const Eigen::Vector3d& X, const Eigen::Vector3d& r, double W, const cfp::PinholeCamera<double>& camera,
-                          double baseline_fx, bool stereo) {
+/// Normal equations of one observation (residual r, information W) from central differences through the library's
+/// update.
+PoseSystem numeric_system(const cfp::SE3<double>& T, const Eigen::Vector3d& X, const Eigen::Vector3d& r, double W,
+                          const cfp::PinholeCamera<double>& camera, double baseline_fx, bool stereo) {
   Eigen::Matrix<double, 3, 6> J;
   for (int k = 0; k < 6; ++k) {
     const double h = 1e-6;
     const Vector6<double> step = Vector6<double>::Unit(k) * h;
     J.col(k) = (residual(cfp::se3_exp<double>(step) * T, X, camera, baseline_fx, stereo) -
-                residual(cfp::se3_exp<double>(Vector6<double>(-step)) * T, X, camera, baseline_fx, stereo)) / (2 * h);
+                residual(cfp::se3_exp<double>(Vector6<double>(-step)) * T, X, camera, baseline_fx, stereo)) /
+               (2 * h);
   }
   PoseSystem system;
   system.H = W * J.transpose() * J;
@@ -39,7 +42,9 @@ PoseSystem numeric_system(const cfp::SE3<double>& T, const Eigen::Vector3d& X, c
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("Pose system: H and g equal those of numeric Jacobians, pixel and depth, packet, scalar and any camera", "[optimization]", float, double) {
+TEMPLATE_TEST_CASE(
+    "Pose system: H and g equal those of numeric Jacobians, pixel and depth, packet, scalar and any camera",
+    "[optimization]", float, double) {
   using Scalar = TestType;
   using P = cfp::Packet<Scalar>;
   const double tolerance = std::is_same_v<Scalar, float> ? 2e-4 : 1e-6;
@@ -47,7 +52,8 @@ TEMPLATE_TEST_CASE("Pose system: H and g equal those of numeric Jacobians, pixel
   const double baseline_fx = 40;
   cfp::Random random(4, "jacobian");
   for (int i = 0; i < 100; ++i) {
-    const cfp::SE3<double> T{cfp::so3_exp<double>(cfp_test::random_direction(random) * random.uniform(0, 3)), cfp_test::random_direction(random) * 0.3};
+    const cfp::SE3<double> T{cfp::so3_exp<double>(cfp_test::random_direction(random) * random.uniform(0, 3)),
+                             cfp_test::random_direction(random) * 0.3};
     const Eigen::Vector3d p(random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(0.6, 4));
     const Eigen::Vector3d X = T.rotation.transpose() * (p - T.translation);
     const double information = random.uniform(0.2, 2), weight = random.uniform(0.1, 1);
@@ -58,10 +64,21 @@ TEMPLATE_TEST_CASE("Pose system: H and g equal those of numeric Jacobians, pixel
     const std::size_t lanes = static_cast<std::size_t>(cfp::lanes_of<P>);
     std::vector<Scalar> storage[10];
     PoseColumns<Scalar> columns;
-    Scalar** pointers[10] = {&columns.x, &columns.y, &columns.z, &columns.u, &columns.v, &columns.u_right, &columns.information, &columns.active, &columns.error, &columns.weight};
+    Scalar** pointers[10] = {&columns.x,       &columns.y,           &columns.z,      &columns.u,     &columns.v,
+                             &columns.u_right, &columns.information, &columns.active, &columns.error, &columns.weight};
     const auto fill = [&](bool normalised) {
-      const double fu = normalised ? 1 / camera.fx : 1, fv = normalised ? 1 / camera.fy : 1, cu = normalised ? camera.cx : 0, cv = normalised ? camera.cy : 0;
-      const double values[10] = {X.x(), X.y(), X.z(), (measured[0] - cu) * fu, (measured[1] - cv) * fv, (measured[2] - cu) * fu, information / (fu * fu), weight, 0, weight};
+      const double fu = normalised ? 1 / camera.fx : 1, fv = normalised ? 1 / camera.fy : 1,
+                   cu = normalised ? camera.cx : 0, cv = normalised ? camera.cy : 0;
+      const double values[10] = {X.x(),
+                                 X.y(),
+                                 X.z(),
+                                 (measured[0] - cu) * fu,
+                                 (measured[1] - cv) * fv,
+                                 (measured[2] - cu) * fu,
+                                 information / (fu * fu),
+                                 weight,
+                                 0,
+                                 weight};
       for (int c = 0; c < 10; ++c) {
         storage[c].assign(lanes, Scalar(c == 6 ? 1 : 0));  // the other lanes: padding
         storage[c][0] = static_cast<Scalar>(values[c]);
@@ -85,7 +102,8 @@ TEMPLATE_TEST_CASE("Pose system: H and g equal those of numeric Jacobians, pixel
       fill(true);
       cfp::detail::add_pinhole<Scalar, s>(columns, 0, 1, camera, baseline_fx, T, cfp::Trivial<Scalar>{}, scalar);
       fill(false);
-      cfp::detail::add_camera<s>(columns, 0, 1, cfp_test::PlainCamera{camera}, baseline_fx, T, cfp::Trivial<double>{}, general);
+      cfp::detail::add_camera<s>(columns, 0, 1, cfp_test::PlainCamera{camera}, baseline_fx, T, cfp::Trivial<double>{},
+                                 general);
       check(packet);
       check(scalar);
       check(general);
@@ -94,7 +112,8 @@ TEMPLATE_TEST_CASE("Pose system: H and g equal those of numeric Jacobians, pixel
   }
 }
 
-TEST_CASE("Pose system: a point behind the camera keeps the error it last had in front and adds nothing to H and g", "[optimization]") {
+TEST_CASE("Pose system: a point behind the camera keeps the error it last had in front and adds nothing to H and g",
+          "[optimization]") {
   using P = cfp::Packet<double>;
   const cfp::PinholeCamera<double> camera{500, 500, 320, 240};
   std::vector<double> x(8), y(8), z(8, 2.0), u(8, 0.01), v(8), information(8, 500.0 * 500.0), active(8), error(8);

@@ -8,8 +8,8 @@
 
 namespace {
 
-constexpr cfp::LossType all_types[] = {cfp::LossType::trivial, cfp::LossType::huber, cfp::LossType::cauchy, cfp::LossType::geman_mcclure,
-                                       cfp::LossType::truncated};
+constexpr cfp::LossType all_types[] = {cfp::LossType::trivial, cfp::LossType::huber, cfp::LossType::cauchy,
+                                       cfp::LossType::geman_mcclure, cfp::LossType::truncated};
 
 }  // namespace
 
@@ -17,18 +17,21 @@ TEST_CASE("Losses: first and second derivative equal the central differences of 
   for (const cfp::LossType type : all_types) {
     for (const double delta : {0.3, 1.0, 2.4476519, 20.0}) {
       const cfp::RobustLoss<double> loss{type, delta};
-      for (const double ratio : {1e-3, 0.1, 0.5, 0.97, 1.03, 2.0, 17.0, 1e3}) {  // of s to delta^2; the corner itself is left out
+      for (const double ratio :
+           {1e-3, 0.1, 0.5, 0.97, 1.03, 2.0, 17.0, 1e3}) {  // of s to delta^2; the corner itself is left out
         const double s = ratio * delta * delta;
         const double h = 1e-5 * s;
         CAPTURE(static_cast<int>(type), delta, s);
         CHECK(loss.first(s) == Approx((loss.value(s + h) - loss.value(s - h)) / (2 * h)).epsilon(1e-6).margin(1e-12));
-        CHECK(loss.second(s) * s == Approx((loss.first(s + h) - loss.first(s - h)) / (2 * h) * s).epsilon(1e-6).margin(1e-9));
+        CHECK(loss.second(s) * s ==
+              Approx((loss.first(s + h) - loss.first(s - h)) / (2 * h) * s).epsilon(1e-6).margin(1e-9));
       }
     }
   }
 }
 
-TEMPLATE_TEST_CASE("Losses: least squares at 0, concave, derivative in [0, 1], finite limits", "[optimization]", float, double) {
+TEMPLATE_TEST_CASE("Losses: least squares at 0, concave, derivative in [0, 1], finite limits", "[optimization]", float,
+                   double) {
   using Scalar = TestType;
   for (const cfp::LossType type : all_types) {
     const cfp::RobustLoss<Scalar> loss{type, Scalar(1.5)};
@@ -45,7 +48,8 @@ TEMPLATE_TEST_CASE("Losses: least squares at 0, concave, derivative in [0, 1], f
       REQUIRE(loss.second(s) <= 0);
       last_value = loss.value(s), last_first = loss.first(s);
     }
-    for (const Scalar s : {std::numeric_limits<Scalar>::denorm_min(), (std::numeric_limits<Scalar>::max)(), std::numeric_limits<Scalar>::infinity()}) {
+    for (const Scalar s : {std::numeric_limits<Scalar>::denorm_min(), (std::numeric_limits<Scalar>::max)(),
+                           std::numeric_limits<Scalar>::infinity()}) {
       CHECK_FALSE(std::isnan(loss.value(s)));
       CHECK_FALSE(std::isnan(loss.first(s)));
       CHECK_FALSE(std::isnan(loss.second(s)));

@@ -1,4 +1,4 @@
-#include "cfp/optimization/two_threads.hpp"
+#include "cfp/optimization/bundle/two_threads.hpp"
 
 #include <thread>
 #include <vector>
@@ -22,7 +22,8 @@ TEST_CASE("Two threads do every task once, odd ones on the helper", "[optimizati
   }
 }
 
-TEST_CASE("The hand-over to the helper holds for many short rounds and allocates nothing", "[optimization][two_threads]") {
+TEST_CASE("The hand-over to the helper holds for many short rounds and allocates nothing",
+          "[optimization][two_threads]") {
   cfp::TwoThreads two;
   long long sums[2] = {0, 0};
   CHECK(cfp_test::allocations_in([&] {

@@ -58,10 +58,13 @@ TEST_CASE("The weight rules are what they are called", "[probability]") {
 
 TEMPLATE_TEST_CASE("Map points and weights keep their range for hostile input", "[probability]", float, double) {
   using Limits = std::numeric_limits<TestType>;
-  const std::vector<TestType> hostile = {TestType(0), TestType(1), TestType(-3), TestType(7), Limits::denorm_min(), Limits::max(), Limits::infinity(), -Limits::infinity(), Limits::quiet_NaN()};
+  const std::vector<TestType> hostile = {TestType(0),        TestType(1),          TestType(-3),
+                                         TestType(7),        Limits::denorm_min(), Limits::max(),
+                                         Limits::infinity(), -Limits::infinity(),  Limits::quiet_NaN()};
   for (const TestType m : hostile) {
     for (const TestType k : hostile) {
-      for (const auto policy : {cfp::MapPointPolicy::copy, cfp::MapPointPolicy::exponential_mean, cfp::MapPointPolicy::log_odds}) {
+      for (const auto policy :
+           {cfp::MapPointPolicy::copy, cfp::MapPointPolicy::exponential_mean, cfp::MapPointPolicy::log_odds}) {
         const TestType updated = cfp::updated_map_point(m, k, with(policy));
         CHECK((updated >= 0 && updated <= 1));
       }
@@ -76,7 +79,9 @@ TEMPLATE_TEST_CASE("Map points and weights keep their range for hostile input", 
 TEMPLATE_TEST_CASE("K with M as its prior is Bayes' rule on the odds", "[probability]", float, double) {
   using S = TestType;
   const cfp::MapPointOptions options;
-  const auto posterior = [&](double k, double m) { return static_cast<double>(cfp::posterior_probability(S(k), S(m), options)); };
+  const auto posterior = [&](double k, double m) {
+    return static_cast<double>(cfp::posterior_probability(S(k), S(m), options));
+  };
   for (double k = 0.05; k < 1; k += 0.05) {
     for (double m = 0.05; m < 1; m += 0.05) {
       const double odds = k / (1 - k) * (m / (1 - m));
@@ -87,7 +92,8 @@ TEMPLATE_TEST_CASE("K with M as its prior is Bayes' rule on the odds", "[probabi
   }
   CHECK(posterior(1, 0) == Approx(0.5).epsilon(1e-5));  // both at the bound
   CHECK(posterior(std::numeric_limits<double>::quiet_NaN(), 0.5) == 0);
-  for (const double bad : {-1.0, 2.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+  for (const double bad :
+       {-1.0, 2.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     CHECK(posterior(bad, 0.3) >= 0);
     CHECK(posterior(bad, 0.3) <= 1);
     CHECK(posterior(0.3, bad) >= 0);
@@ -112,7 +118,8 @@ TEST_CASE("Map-point options outside their range are named", "[probability]") {
 }
 
 TEST_CASE("A map point that was never in doubt keeps M = 1 under every policy", "[probability]") {
-  for (const auto policy : {cfp::MapPointPolicy::copy, cfp::MapPointPolicy::exponential_mean, cfp::MapPointPolicy::log_odds}) {
+  for (const auto policy :
+       {cfp::MapPointPolicy::copy, cfp::MapPointPolicy::exponential_mean, cfp::MapPointPolicy::log_odds}) {
     CHECK(cfp::updated_map_point(1.0, 1.0, with(policy)) == 1.0);
   }
 }

@@ -47,7 +47,8 @@ ObjectProbability run(const std::vector<Scalar>& distances, const ObjectProbabil
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("One pair's score is the chosen function of the chi-squared distribution", "[probability]", float, double) {
+TEMPLATE_TEST_CASE("One pair's score is the chosen function of the chi-squared distribution", "[probability]", float,
+                   double) {
   const TestType tolerance = std::is_same_v<TestType, float> ? TestType(1e-6) : TestType(1e-14);
   ObjectProbabilityOptions options;
   CHECK(cfp::object_score(TestType(0), options) == 1);
@@ -74,7 +75,8 @@ TEST_CASE("As printed, no object can pass the paper's own threshold", "[probabil
   CHECK(run(std::vector<double>(100, 1e-9), options).static_probability <= 0.5);
 }
 
-TEMPLATE_TEST_CASE("Selecting three order statistics equals scoring and sorting all pairs", "[probability]", float, double) {
+TEMPLATE_TEST_CASE("Selecting three order statistics equals scoring and sorting all pairs", "[probability]", float,
+                   double) {
   cfp::Random random(7, "object selection");
   for (const ObjectScore score : {ObjectScore::survival, ObjectScore::density, ObjectScore::normalized_density}) {
     for (const double k : {1.0, 2.0, 3.0, 5.0}) {
@@ -116,8 +118,9 @@ TEST_CASE("An object is unknown with too few usable pairs, and says so", "[proba
 
 TEMPLATE_TEST_CASE("Hostile distances give a probability in range", "[probability]", float, double) {
   using Limits = std::numeric_limits<TestType>;
-  const std::vector<TestType> hostile = {TestType(0), Limits::denorm_min(), Limits::min(), Limits::max(), Limits::infinity(), -Limits::infinity(),
-                                         Limits::quiet_NaN(), TestType(1e30), TestType(-1), TestType(1)};
+  const std::vector<TestType> hostile = {TestType(0),        Limits::denorm_min(), Limits::min(),       Limits::max(),
+                                         Limits::infinity(), -Limits::infinity(),  Limits::quiet_NaN(), TestType(1e30),
+                                         TestType(-1),       TestType(1)};
   for (const ObjectScore score : {ObjectScore::survival, ObjectScore::density, ObjectScore::normalized_density}) {
     for (const double k : {0.5, 1.0, 2.0, 7.5}) {
       ObjectProbabilityOptions options;
@@ -141,7 +144,8 @@ TEST_CASE("The object score allocates nothing", "[probability]") {
   std::vector<float> scratch(d.size());
   const ObjectProbabilityOptions options;
   CHECK(cfp_test::allocations_in([&] {
-          volatile double keep = cfp::object_probability(cfp::span<const float>(d), cfp::span<float>(scratch), options).static_probability;
+          volatile double keep =
+              cfp::object_probability(cfp::span<const float>(d), cfp::span<float>(scratch), options).static_probability;
           (void)keep;
         }) == 0);
 }

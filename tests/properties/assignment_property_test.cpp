@@ -25,8 +25,8 @@ double any_double() {
 /// Costs with many ties, some forbidden.
 std::vector<double> costs_of(std::size_t size) {
   return *rc::gen::container<std::vector<double>>(size, rc::gen::map(rc::gen::inRange(-3, 13), [](int k) {
-    return k == 12 ? std::numeric_limits<double>::infinity() : 0.25 * k;
-  }));
+                                                    return k == 12 ? std::numeric_limits<double>::infinity() : 0.25 * k;
+                                                  }));
 }
 
 }  // namespace
@@ -75,7 +75,8 @@ TEST_CASE("Properties of the assignment", "[properties]") {
     };
     const double a = objective(cfp::solve_assignment(cfp::CostMatrix(values, rows, cols), gate, columns, workspace));
     const double b = objective(cfp::solve_assignment(cfp::CostMatrix(permuted, rows, cols), gate, columns, workspace));
-    const double c = objective(cfp::solve_assignment(cfp::CostMatrix(transposed, cols, rows), gate, flipped, workspace));
+    const double c =
+        objective(cfp::solve_assignment(cfp::CostMatrix(transposed, cols, rows), gate, flipped, workspace));
     RC_ASSERT(std::abs(a - b) < 1e-9);
     RC_ASSERT(std::abs(a - c) < 1e-9);
   });

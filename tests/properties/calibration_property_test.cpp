@@ -9,7 +9,9 @@
 
 namespace {
 
-std::vector<char> labels(std::size_t n) { return *rc::gen::container<std::vector<char>>(n, rc::gen::element<char>(0, 1)); }
+std::vector<char> labels(std::size_t n) {
+  return *rc::gen::container<std::vector<char>>(n, rc::gen::element<char>(0, 1));
+}
 
 }  // namespace
 
@@ -42,7 +44,8 @@ TEST_CASE("Calibration of any doubles is finite and in range", "[properties]") {
     cfp::CalibrationWorkspace workspace;
     const std::vector<char> y = labels(p.size());
     const auto r = cfp::evaluate_calibration<7, double>(p, y, w, workspace);
-    for (const double x : {r.auc, r.brier, r.expected_calibration_error, r.largest_calibration_error, r.static_fraction}) {
+    for (const double x :
+         {r.auc, r.brier, r.expected_calibration_error, r.largest_calibration_error, r.static_fraction}) {
       RC_ASSERT(x >= 0 && x <= 1);
     }
     RC_ASSERT(r.log_loss >= 0 && r.log_loss < 35);

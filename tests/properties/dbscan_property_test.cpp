@@ -17,10 +17,13 @@ namespace {
 // Multiples of 1/64 in [0, 8): exact in float and double, with many ties.
 std::vector<double> grid_values() {
   std::vector<double> values;
-  for (const int steps : *rc::gen::container<std::vector<int>>(rc::gen::inRange(0, 512))) values.push_back(steps / 64.0);
+  for (const int steps : *rc::gen::container<std::vector<int>>(rc::gen::inRange(0, 512)))
+    values.push_back(steps / 64.0);
   return values;
 }
-cfp::DbscanOptions any_options() { return {*rc::gen::inRange(0, 40) / 64.0, static_cast<std::size_t>(*rc::gen::inRange(1, 10))}; }
+cfp::DbscanOptions any_options() {
+  return {*rc::gen::inRange(0, 40) / 64.0, static_cast<std::size_t>(*rc::gen::inRange(1, 10))};
+}
 
 template <typename Scalar>
 std::vector<int> labels_of(const std::vector<Scalar>& values, const cfp::DbscanOptions& options) {
@@ -36,7 +39,10 @@ std::vector<double> any_box() {
   std::vector<double> depths(static_cast<std::size_t>(*rc::gen::inRange(0, 200)));
   for (double& depth : depths) {
     const std::uint32_t kind = random.index(8);
-    depth = kind == 0 ? 0.0 : kind < 4 ? 2.0 + 0.1 * random.normal() : kind < 6 ? 3.5 + 0.03 * random.normal() : random.uniform(1, 6);
+    depth = kind == 0  ? 0.0
+            : kind < 4 ? 2.0 + 0.1 * random.normal()
+            : kind < 6 ? 3.5 + 0.03 * random.normal()
+                       : random.uniform(1, 6);
   }
   return depths;
 }
@@ -92,7 +98,8 @@ TEST_CASE("DBSCAN properties", "[properties]") {
   rc::prop("noise does not grow with eps, nor shrink with min_pts", [] {
     const std::vector<double> values = grid_values();
     const cfp::DbscanOptions options = any_options();
-    const std::vector<int> labels = labels_of(values, options), wider = labels_of(values, {options.eps + 1 / 64.0, options.min_pts}),
+    const std::vector<int> labels = labels_of(values, options),
+                           wider = labels_of(values, {options.eps + 1 / 64.0, options.min_pts}),
                            denser = labels_of(values, {options.eps, options.min_pts + 1});
     for (std::size_t i = 0; i < values.size(); ++i) {
       RC_ASSERT(labels[i] < 0 || wider[i] >= 0);

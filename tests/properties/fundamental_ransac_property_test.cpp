@@ -1,4 +1,4 @@
-#include "cfp/geometry/fundamental_ransac.hpp"
+#include "cfp/robust/fundamental_ransac.hpp"
 
 #include <vector>
 
@@ -18,7 +18,8 @@ Points arbitrary_points(std::size_t n) {
       return *rc::gen::weightedOneOf<double>(
           {{12, rc::gen::map(rc::gen::inRange(0, 6400), [](int x) { return x * 0.1; })},
            {3, rc::gen::element(0.0, 320.0)},
-           {1, rc::gen::element(std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), -1e300, 1e-310, 9e4)},
+           {1, rc::gen::element(std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),
+                                -1e300, 1e-310, 9e4)},
            {1, rc::gen::arbitrary<double>()}});
     };
     points.push_back({coordinate(), coordinate()});
@@ -28,14 +29,16 @@ Points arbitrary_points(std::size_t n) {
 
 }  // namespace
 
-TEST_CASE("fundamental_ransac ends with finite numbers, consistent counts and the same bits for any input", "[properties]") {
+TEST_CASE("fundamental_ransac ends with finite numbers, consistent counts and the same bits for any input",
+          "[properties]") {
   rc::prop("arbitrary pairs and weights", [] {
     const auto n = *rc::gen::inRange<std::size_t>(0, 60);
     const Points prev = arbitrary_points(n), cur = *rc::gen::arbitrary<bool>() ? prev : arbitrary_points(n);
     std::vector<double> weights;
     if (*rc::gen::arbitrary<bool>()) {
       for (std::size_t i = 0; i < n; ++i)
-        weights.push_back(*rc::gen::element(0.0, 1.0, 0.5, -1.0, 1e-310, 1e308, std::numeric_limits<double>::quiet_NaN()));
+        weights.push_back(
+            *rc::gen::element(0.0, 1.0, 0.5, -1.0, 1e-310, 1e308, std::numeric_limits<double>::quiet_NaN()));
     }
     cfp::FundamentalRansacOptions options;
     options.max_iterations = 50;

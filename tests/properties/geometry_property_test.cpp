@@ -55,8 +55,10 @@ TEST_CASE("properties of epipolar distances", "[properties]") {
   });
   rc::prop("moving the current pixel moves the distance by at most as much", [] {
     const cfp::Matrix3<double> F = cfp::fundamental_from_pose(camera, cfp::se3_exp(tangent(0.5, 0.3)));
-    const Vector2<double> prev(real(0, 640), real(0, 480)), cur(real(0, 640), real(0, 480)), step(real(-20, 20), real(-20, 20));
-    const double d = cfp::epipolar_distance(F, prev, cur), moved = cfp::epipolar_distance(F, prev, Vector2<double>(cur + step));
+    const Vector2<double> prev(real(0, 640), real(0, 480)), cur(real(0, 640), real(0, 480)),
+        step(real(-20, 20), real(-20, 20));
+    const double d = cfp::epipolar_distance(F, prev, cur),
+                 moved = cfp::epipolar_distance(F, prev, Vector2<double>(cur + step));
     RC_PRE(cfp::has_distance(d));
     RC_ASSERT(std::abs(moved - d) <= step.norm() + 1e-9);
   });
@@ -91,7 +93,8 @@ TEST_CASE("properties of reprojection distances", "[properties]") {
       depth_f[i] = static_cast<float>(depth[i]);
     }
     cfp::reprojection_distances(camera, T, prev, depth, cur, out);
-    cfp::reprojection_distances(cfp::PinholeCamera<float>{500, 510, 320, 240}, T.cast<float>(), prev_f, depth_f, cur_f, out_f);
+    cfp::reprojection_distances(cfp::PinholeCamera<float>{500, 510, 320, 240}, T.cast<float>(), prev_f, depth_f, cur_f,
+                                out_f);
     for (std::size_t i = 0; i < n; ++i) {
       if (depth[i] > 1) RC_ASSERT(std::abs(out[i] - static_cast<double>(out_f[i])) < 5e-3 * (1 + out[i] * 1e-2));
       if (depth[i] <= 0) RC_ASSERT(out[i] == -1 && out_f[i] == -1);

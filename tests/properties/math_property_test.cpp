@@ -47,7 +47,8 @@ TEST_CASE("properties of chi-squared", "[properties]") {
   rc::prop("float equals double within its rounding", [] {
     const double k = real(0.5, 20), x = real(0.01, 40);
     const float xf = static_cast<float>(x);
-    RC_ASSERT(std::abs(cfp::chi_squared_survival(xf, k) - cfp::chi_squared_survival(static_cast<double>(xf), k)) <= 1e-6);
+    RC_ASSERT(std::abs(cfp::chi_squared_survival(xf, k) - cfp::chi_squared_survival(static_cast<double>(xf), k)) <=
+              1e-6);
   });
 }
 
@@ -98,7 +99,8 @@ TEST_CASE("properties of order statistics", "[properties]") {
     const std::array<double, 3> quantiles = {0.1, 0.2, 0.3};
     scratch = values;
     const std::array<double, 3> selected = cfp::select_quantiles(cfp::span<double>(scratch), quantiles);
-    for (std::size_t i = 0; i < 3; ++i) RC_ASSERT(selected[i] == sorted[cfp::quantile_rank(quantiles[i], values.size()) - 1]);
+    for (std::size_t i = 0; i < 3; ++i)
+      RC_ASSERT(selected[i] == sorted[cfp::quantile_rank(quantiles[i], values.size()) - 1]);
   });
   rc::prop("quantile_rank grows with q and with n", [] {
     const std::size_t n = static_cast<std::size_t>(*rc::gen::inRange(1, 100000));

@@ -5,11 +5,11 @@
 #include <vector>
 
 #include "cfp/core/random.hpp"
-#include "cfp/probability/constraint.hpp"
-#include "cfp/probability/fusion.hpp"
-#include "cfp/probability/keypoint_first_stage.hpp"
+#include "cfp/probability/distance_sigmoid.hpp"
+#include "cfp/probability/first_stage_probability.hpp"
 #include "cfp/probability/map_point.hpp"
 #include "cfp/probability/object.hpp"
+#include "cfp/probability/second_stage_probability.hpp"
 #include "support/catch.hpp"
 #include "support/generators.hpp"
 
@@ -71,7 +71,8 @@ TEST_CASE("Properties of the object probability", "[properties]") {
     const auto d = *distances(1);
     const std::vector<float> f(d.begin(), d.end());
     std::vector<float> scratch(f.size());
-    const double single = cfp::object_probability(cfp::span<const float>(f), cfp::span<float>(scratch), from_one_pair()).static_probability;
+    const double single = cfp::object_probability(cfp::span<const float>(f), cfp::span<float>(scratch), from_one_pair())
+                              .static_probability;
     RC_ASSERT(std::abs(single - object(d, from_one_pair())) < 1e-5);
   });
 }
@@ -95,7 +96,8 @@ TEST_CASE("Properties of the first stage", "[properties]") {
   rc::prop("Background is continuous at O_Th", [] {
     const double t = 0.01 + 0.98 * *probability();
     const double h = 1e-9;
-    RC_ASSERT(std::abs(cfp::first_stage_probability(t - h, false, t) - cfp::first_stage_probability(t + h, false, t)) < 1e-6);
+    RC_ASSERT(std::abs(cfp::first_stage_probability(t - h, false, t) - cfp::first_stage_probability(t + h, false, t)) <
+              1e-6);
   });
 }
 
@@ -103,7 +105,8 @@ TEST_CASE("Properties of the constraint sigmoid", "[properties]") {
   rc::prop("The model is finite and its probabilities in range for any distances", [] {
     const auto d = *rc::gen::container<std::vector<double>>(any_double());
     const auto model = fit(d);
-    RC_ASSERT(std::isfinite(model.threshold_px) && std::isfinite(model.minimum_px) && std::isfinite(model.slope_per_px));
+    RC_ASSERT(std::isfinite(model.threshold_px) && std::isfinite(model.minimum_px) &&
+              std::isfinite(model.slope_per_px));
     RC_ASSERT(model.calculation_confidence >= 0 && model.calculation_confidence <= 1);
     const double k = cfp::static_probability(model, *any_double());
     RC_ASSERT(k >= 0 && k <= 1);
@@ -138,23 +141,32 @@ TEST_CASE("Properties of the constraint sigmoid", "[properties]") {
     const auto d = *rc::gen::container<std::vector<double>>(any_double());
     std::vector<double> out(d.size());
     cfp::static_probabilities(model, cfp::span<const double>(d), cfp::span<double>(out));
-    for (std::size_t i = 0; i < d.size(); ++i) RC_ASSERT(std::abs(out[i] - cfp::static_probability(model, d[i])) < 1e-12);
+    for (std::size_t i = 0; i < d.size(); ++i)
+      RC_ASSERT(std::abs(out[i] - cfp::static_probability(model, d[i])) < 1e-12);
   });
 }
 
 TEST_CASE("Properties of the fusion", "[properties]") {
-  const auto evidence = [] { return cfp::Evidence<double>{*probability(), *probability(), *rc::gen::arbitrary<bool>()}; };
+  const auto evidence = [] {
+    return cfp::Evidence<double>{*probability(), *probability(), *rc::gen::arbitrary<bool>()};
+  };
   rc::prop("The low-dynamic mean lies between its two probabilities, the high-dynamic product below both", [&] {
     auto t = evidence(), f = evidence();
     t.available = f.available = true;
-    const double low = (std::min)(t.static_probability, f.static_probability), high = (std::max)(t.static_probability, f.static_probability);
+    const double low = (std::min)(t.static_probability, f.static_probability),
+                 high = (std::max)(t.static_probability, f.static_probability);
     const double mean = cfp::fuse_low_dynamic(t, f);
     RC_ASSERT(mean >= low - 1e-12 && mean <= high + 1e-12);
     RC_ASSERT(cfp::fuse_high_dynamic(t, f) <= low);
   });
   rc::prop("A constraint's probability never lowers the result by rising", [&] {
-    cfp::SecondStageKeypoint<double> p{evidence(), evidence(), *probability(), *probability(), *rc::gen::arbitrary<bool>(),
-                                       *rc::gen::arbitrary<bool>(), *rc::gen::arbitrary<bool>()};
+    cfp::SecondStageKeypoint<double> p{evidence(),
+                                       evidence(),
+                                       *probability(),
+                                       *probability(),
+                                       *rc::gen::arbitrary<bool>(),
+                                       *rc::gen::arbitrary<bool>(),
+                                       *rc::gen::arbitrary<bool>()};
     const double before = cfp::second_stage_probability(p, 0.9);
     p.projection.static_probability += (1 - p.projection.static_probability) * *probability();
     RC_ASSERT(cfp::second_stage_probability(p, 0.9) >= before - 1e-12);
@@ -162,7 +174,10 @@ TEST_CASE("Properties of the fusion", "[properties]") {
   rc::prop("K is in [0, 1] for any evidence", [] {
     const cfp::SecondStageKeypoint<double> p{{*any_double(), *any_double(), *rc::gen::arbitrary<bool>()},
                                              {*any_double(), *any_double(), *rc::gen::arbitrary<bool>()},
-                                             *any_double(), *any_double(), *rc::gen::arbitrary<bool>(), *rc::gen::arbitrary<bool>(),
+                                             *any_double(),
+                                             *any_double(),
+                                             *rc::gen::arbitrary<bool>(),
+                                             *rc::gen::arbitrary<bool>(),
                                              *rc::gen::arbitrary<bool>()};
     const double k = cfp::second_stage_probability(p, 0.9);
     RC_ASSERT(k >= 0 && k <= 1);
@@ -170,7 +185,8 @@ TEST_CASE("Properties of the fusion", "[properties]") {
 }
 
 TEST_CASE("Properties of the map-point update", "[properties]") {
-  for (const auto policy : {cfp::MapPointPolicy::copy, cfp::MapPointPolicy::exponential_mean, cfp::MapPointPolicy::log_odds}) {
+  for (const auto policy :
+       {cfp::MapPointPolicy::copy, cfp::MapPointPolicy::exponential_mean, cfp::MapPointPolicy::log_odds}) {
     cfp::MapPointOptions options;
     options.policy = policy;
     rc::prop("M is in [0, 1] for any M and K, policy " + std::to_string(static_cast<int>(policy)), [options] {

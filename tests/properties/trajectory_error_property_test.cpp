@@ -34,7 +34,9 @@ TEST_CASE("ATE after rigid alignment does not depend on either world frame", "[p
     const auto ate = [&](const auto& a, const auto& b) {
       return cfp::absolute_trajectory_error(view(a), view(b), {}, workspace).translation_m.rmse;
     };
-    const auto rpe = [&](const auto& a, const auto& b) { return cfp::relative_pose_error(view(a), view(b), relative, workspace); };
+    const auto rpe = [&](const auto& a, const auto& b) {
+      return cfp::relative_pose_error(view(a), view(b), relative, workspace);
+    };
     const auto truth = cfp_test::moved(c.T_new_world, c.truth), estimate = cfp_test::moved(c.T_new_world, c.estimate);
     RC_ASSERT(std::abs(ate(c.truth, c.estimate) - ate(c.truth, estimate)) < 1e-9);
     RC_ASSERT(std::abs(ate(c.truth, c.estimate) - ate(truth, c.estimate)) < 1e-9);

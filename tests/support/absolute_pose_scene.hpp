@@ -1,4 +1,5 @@
-// A map seen by a camera at a known pose: points, noisy pixels, mismatches, and weights that know more or less about them.
+// A map seen by a camera at a known pose: points, noisy pixels, mismatches, and weights that know more or less about
+// them.
 #pragma once
 
 #include <array>
@@ -28,10 +29,12 @@ struct AbsolutePoseScene {
 };
 
 template <typename Scalar, typename Camera>
-AbsolutePoseScene<Scalar> make_absolute_pose_scene(cfp::Random& random, const Camera& camera, const AbsolutePoseOptions& options) {
+AbsolutePoseScene<Scalar> make_absolute_pose_scene(cfp::Random& random, const Camera& camera,
+                                                   const AbsolutePoseOptions& options) {
   using CameraScalar = typename Camera::ScalarType;
   AbsolutePoseScene<Scalar> scene;
-  const cfp::Vector3<double> axis = cfp::Vector3<double>(random.normal(), random.normal(), random.normal()).normalized();
+  const cfp::Vector3<double> axis =
+      cfp::Vector3<double>(random.normal(), random.normal(), random.normal()).normalized();
   scene.T_cam_world.rotation = cfp::so3_exp<double>(random.uniform(0, 3) * axis);
   scene.T_cam_world.translation = cfp::Vector3<double>(random.normal(), random.normal(), random.normal());
   const cfp::SE3<double> T_world_cam = scene.T_cam_world.inverse();

@@ -9,12 +9,12 @@
 #include <glog/logging.h>
 
 #include "cfp/math/se3.hpp"
-#include "cfp/optimization/ba_problem.hpp"
+#include "cfp/optimization/bundle/bundle_problem.hpp"
 
 namespace cfp_test {
 
-/// Pose as (R row by row, t), 12 numbers; tangent as cfp's se3: T <- exp(xi) T. The cost functions put their 6-vector Jacobian
-/// into the first columns of the ambient one, so the plus Jacobian is the identity there.
+/// Pose as (R row by row, t), 12 numbers; tangent as cfp's se3: T <- exp(xi) T. The cost functions put their 6-vector
+/// Jacobian into the first columns of the ambient one, so the plus Jacobian is the identity there.
 class PoseManifold : public ceres::Manifold {
  public:
   int AmbientSize() const override { return 12; }
@@ -46,7 +46,8 @@ class ReprojectionCost : public ceres::SizedCostFunction<Residuals, 12, 3> {
 
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
     const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> R(parameters[0]);
-    const Eigen::Vector3d p = R * Eigen::Map<const Eigen::Vector3d>(parameters[1]) + Eigen::Map<const Eigen::Vector3d>(parameters[0] + 9);
+    const Eigen::Vector3d p =
+        R * Eigen::Map<const Eigen::Vector3d>(parameters[1]) + Eigen::Map<const Eigen::Vector3d>(parameters[0] + 9);
     Eigen::Vector2d pixel;
     Eigen::Matrix<double, 2, 3> A;
     if (!camera_.project(p, pixel, &A)) return false;
@@ -70,7 +71,8 @@ class ReprojectionCost : public ceres::SizedCostFunction<Residuals, 12, 3> {
       }
       J_pose.template rightCols<6>().setZero();
     }
-    if (jacobians[1] != nullptr) Eigen::Map<Eigen::Matrix<double, Residuals, 3, Eigen::RowMajor>>(jacobians[1]).noalias() = J * R;
+    if (jacobians[1] != nullptr)
+      Eigen::Map<Eigen::Matrix<double, Residuals, 3, Eigen::RowMajor>>(jacobians[1]).noalias() = J * R;
     return true;
   }
 
@@ -94,7 +96,8 @@ struct CeresResult {
 
 /// Builds and solves; poses and points of the problem are updated.
 template <typename Camera, typename Scalar>
-CeresResult solve_with_ceres(const cfp::BaProblem<Camera, Scalar>& p, const cfp::WeightedBaOptions& options, ceres::Solver::Options solver) {
+CeresResult solve_with_ceres(const cfp::BundleProblem<Camera, Scalar>& p, const cfp::BundleOptions& options,
+                             ceres::Solver::Options solver) {
   std::vector<double> poses(12 * p.poses.size());
   for (std::size_t k = 0; k < p.poses.size(); ++k) {
     Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> rotation(poses.data() + 12 * k);
@@ -117,10 +120,13 @@ CeresResult solve_with_ceres(const cfp::BaProblem<Camera, Scalar>& p, const cfp:
     const auto u = static_cast<double>(o.pixels(i, 0)), v = static_cast<double>(o.pixels(i, 1));
     const bool stereo = right > 0 && p.baseline_fx > 0;
     ceres::CostFunction* cost = nullptr;
-    if (stereo) cost = new ReprojectionCost<3, Camera>(camera, u, v, right, p.baseline_fx, sigma);
-    else cost = new ReprojectionCost<2, Camera>(camera, u, v, right, 0, sigma);
-    problem.AddResidualBlock(cost, make_ceres_loss(options.loss, stereo ? options.chi2_stereo : options.chi2_mono, weight), &poses[12 * k],
-                             p.points[j].data());
+    if (stereo)
+      cost = new ReprojectionCost<3, Camera>(camera, u, v, right, p.baseline_fx, sigma);
+    else
+      cost = new ReprojectionCost<2, Camera>(camera, u, v, right, 0, sigma);
+    problem.AddResidualBlock(cost,
+                             make_ceres_loss(options.loss, stereo ? options.chi2_stereo : options.chi2_mono, weight),
+                             &poses[12 * k], p.points[j].data());
   }
   for (std::size_t k = 0; k < p.poses.size(); ++k) {
     if (!problem.HasParameterBlock(&poses[12 * k])) continue;

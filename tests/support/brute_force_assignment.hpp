@@ -17,12 +17,13 @@ struct BestAssignment {
 
 namespace detail {
 template <typename Scalar>
-void try_row(const cfp::CostMatrix<Scalar>& costs, double max_cost, std::size_t row, std::vector<char>& used, BestAssignment now,
-             bool most_pairs, BestAssignment& best) {
+void try_row(const cfp::CostMatrix<Scalar>& costs, double max_cost, std::size_t row, std::vector<char>& used,
+             BestAssignment now, bool most_pairs, BestAssignment& best) {
   if (row == costs.rows) {
-    const bool better = now.pairs != best.pairs && most_pairs
-                            ? now.pairs > best.pairs
-                            : now.cost - best.cost < max_cost * (static_cast<double>(now.pairs) - static_cast<double>(best.pairs));
+    const bool better =
+        now.pairs != best.pairs && most_pairs
+            ? now.pairs > best.pairs
+            : now.cost - best.cost < max_cost * (static_cast<double>(now.pairs) - static_cast<double>(best.pairs));
     if (better || (most_pairs && now.pairs == best.pairs && now.cost < best.cost)) best = now;
     return;
   }

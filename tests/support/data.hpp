@@ -15,6 +15,6 @@ inline std::filesystem::path data_folder(const std::string& name) {
 }  // namespace cfp_test
 
 /// Defines `variable` as the path of a file or folder of the real data, or ends the test case as skipped.
-#define CFP_REQUIRE_DATA(variable, name)                                                          \
-  const std::filesystem::path variable = cfp_test::data_folder(name);                             \
+#define CFP_REQUIRE_DATA(variable, name)                              \
+  const std::filesystem::path variable = cfp_test::data_folder(name); \
   if (!std::filesystem::exists(variable)) CFP_SKIP("no " + variable.string() + "; set CFP_TEST_DATA")

@@ -26,7 +26,8 @@ struct FakeRun {
 inline cfp::SE3<double> fake_truth(double t) {
   cfp::SE3<double> T;
   T.rotation = cfp::so3_exp(cfp::Vector3<double>(0.1 * std::sin(t), 0.4 * std::sin(0.7 * t), 0.05 * t));
-  T.translation = {1.2 * std::sin(0.6 * t), 0.5 * std::cos(0.9 * t) - 0.3 * std::sin(1.7 * t), 1.4 + 0.12 * std::sin(1.3 * t)};
+  T.translation = {1.2 * std::sin(0.6 * t), 0.5 * std::cos(0.9 * t) - 0.3 * std::sin(1.7 * t),
+                   1.4 + 0.12 * std::sin(1.3 * t)};
   return T;
 }
 
@@ -42,7 +43,8 @@ inline void evaluate(cfp_slam::RunRecord& run) {
   run.relative = cfp::relative_pose_error(View(run.truth), View(estimate), relative, workspace);
 }
 
-inline void fake_boxes(const FakeRun& fake, std::size_t k, cfp::Random& random, cfp_slam::FrameRecord& frame, cfp_slam::RunRecord& run) {
+inline void fake_boxes(const FakeRun& fake, std::size_t k, cfp::Random& random, cfp_slam::FrameRecord& frame,
+                       cfp_slam::RunRecord& run) {
   const auto probability = [&](bool is_static, double sharpness) {
     return static_cast<float>(1 / (1 + std::exp(-(is_static ? 1.0 : -1.0) * sharpness - 1.2 * random.normal())));
   };
@@ -60,8 +62,9 @@ inline void fake_boxes(const FakeRun& fake, std::size_t k, cfp::Random& random, 
     for (int i = 0; i < 40; ++i) {
       const bool is_static = random.uniform() < (still ? 0.85 : 0.45);
       const float first = probability(is_static, 0.5 * fake.sharpness), second = probability(is_static, fake.sharpness);
-      for (const auto& [samples, p] : {std::make_pair(&run.first_stage, first), std::make_pair(&run.second_stage, second),
-                                       std::make_pair(&run.map_point, 0.5F * (second + probability(is_static, fake.sharpness)))}) {
+      for (const auto& [samples, p] :
+           {std::make_pair(&run.first_stage, first), std::make_pair(&run.second_stage, second),
+            std::make_pair(&run.map_point, 0.5F * (second + probability(is_static, fake.sharpness)))}) {
         samples->probability.push_back(p);
         samples->is_static.push_back(is_static);
       }
@@ -87,12 +90,12 @@ inline cfp_slam::RunRecord fake_run(const FakeRun& fake) {
     frame.image = "rgb/" + std::to_string(k) + ".png";
     cfp::SE3<double> T = T_map_world * fake_truth(t);
     const double s = t / (0.2 + static_cast<double>(fake.frames) / 30), middle = (s - 0.55) / 0.1;
-    T.translation +=
-        fake.drift_m * cfp::Vector3<double>(std::sin(5 * s + static_cast<double>(fake.seed)), std::sin(9 * s), std::cos(7 * s)) +
-        fake.bump_m * std::exp(-middle * middle) * cfp::Vector3<double>(1, 0.6, -0.2) +
-        0.15 * fake.drift_m * cfp::Vector3<double>(random.normal(), random.normal(), random.normal());
-    T.rotation =
-        T.rotation * cfp::so3_exp(cfp::Vector3<double>(0.1 * fake.drift_m * random.normal(), 0.3 * fake.drift_m * std::sin(4 * s), 0));
+    T.translation += fake.drift_m * cfp::Vector3<double>(std::sin(5 * s + static_cast<double>(fake.seed)),
+                                                         std::sin(9 * s), std::cos(7 * s)) +
+                     fake.bump_m * std::exp(-middle * middle) * cfp::Vector3<double>(1, 0.6, -0.2) +
+                     0.15 * fake.drift_m * cfp::Vector3<double>(random.normal(), random.normal(), random.normal());
+    T.rotation = T.rotation * cfp::so3_exp(cfp::Vector3<double>(0.1 * fake.drift_m * random.normal(),
+                                                                0.3 * fake.drift_m * std::sin(4 * s), 0));
     frame.T_world_cam = T;
     const bool lost = k >= fake.lost_from && k < fake.lost_from + fake.lost_count;
     frame.outcome = lost ? cfp_slam::Outcome::lost : cfp_slam::Outcome::tracked;
@@ -139,7 +142,8 @@ inline cfp_slam::RunRecord fake_run(const FakeRun& fake) {
 }
 
 /// The seven variants of one sequence.
-inline std::vector<cfp_slam::RunRecord> fake_variants(const std::string& sequence, std::uint64_t seed = 1, std::size_t frames = 300) {
+inline std::vector<cfp_slam::RunRecord> fake_variants(const std::string& sequence, std::uint64_t seed = 1,
+                                                      std::size_t frames = 300) {
   std::vector<cfp_slam::RunRecord> runs;
   const auto add = [&](const char* variant, double drift, double bump, std::size_t lost, double sharpness) {
     FakeRun fake;

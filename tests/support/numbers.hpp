@@ -11,8 +11,12 @@ namespace cfp_test {
 template <typename Scalar>
 constexpr std::array<Scalar, 16> hostile_numbers() {
   using limits = std::numeric_limits<Scalar>;
-  return {limits::quiet_NaN(), limits::infinity(), -limits::infinity(), (limits::max)(), limits::lowest(), (limits::min)(), -(limits::min)(),
-          limits::denorm_min(), -limits::denorm_min(), Scalar(0), Scalar(-0.0), limits::epsilon(), Scalar(1), Scalar(-1), Scalar(0.5), Scalar(640)};
+  return {limits::quiet_NaN(), limits::infinity(),   -limits::infinity(),
+          (limits::max)(),     limits::lowest(),     (limits::min)(),
+          -(limits::min)(),    limits::denorm_min(), -limits::denorm_min(),
+          Scalar(0),           Scalar(-0.0),         limits::epsilon(),
+          Scalar(1),           Scalar(-1),           Scalar(0.5),
+          Scalar(640)};
 }
 
 /// |a - b| over the larger of the two magnitudes; 0 for equal numbers (also infinite ones).

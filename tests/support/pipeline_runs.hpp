@@ -4,8 +4,8 @@
 #include <utility>
 #include <vector>
 
-#include "cfp/pipeline/first_stage.hpp"
-#include "cfp/pipeline/second_stage.hpp"
+#include "cfp/frame/first_stage.hpp"
+#include "cfp/frame/second_stage.hpp"
 #include "support/dynamic_scene.hpp"
 
 namespace cfp_test {
@@ -21,10 +21,14 @@ struct FirstStageRun {
     for (const auto& box : scene.boxes) boxes.push_back({box, true, true});
   }
 
-  cfp::FirstStageResult first(const cfp::FirstStageOptions& options, const cfp::Matrix3<Scalar>* F = nullptr) { return first(options, F, scene.camera); }
+  cfp::FirstStageResult first(const cfp::FirstStageOptions& options, const cfp::Matrix3<Scalar>* F = nullptr) {
+    return first(options, F, scene.camera);
+  }
   template <typename Camera>
-  cfp::FirstStageResult first(const cfp::FirstStageOptions& options, const cfp::Matrix3<Scalar>* F, const Camera& camera) {
-    const cfp::FirstStageInput<Scalar> in{scene.keypoints, scene.depths, boxes, scene.previous_keypoints, scene.keypoints, F};
+  cfp::FirstStageResult first(const cfp::FirstStageOptions& options, const cfp::Matrix3<Scalar>* F,
+                              const Camera& camera) {
+    const cfp::FirstStageInput<Scalar> in{scene.keypoints,          scene.depths,    boxes,
+                                          scene.previous_keypoints, scene.keypoints, F};
     return cfp::first_stage(in, camera, {k, label, ruling_box, objects}, options, work);
   }
 
@@ -40,15 +44,26 @@ struct FirstStageRun {
 template <typename Scalar>
 struct SecondStageRun : FirstStageRun<Scalar> {
   explicit SecondStageRun(DynamicScene<Scalar> s)
-      : FirstStageRun<Scalar>(std::move(s)), m(this->scene.keypoints.size(), Scalar(1)), weight(this->scene.keypoints.size()), T_cur_prev(this->scene.T_cur_prev) {
+      : FirstStageRun<Scalar>(std::move(s)),
+        m(this->scene.keypoints.size(), Scalar(1)),
+        weight(this->scene.keypoints.size()),
+        T_cur_prev(this->scene.T_cur_prev) {
     this->first({});
   }
 
   cfp::SecondStageResult second(const cfp::SecondStageOptions& options) { return second(options, this->scene.camera); }
   template <typename Camera>
   cfp::SecondStageResult second(const cfp::SecondStageOptions& options, const Camera& camera) {
-    const cfp::SecondStageInput<Scalar> in{this->scene.keypoints, this->label, this->ruling_box, this->boxes, this->objects,
-                                           this->scene.previous_keypoints, this->scene.previous_depths, this->scene.match, T_cur_prev, inliers};
+    const cfp::SecondStageInput<Scalar> in{this->scene.keypoints,
+                                           this->label,
+                                           this->ruling_box,
+                                           this->boxes,
+                                           this->objects,
+                                           this->scene.previous_keypoints,
+                                           this->scene.previous_depths,
+                                           this->scene.match,
+                                           T_cur_prev,
+                                           inliers};
     return cfp::second_stage(in, camera, {this->k, m, weight}, options, second_work);
   }
 

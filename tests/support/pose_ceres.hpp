@@ -14,8 +14,8 @@
 
 namespace cfp_test {
 
-/// Ambient: 9 rotation entries (row-major), 3 translation. Jacobians are handed over in tangent coordinates, in the first six
-/// ambient columns, which the manifold's "plus Jacobian" [I; 0] picks out.
+/// Ambient: 9 rotation entries (row-major), 3 translation. Jacobians are handed over in tangent coordinates, in the
+/// first six ambient columns, which the manifold's "plus Jacobian" [I; 0] picks out.
 class LeftUpdate final : public ceres::Manifold {
  public:
   int AmbientSize() const override { return 12; }
@@ -52,10 +52,13 @@ class PixelError final : public ceres::SizedCostFunction<Rows, 12> {
     r[1] = (fy * y * iz + cy - z[1]) * inverse_sigma;
     if (Rows == 3) r[2] = (fx * x * iz + cx - bf * iz - z[2]) * inverse_sigma;
     if (jacobians == nullptr || jacobians[0] == nullptr) return true;
-    double* J = jacobians[0];  // the form of ORB-SLAM2's EdgeSE3ProjectXYZOnlyPose, columns reordered to (translation, rotation)
+    double* J = jacobians[0];  // the form of ORB-SLAM2's EdgeSE3ProjectXYZOnlyPose, columns reordered to (translation,
+                               // rotation)
     const double s = inverse_sigma;
-    const double row0[6] = {s * fx * iz, 0, -s * fx * x * iz2, -s * fx * x * y * iz2, s * fx * (1 + x * x * iz2), -s * fx * y * iz};
-    const double row1[6] = {0, s * fy * iz, -s * fy * y * iz2, -s * fy * (1 + y * y * iz2), s * fy * x * y * iz2, s * fy * x * iz};
+    const double row0[6] = {s * fx * iz,     0, -s * fx * x * iz2, -s * fx * x * y * iz2, s * fx * (1 + x * x * iz2),
+                            -s * fx * y * iz};
+    const double row1[6] = {
+        0, s * fy * iz, -s * fy * y * iz2, -s * fy * (1 + y * y * iz2), s * fy * x * y * iz2, s * fy * x * iz};
     for (int i = 0; i < 12; ++i) J[i] = i < 6 ? row0[i] : 0;
     for (int i = 0; i < 12; ++i) J[12 + i] = i < 6 ? row1[i] : 0;
     if (Rows == 3) {
@@ -82,10 +85,14 @@ class GemanLoss final : public ceres::LossFunction {
 
 inline ceres::LossFunction* ceres_loss(cfp::LossType type, double delta) {
   switch (type) {
-    case cfp::LossType::huber: return new ceres::HuberLoss(delta);
-    case cfp::LossType::cauchy: return new ceres::CauchyLoss(delta);
-    case cfp::LossType::geman_mcclure: return new GemanLoss(delta);
-    default: return nullptr;
+    case cfp::LossType::huber:
+      return new ceres::HuberLoss(delta);
+    case cfp::LossType::cauchy:
+      return new ceres::CauchyLoss(delta);
+    case cfp::LossType::geman_mcclure:
+      return new GemanLoss(delta);
+    default:
+      return nullptr;
   }
 }
 
@@ -98,14 +105,16 @@ struct CeresPose {
 
 /// The rounds of `options` with Ceres. `weights` empty: 1. Converges to `tolerance` (relative decrease of the cost).
 template <typename Scalar>
-CeresPose ceres_refine(const PoseScene<Scalar>& scene, const std::vector<Scalar>& weights, const cfp::WeightedPnPOptions& options, double tolerance = 1e-6,
+CeresPose ceres_refine(const PoseScene<Scalar>& scene, const std::vector<Scalar>& weights,
+                       const cfp::PoseOptions& options, double tolerance = 1e-6,
                        ceres::LinearSolverType solver = ceres::DENSE_QR) {
   const std::size_t n = scene.points.size();
   std::vector<std::unique_ptr<PixelError<2>>> mono(n);
   std::vector<std::unique_ptr<PixelError<3>>> stereo(n);
   const auto fill = [&](auto& cost, std::size_t i) {
     for (std::size_t c = 0; c < 3; ++c) cost.X[c] = static_cast<double>(scene.points[i][c]);
-    cost.fx = scene.camera.fx, cost.fy = scene.camera.fy, cost.cx = scene.camera.cx, cost.cy = scene.camera.cy, cost.bf = scene.baseline_fx;
+    cost.fx = scene.camera.fx, cost.fy = scene.camera.fy, cost.cx = scene.camera.cx, cost.cy = scene.camera.cy,
+    cost.bf = scene.baseline_fx;
     cost.z[0] = static_cast<double>(scene.pixels[i][0]), cost.z[1] = static_cast<double>(scene.pixels[i][1]);
     cost.z[2] = cost.z[0] - scene.baseline_fx / static_cast<double>(scene.depths[i]);
     cost.inverse_sigma = 1 / static_cast<double>(scene.sigmas[i]);
@@ -136,14 +145,17 @@ CeresPose ceres_refine(const PoseScene<Scalar>& scene, const std::vector<Scalar>
     problem_options.disable_all_safety_checks = true;
     ceres::Problem problem(problem_options);
     problem.AddParameterBlock(T, 12, &manifold);
-    const std::unique_ptr<ceres::LossFunction> mono_loss(ceres_loss(round.loss, round.scale * std::sqrt(options.chi2_mono)));
-    const std::unique_ptr<ceres::LossFunction> stereo_loss(ceres_loss(round.loss, round.scale * std::sqrt(options.chi2_stereo)));
+    const std::unique_ptr<ceres::LossFunction> mono_loss(
+        ceres_loss(round.loss, round.scale * std::sqrt(options.chi2_mono)));
+    const std::unique_ptr<ceres::LossFunction> stereo_loss(
+        ceres_loss(round.loss, round.scale * std::sqrt(options.chi2_stereo)));
     std::vector<std::unique_ptr<ceres::LossFunction>> scaled;
     for (std::size_t i = 0; i < n; ++i) {
       if (round.inliers_only && result.mask[i] == 0) continue;
       ceres::LossFunction* loss = mono[i] ? mono_loss.get() : stereo_loss.get();
       if (!weights.empty()) {
-        scaled.push_back(std::make_unique<ceres::ScaledLoss>(loss, static_cast<double>(weights[i]), ceres::DO_NOT_TAKE_OWNERSHIP));
+        scaled.push_back(
+            std::make_unique<ceres::ScaledLoss>(loss, static_cast<double>(weights[i]), ceres::DO_NOT_TAKE_OWNERSHIP));
         loss = scaled.back().get();
       }
       problem.AddResidualBlock(mono[i] ? static_cast<ceres::CostFunction*>(mono[i].get()) : stereo[i].get(), loss, T);

@@ -1,4 +1,5 @@
-// Seeded scenes for pose refinement: a camera among points, pixel noise, gross errors or people who move, start pose off.
+// Seeded scenes for pose refinement: a camera among points, pixel noise, gross errors or people who move, start pose
+// off.
 #pragma once
 
 #include <array>
@@ -9,7 +10,7 @@
 #include "cfp/core/random.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/math/se3.hpp"
-#include "cfp/optimization/weighted_pnp.hpp"
+#include "cfp/optimization/pose/pose_refinement.hpp"
 
 namespace cfp_test {
 
@@ -19,7 +20,7 @@ struct PoseSceneOptions {
   double moving_share = 0;     // points on one person who walks: all displaced alike
   double stereo_share = 0;
   double noise_px = 1;
-  bool octaves = false;        // sigma in {1, 1.2, …, 1.2^7}
+  bool octaves = false;  // sigma in {1, 1.2, …, 1.2^7}
   double start_m = 0.02, start_deg = 1;
 };
 
@@ -48,7 +49,10 @@ struct PoseScene {
 struct PlainCamera {
   using ScalarType = double;
   cfp::PinholeCamera<double> pinhole;
-  bool project(const cfp::Vector3<double>& p, cfp::Vector2<double>& pixel, cfp::Matrix23<double>* J = nullptr) const noexcept { return pinhole.project(p, pixel, J); }
+  bool project(const cfp::Vector3<double>& p, cfp::Vector2<double>& pixel,
+               cfp::Matrix23<double>* J = nullptr) const noexcept {
+    return pinhole.project(p, pixel, J);
+  }
 };
 
 inline cfp::Vector3<double> random_direction(cfp::Random& random) {
@@ -60,9 +64,12 @@ template <typename Scalar>
 PoseScene<Scalar> make_pose_scene(std::uint64_t seed, const PoseSceneOptions& options = {}) {
   cfp::Random random(seed, "pose scene");
   PoseScene<Scalar> scene;
-  scene.truth = {cfp::so3_exp<double>(random_direction(random) * random.uniform(0, 3)), random_direction(random) * random.uniform(0, 3)};
+  scene.truth = {cfp::so3_exp<double>(random_direction(random) * random.uniform(0, 3)),
+                 random_direction(random) * random.uniform(0, 3)};
   const double angle = options.start_deg * cfp::pi<double> / 180;
-  scene.start = cfp::SE3<double>{cfp::so3_exp<double>(random_direction(random) * angle), random_direction(random) * options.start_m} * scene.truth;
+  scene.start = cfp::SE3<double>{cfp::so3_exp<double>(random_direction(random) * angle),
+                                 random_direction(random) * options.start_m} *
+                scene.truth;
   const cfp::SE3<double> T_world_cam = scene.truth.inverse();
   const cfp::Vector3<double> walk = random_direction(random) * 0.15;
   for (int i = 0; i < options.points; ++i) {
@@ -92,8 +99,12 @@ PoseScene<Scalar> make_pose_scene(std::uint64_t seed, const PoseSceneOptions& op
 }
 
 /// Distance of the camera centres in metres.
-inline double centre_distance(const cfp::SE3<double>& a, const cfp::SE3<double>& b) { return (a.inverse().translation - b.inverse().translation).norm(); }
+inline double centre_distance(const cfp::SE3<double>& a, const cfp::SE3<double>& b) {
+  return (a.inverse().translation - b.inverse().translation).norm();
+}
 /// Angle between two attitudes in radians.
-inline double angle_between(const cfp::SE3<double>& a, const cfp::SE3<double>& b) { return cfp::so3_log<double>(a.rotation * b.rotation.transpose()).norm(); }
+inline double angle_between(const cfp::SE3<double>& a, const cfp::SE3<double>& b) {
+  return cfp::so3_log<double>(a.rotation * b.rotation.transpose()).norm();
+}
 
 }  // namespace cfp_test

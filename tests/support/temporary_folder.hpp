@@ -12,7 +12,8 @@ namespace cfp_test {
 struct TemporaryFolder {
   TemporaryFolder() {
     static int count = 0;
-    path = std::filesystem::temp_directory_path() / ("cfp_test_" + std::to_string(::getpid()) + "_" + std::to_string(++count));
+    path = std::filesystem::temp_directory_path() /
+           ("cfp_test_" + std::to_string(::getpid()) + "_" + std::to_string(++count));
     std::filesystem::create_directories(path);
   }
   TemporaryFolder(const TemporaryFolder&) = delete;

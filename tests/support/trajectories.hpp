@@ -34,8 +34,8 @@ inline Trajectory<double> random_walk(cfp::Random& random, std::size_t n, double
 /// The same with noise on every pose.
 inline Trajectory<double> disturbed(cfp::Random& random, Trajectory<double> poses, double noise) {
   for (auto& pose : poses) {
-    pose.T_world_cam =
-        pose.T_world_cam * cfp::SE3<double>{cfp::so3_exp<double>(random_vector(random, noise)), random_vector(random, noise)};
+    pose.T_world_cam = pose.T_world_cam * cfp::SE3<double>{cfp::so3_exp<double>(random_vector(random, noise)),
+                                                           random_vector(random, noise)};
   }
   return poses;
 }

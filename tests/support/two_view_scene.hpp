@@ -55,15 +55,17 @@ TwoViewScene<Scalar> make_two_view_scene(cfp::Random& random, const TwoViewOptio
     const cfp::Vector2<double> u(random.uniform(0, 640), random.uniform(0, 480));
     cfp::Vector3<double> ray;
     scene.camera.unproject(u, ray);
-    const bool on_plane =
-        options.shape == SceneShape::plane || (options.shape == SceneShape::volume_and_plane && random.uniform() < options.plane_share);
+    const bool on_plane = options.shape == SceneShape::plane ||
+                          (options.shape == SceneShape::volume_and_plane && random.uniform() < options.plane_share);
     const cfp::Vector3<double> point = ray * (on_plane ? 1.2 / tilt.dot(ray) : random.uniform(0.6, 5));
     cfp::Vector2<double> v(0, 0);
-    if (!scene.camera.project(scene.T_cur_prev * point, v) || v.x() < 0 || v.x() >= 640 || v.y() < 0 || v.y() >= 480) continue;
+    if (!scene.camera.project(scene.T_cur_prev * point, v) || v.x() < 0 || v.x() >= 640 || v.y() < 0 || v.y() >= 480)
+      continue;
     const bool inlier = random.uniform() >= options.outlier_share;
     cfp::Vector2<double> shift(0, 0);
     if (!inlier) {
-      const double angle = random.uniform(0, 2 * cfp::pi<double>), radius = random.uniform(options.outlier_min_px, options.outlier_max_px);
+      const double angle = random.uniform(0, 2 * cfp::pi<double>),
+                   radius = random.uniform(options.outlier_min_px, options.outlier_max_px);
       shift = radius * cfp::Vector2<double>(std::cos(angle), std::sin(angle));
     }
     const auto pixel = [&](const cfp::Vector2<double>& x, double noise) {
@@ -91,7 +93,8 @@ double median_sampson_of_truth(const TwoViewScene<Scalar>& scene, const cfp::Mat
     distances.push_back(static_cast<double>(cfp::sampson_distance<Scalar>(F, {p[0], p[1]}, {q[0], q[1]})));
   }
   if (distances.empty()) return 0;
-  std::nth_element(distances.begin(), distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2), distances.end());
+  std::nth_element(distances.begin(), distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2),
+                   distances.end());
   return distances[distances.size() / 2];
 }
 

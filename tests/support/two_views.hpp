@@ -31,13 +31,17 @@ struct TwoViews {
     xi << 0.12, -0.05, 0.08, 0.03, -0.06, 0.02;
     const cfp::SE3<double> T = cfp::se3_exp(xi);
     T_cur_prev = T.cast<Scalar>();
-    const auto wide = [](const cfp::PinholeCamera<Scalar>& c) { return cfp::PinholeCamera<double>{c.fx, c.fy, c.cx, c.cy}; };
+    const auto wide = [](const cfp::PinholeCamera<Scalar>& c) {
+      return cfp::PinholeCamera<double>{c.fx, c.fy, c.cx, c.cy};
+    };
     while (prev.size() < n) {
       const cfp::Vector2<double> pixel(random.uniform(0, 640), random.uniform(0, 480));
       const double depth = random.uniform(0.6, 6);
       cfp::Vector3<double> ray = cfp::Vector3<double>::Zero();
       cfp::Vector2<double> seen = cfp::Vector2<double>::Zero();
-      if (!wide(camera_prev).unproject(pixel, ray) || !wide(camera_cur).project(T * cfp::Vector3<double>(depth * ray), seen)) continue;
+      if (!wide(camera_prev).unproject(pixel, ray) ||
+          !wide(camera_cur).project(T * cfp::Vector3<double>(depth * ray), seen))
+        continue;
       prev.push_back(pixel.cast<Scalar>());
       cur.push_back(seen.cast<Scalar>());
       depth_prev.push_back(static_cast<Scalar>(depth));

@@ -4,10 +4,10 @@
 
 #include "cfp/core/random.hpp"
 #include "cfp/core/span.hpp"
+#include "cfp/frame/static_probability_pipeline.hpp"
 #include "cfp/geometry/box.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/math/se3.hpp"
-#include "cfp/pipeline/static_probability_pipeline.hpp"
 #include "support/catch.hpp"
 #include "support/dynamic_scene.hpp"
 #include "support/threads.hpp"
@@ -27,7 +27,8 @@ TEST_CASE("Threads that share camera, pose and points get one thread's bits", "[
     double sum = 0;
     for (std::size_t i = 0; i < points.size(); ++i) {
       Eigen::Vector2d pixel;
-      if (camera.project(T_cam_world * points[i], pixel) && cfp::contains(box, pixel.x(), pixel.y())) sum += pixel.x() - pixel.y();
+      if (camera.project(T_cam_world * points[i], pixel) && cfp::contains(box, pixel.x(), pixel.y()))
+        sum += pixel.x() - pixel.y();
     }
     return sum + cfp::se3_log(T_cam_world).sum();
   });
@@ -51,7 +52,9 @@ TEST_CASE("Threads with a pipeline each share the frame's arrays and get one thr
       frame.flow_previous = scene.previous_keypoints;
       frame.flow_current = scene.keypoints;
       frame.match = scene.match;
-      const auto result = pipeline.process(frame, scene.camera, [&](cfp::Stage, cfp::span<const float>) { return cfp::PoseEstimate{scene.T_cur_prev, 300, true}; });
+      const auto result = pipeline.process(frame, scene.camera, [&](cfp::Stage, cfp::span<const float>) {
+        return cfp::PoseEstimate{scene.T_cur_prev, 300, true};
+      });
       for (const float w : result.weight) sum += static_cast<double>(w);
     }
     return sum;

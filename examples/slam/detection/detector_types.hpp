@@ -1,5 +1,5 @@
-// What the tracking loop knows of an object detector. Every detector here may be called from a thread of its own: it holds no
-// global state and touches the image only during the call. One object serves one caller at a time.
+// What the tracking loop knows of an object detector. Every detector here may be called from a thread of its own: it
+// holds no global state and touches the image only during the call. One object serves one caller at a time.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "cfp/detection/box_track.hpp"
+#include "cfp/detection/box_tracker_types.hpp"
 
 namespace cfp_slam {
 
@@ -18,8 +18,8 @@ class Detector {
  public:
   virtual ~Detector() = default;
 
-  // The boxes of an 8-bit BGR image taken at time_s: finite, x1 < x2, y1 < y2, clipped to the image, class_id an index into
-  // classes(). Throws std::runtime_error that names the detector and what is wrong.
+  // The boxes of an 8-bit BGR image taken at time_s: finite, x1 < x2, y1 < y2, clipped to the image, class_id an index
+  // into classes(). Throws std::runtime_error that names the detector and what is wrong.
   virtual Detections detect(const cv::Mat& bgr, double time_s) = 0;
 
   [[nodiscard]] const std::vector<std::string>& classes() const { return classes_; }

@@ -1,4 +1,5 @@
-// A detection network through OpenCV's dnn module: ONNX or Darknet, its family told from its outputs (network_outputs.hpp).
+// A detection network through OpenCV's dnn module: ONNX or Darknet, its family told from its outputs
+// (network_outputs.hpp).
 #pragma once
 
 #include <algorithm>
@@ -29,7 +30,8 @@ struct InputMapping {
   }
 };
 
-// The image at the network's size: stretched, or at its own aspect ratio in the middle of a grey frame, as the families are trained.
+// The image at the network's size: stretched, or at its own aspect ratio in the middle of a grey frame, as the families
+// are trained.
 inline InputMapping fit_image(const cv::Mat& bgr, cv::Size input, bool keep_aspect, cv::Mat& fitted) {
   const double scale_x = double(input.width) / bgr.cols, scale_y = double(input.height) / bgr.rows;
   if (!keep_aspect) {
@@ -57,19 +59,22 @@ inline std::vector<std::string> network_classes(const std::filesystem::path& mod
       if (!line.empty()) names.push_back(line);
     }
     if (names.size() == static_cast<std::size_t>(count)) return names;
-    throw std::runtime_error(file.string() + ": " + std::to_string(names.size()) + " names for the network's " + std::to_string(count) +
-                             " classes");
+    throw std::runtime_error(file.string() + ": " + std::to_string(names.size()) + " names for the network's " +
+                             std::to_string(count) + " classes");
   }
   if (count == 1) return {"person"};
   if (static_cast<std::size_t>(count) == std::size(coco_names)) return {std::begin(coco_names), std::end(coco_names)};
-  throw std::runtime_error(model.string() + ": " + std::to_string(count) + " classes; name them, one per line, in " + file.string());
+  throw std::runtime_error(model.string() + ": " + std::to_string(count) + " classes; name them, one per line, in " +
+                           file.string());
 }
 
-// The network runs on the threads of cv::setNumThreads, a setting of the whole process. Beside a thread that extracts features
-// leave that at its default: OpenCV shares one pool among its callers. cv::setNumThreads(1) keeps the network in its caller's thread.
+// The network runs on the threads of cv::setNumThreads, a setting of the whole process. Beside a thread that extracts
+// features leave that at its default: OpenCV shares one pool among its callers. cv::setNumThreads(1) keeps the network
+// in its caller's thread.
 class NetworkDetector final : public Detector {
  public:
-  // model: .onnx, or .cfg / .weights with the other one of the same stem beside it. input: 0 x 0 takes the size the file states.
+  // model: .onnx, or .cfg / .weights with the other one of the same stem beside it. input: 0 x 0 takes the size the
+  // file states.
   NetworkDetector(const std::filesystem::path& model, cv::Size input, const DetectorOptions& options)
       : Detector(model.filename().string(), {}), input_(input), options_(options) {
     const std::string file = model.string();
@@ -136,7 +141,8 @@ class NetworkDetector final : public Detector {
     }
     suppress(found, static_cast<float>(options_.max_overlap));
     for (auto& d : found) d.box = cfp::clip(mapping.to_image(d.box), float(bgr.cols), float(bgr.rows));
-    found.erase(std::remove_if(found.begin(), found.end(), [](const auto& d) { return !cfp::is_proper(d.box); }), found.end());
+    found.erase(std::remove_if(found.begin(), found.end(), [](const auto& d) { return !cfp::is_proper(d.box); }),
+                found.end());
     return found;
   }
 
@@ -148,10 +154,12 @@ class NetworkDetector final : public Detector {
     if (!std::filesystem::is_regular_file(file)) throw std::runtime_error(file.string() + ": no such file");
   }
 
-  // As the families are trained: NanoDet on BGR less ImageNet's mean over its deviation, FastestDet on BGR / 255, the YOLOs on RGB / 255.
+  // As the families are trained: NanoDet on BGR less ImageNet's mean over its deviation, FastestDet on BGR / 255, the
+  // YOLOs on RGB / 255.
   void make_blob() {
     if (family_ != NetworkFamily::nanodet) {
-      cv::dnn::blobFromImage(fitted_, blob_, 1 / 255.0, input_, {}, family_ != NetworkFamily::fastestdet, false, CV_32F);
+      cv::dnn::blobFromImage(fitted_, blob_, 1 / 255.0, input_, {}, family_ != NetworkFamily::fastestdet, false,
+                             CV_32F);
       return;
     }
     cv::dnn::blobFromImage(fitted_, blob_, 1, input_, {103.53, 116.28, 123.675}, false, false, CV_32F);

@@ -1,4 +1,5 @@
-// The input size that a network's file states: OpenCV's dnn module keeps it to itself until a forward pass of that very size.
+// The input size that a network's file states: OpenCV's dnn module keeps it to itself until a forward pass of that very
+// size.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +14,8 @@
 
 namespace cfp_slam {
 
-// Walks the fields of a protobuf message within a stream: just enough to find an ONNX graph's inputs without reading its weights.
+// Walks the fields of a protobuf message within a stream: just enough to find an ONNX graph's inputs without reading
+// its weights.
 class ProtobufReader {
  public:
   ProtobufReader(std::istream& stream, std::streamoff end) : stream_(stream), end_(end) {}
@@ -65,8 +67,8 @@ class ProtobufReader {
   std::streamoff end_, field_end_ = -1;
 };
 
-// The first input of the graph with the shape 1 x 3 x H x W (ModelProto.graph.input.type.tensor_type.shape.dim.dim_value), 0 x 0
-// when there is none or its size is left open.
+// The first input of the graph with the shape 1 x 3 x H x W
+// (ModelProto.graph.input.type.tensor_type.shape.dim.dim_value), 0 x 0 when there is none or its size is left open.
 inline cv::Size onnx_input_size(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   stream.seekg(0, std::ios::end);
@@ -104,8 +106,11 @@ inline cv::Size darknet_input_size(const std::filesystem::path& cfg) {
   std::ifstream stream(cfg);
   cv::Size size;
   for (std::string line; std::getline(stream, line);) {
-    line.erase(std::remove_if(line.begin(), line.end(), [](char c) { return c == ' ' || c == '\t' || c == '\r'; }), line.end());
-    const auto number = [&](const std::string& key) { return line.rfind(key, 0) == 0 ? std::atoi(line.c_str() + key.size()) : 0; };
+    line.erase(std::remove_if(line.begin(), line.end(), [](char c) { return c == ' ' || c == '\t' || c == '\r'; }),
+               line.end());
+    const auto number = [&](const std::string& key) {
+      return line.rfind(key, 0) == 0 ? std::atoi(line.c_str() + key.size()) : 0;
+    };
     if (size.width == 0) size.width = number("width=");
     if (size.height == 0) size.height = number("height=");
   }

@@ -1,5 +1,6 @@
-// From the output tensors of small detection networks to boxes: which family a network belongs to, told from the shapes, and one
-// decoder per family. Boxes come out in pixels of the network's input. NaN, infinity and garbage in a tensor yield no box.
+// From the output tensors of small detection networks to boxes: which family a network belongs to, told from the
+// shapes, and one decoder per family. Boxes come out in pixels of the network's input. NaN, infinity and garbage in a
+// tensor yield no box.
 #pragma once
 
 #include <algorithm>
@@ -18,10 +19,10 @@
 namespace cfp_slam {
 
 enum class NetworkFamily {
-  yolov5,      // 1 x N x (5 + C): cx cy w h objectness, class scores; N = 3 per grid cell
-  yolov8,      // 1 x (4 + C) x N: cx cy w h, class scores; N = 1 per grid cell
-  darknet,     // OpenCV's Region layers, N x (5 + C) each: cx cy w h as shares of the input, class scores times objectness
-  nanodet,     // per stride N x C scores and N x 32: a distribution over 0..7 strides for each side's distance
+  yolov5,   // 1 x N x (5 + C): cx cy w h objectness, class scores; N = 3 per grid cell
+  yolov8,   // 1 x (4 + C) x N: cx cy w h, class scores; N = 1 per grid cell
+  darknet,  // OpenCV's Region layers, N x (5 + C) each: cx cy w h as shares of the input, class scores times objectness
+  nanodet,  // per stride N x C scores and N x 32: a distribution over 0..7 strides for each side's distance
   fastestdet,  // 1 x (5 + C) x H x W: objectness, tanh offset, sigmoid size, class scores
 };
 constexpr const char* to_string(NetworkFamily family) {
@@ -85,12 +86,13 @@ inline std::vector<NanodetLevel> nanodet_levels(const std::vector<cv::Mat>& outp
   return levels;
 }
 
-// Throws std::runtime_error with the shapes when they fit no family. The numbers of rows must be those of the input's grids, so a
-// network that suppresses by itself (1 x 300 x 6, say) is not mistaken for one of these.
+// Throws std::runtime_error with the shapes when they fit no family. The numbers of rows must be those of the input's
+// grids, so a network that suppresses by itself (1 x 300 x 6, say) is not mistaken for one of these.
 inline NetworkLayout recognise(const std::vector<cv::Mat>& outputs, cv::Size input, bool darknet) {
   const auto fail = [&]() -> NetworkLayout {
     throw std::runtime_error("outputs " + shapes_of(outputs) + " for an input of " + std::to_string(input.width) + "x" +
-                             std::to_string(input.height) + " are of no known kind (YOLOv5, YOLOv8, NanoDet, FastestDet, Darknet)");
+                             std::to_string(input.height) +
+                             " are of no known kind (YOLOv5, YOLOv8, NanoDet, FastestDet, Darknet)");
   };
   if (outputs.empty()) return fail();
   if (darknet) {
@@ -135,7 +137,9 @@ inline std::pair<float, int> largest(const float* values, int n, int step = 1) {
 inline void keep(Detections& found, const cfp::Box<float>& box, int class_id, float score, float min_score) {
   if (score >= min_score && cfp::is_finite(score) && cfp::is_proper(box)) found.push_back({box, class_id, score});
 }
-inline cfp::Box<float> centred(float cx, float cy, float w, float h) { return {cx - w / 2, cy - h / 2, cx + w / 2, cy + h / 2}; }
+inline cfp::Box<float> centred(float cx, float cy, float w, float h) {
+  return {cx - w / 2, cy - h / 2, cx + w / 2, cy + h / 2};
+}
 
 inline void decode_yolov5(const cv::Mat& output, float min_score, Detections& found) {
   const OutputTable t = table_of(output);
@@ -191,7 +195,8 @@ inline void decode_nanodet(const std::vector<cv::Mat>& outputs, cv::Size input, 
         }
         side[s] = stride * moment / sum;
       }
-      const float cx = (static_cast<float>(r % across) + 0.5F) * stride, cy = (static_cast<float>(r / across) + 0.5F) * stride;
+      const float cx = (static_cast<float>(r % across) + 0.5F) * stride,
+                  cy = (static_cast<float>(r / across) + 0.5F) * stride;
       keep(found, {cx - side[0], cy - side[1], cx + side[2], cy + side[3]}, id, score, min_score);
     }
   }
@@ -199,7 +204,9 @@ inline void decode_nanodet(const std::vector<cv::Mat>& outputs, cv::Size input, 
 
 inline void decode_fastestdet(const cv::Mat& output, cv::Size input, float min_score, Detections& found) {
   const int rows = output.size[2], cols = output.size[3], cells = rows * cols;
-  const auto channel = [&](int c, int cell) { return output.ptr<float>()[static_cast<std::ptrdiff_t>(c) * cells + cell]; };
+  const auto channel = [&](int c, int cell) {
+    return output.ptr<float>()[static_cast<std::ptrdiff_t>(c) * cells + cell];
+  };
   const auto sigmoid = [](float x) { return 1.0F / (1.0F + std::exp(-x)); };
   const auto width = static_cast<float>(input.width), height = static_cast<float>(input.height);
   for (int cell = 0; cell < cells; ++cell) {
@@ -208,21 +215,22 @@ inline void decode_fastestdet(const cv::Mat& output, cv::Size input, float min_s
     if (!(score >= min_score)) continue;
     const float cx = (static_cast<float>(cell % cols) + std::tanh(channel(1, cell))) / static_cast<float>(cols);
     const float cy = (static_cast<float>(cell / cols) + std::tanh(channel(2, cell))) / static_cast<float>(rows);
-    keep(found, centred(cx * width, cy * height, sigmoid(channel(3, cell)) * width, sigmoid(channel(4, cell)) * height), id, score,
-         min_score);
+    keep(found, centred(cx * width, cy * height, sigmoid(channel(3, cell)) * width, sigmoid(channel(4, cell)) * height),
+         id, score, min_score);
   }
 }
 
-// Non-maximum suppression within each class, surest first; equal scores in the order given. Of more than 1000 candidates the
-// surest 1000 take part, which bounds the time for whatever a network says.
+// Non-maximum suppression within each class, surest first; equal scores in the order given. Of more than 1000
+// candidates the surest 1000 take part, which bounds the time for whatever a network says.
 inline void suppress(Detections& found, float max_overlap) {
   std::stable_sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
   found.resize((std::min)(found.size(), std::size_t{1000}));
   std::size_t kept = 0;
   for (const cfp::Detection<float> candidate : found) {
-    const bool covered = std::any_of(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(kept), [&](const auto& k) {
-      return k.class_id == candidate.class_id && cfp::iou(k.box, candidate.box) > max_overlap;
-    });
+    const bool covered =
+        std::any_of(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(kept), [&](const auto& k) {
+          return k.class_id == candidate.class_id && cfp::iou(k.box, candidate.box) > max_overlap;
+        });
     if (!covered) found[kept++] = candidate;
   }
   found.resize(kept);

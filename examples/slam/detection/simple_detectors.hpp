@@ -24,8 +24,8 @@ class NoDetector final : public Detector {
   Detections detect(const cv::Mat&, double) override { return {}; }
 };
 
-// The boxes of the file's frame that is nearest in time, none when it is further away than 5 ms: stamps written with fewer digits
-// match, neighbouring images at up to 100 Hz do not.
+// The boxes of the file's frame that is nearest in time, none when it is further away than 5 ms: stamps written with
+// fewer digits match, neighbouring images at up to 100 Hz do not.
 class FileDetector final : public Detector {
  public:
   FileDetector(const std::string& file, const DetectorOptions& options) : Detector(file, {}), options_(options) {
@@ -38,7 +38,8 @@ class FileDetector final : public Detector {
 
   Detections detect(const cv::Mat& bgr, double time_s) override {
     Detections detections;
-    const auto after = std::lower_bound(frames_.begin(), frames_.end(), time_s, [](const auto& f, double t) { return f.timestamp < t; });
+    const auto after = std::lower_bound(frames_.begin(), frames_.end(), time_s,
+                                        [](const auto& f, double t) { return f.timestamp < t; });
     const auto distance = [&](const auto& frame) { return std::abs(frame.timestamp - time_s); };
     auto nearest = after;
     if (after != frames_.begin() && (after == frames_.end() || distance(after[-1]) <= distance(*after))) --nearest;
@@ -57,7 +58,8 @@ class FileDetector final : public Detector {
   std::vector<cfp_examples::DetectionFrame> frames_;
 };
 
-// Histograms of oriented gradients with the linear support vector machine that OpenCV carries: upright, wholly visible people.
+// Histograms of oriented gradients with the linear support vector machine that OpenCV carries: upright, wholly visible
+// people.
 class HogDetector final : public Detector {
  public:
   explicit HogDetector(const DetectorOptions& options) : Detector("hog", {"person"}), options_(options) {

@@ -1,5 +1,6 @@
-// An RGB-D recording in the format of the TUM data set: opened with every list checked, read frame by frame. What cannot be read is
-// a frame with a note that says why, never an exception; what cannot be parsed refuses the recording with file and line.
+// An RGB-D recording in the format of the TUM data set: opened with every list checked, read frame by frame. What
+// cannot be read is a frame with a note that says why, never an exception; what cannot be parsed refuses the recording
+// with file and line.
 #pragma once
 
 #include <algorithm>
@@ -42,9 +43,10 @@ struct TrueBox {
 
 class Sequence {
  public:
-  // Reads camera.txt (or takes the published TUM camera that the folder's name tells), rgb.txt, depth.txt and, when they are there,
-  // groundtruth.txt or pseudo_groundtruth.txt, labels.txt and boxes.txt. Lists are put in order; of equal stamps the first line stays.
-  // Colour and depth are matched one to one, nearest first, when nearer than max_difference_s, as by TUM's associate.py.
+  // Reads camera.txt (or takes the published TUM camera that the folder's name tells), rgb.txt, depth.txt and, when
+  // they are there, groundtruth.txt or pseudo_groundtruth.txt, labels.txt and boxes.txt. Lists are put in order; of
+  // equal stamps the first line stays. Colour and depth are matched one to one, nearest first, when nearer than
+  // max_difference_s, as by TUM's associate.py.
   explicit Sequence(std::filesystem::path folder, double max_difference_s = 0.02) : folder_(std::move(folder)) {
     camera_ = std::filesystem::exists(folder_ / "camera.txt") ? cfp_examples::read_tum_camera(folder_ / "camera.txt")
                                                               : cfp_examples::published_tum_camera(folder_);
@@ -80,7 +82,8 @@ class Sequence {
   [[nodiscard]] std::vector<TrueBox> true_boxes(std::size_t i) const {
     const auto from = std::lower_bound(true_boxes_.begin(), true_boxes_.end(), time_s(i) - 0.001,
                                        [](const TrueBox& b, double t) { return b.time_s < t; });
-    const auto to = std::find_if(from, true_boxes_.end(), [&](const TrueBox& b) { return b.time_s > time_s(i) + 0.001; });
+    const auto to =
+        std::find_if(from, true_boxes_.end(), [&](const TrueBox& b) { return b.time_s > time_s(i) + 0.001; });
     return {from, to};
   }
 
@@ -92,10 +95,11 @@ class Sequence {
     out.time_s = frame.color.time_s;
     out.image = frame.color.file;
     const auto note = [&](const char* list, const cfp_examples::TumImage& image, const std::string& what) {
-      out.note += (out.note.empty() ? "" : "; ") + (folder_ / list).string() + ":" + std::to_string(image.line) + ": " + what;
+      out.note +=
+          (out.note.empty() ? "" : "; ") + (folder_ / list).string() + ":" + std::to_string(image.line) + ": " + what;
     };
-    const auto read = [&](const char* list, const cfp_examples::TumImage& image, int flags, int type, const char* type_name,
-                          cv::Mat& picture) {
+    const auto read = [&](const char* list, const cfp_examples::TumImage& image, int flags, int type,
+                          const char* type_name, cv::Mat& picture) {
       picture = read_image(folder_ / image.file, flags);
       const std::string size = std::to_string(picture.cols) + "x" + std::to_string(picture.rows);
       if (picture.empty()) {
@@ -116,7 +120,8 @@ class Sequence {
     } else {
       note("rgb.txt", frame.color, "no depth image near its time");
     }
-    if (frame.labels.line > 0) read("labels.txt", frame.labels, cv::IMREAD_UNCHANGED, CV_8UC1, "8-bit grey", out.labels);
+    if (frame.labels.line > 0)
+      read("labels.txt", frame.labels, cv::IMREAD_UNCHANGED, CV_8UC1, "8-bit grey", out.labels);
     out.usable = !out.bgr.empty() && !out.depth.empty();
     out.reading_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     return out;
@@ -135,7 +140,8 @@ class Sequence {
       notes_.push_back((folder_ / name).string() + ":" + std::to_string(image.line) + ": " + what);
     };
     for (const auto& image : list) {
-      if (!cfp::is_finite(image.time_s)) cfp_examples::bad_line(folder_ / name, image.line, "the timestamp is not finite");
+      if (!cfp::is_finite(image.time_s))
+        cfp_examples::bad_line(folder_ / name, image.line, "the timestamp is not finite");
     }
     const auto earlier = [](const auto& a, const auto& b) { return a.time_s < b.time_s; };
     const auto unordered = std::is_sorted_until(list.begin(), list.end(), earlier);
@@ -151,16 +157,16 @@ class Sequence {
     return list;
   }
 
-  // An excerpt of a recording comes with the whole list: images that are not there before the first and after the last that is
-  // belong to no frame. Between those they are frames that cannot be read.
+  // An excerpt of a recording comes with the whole list: images that are not there before the first and after the last
+  // that is belong to no frame. Between those they are frames that cannot be read.
   void drop_absent_ends(List& list) {
     const auto there = [&](const auto& image) { return is_image_file(folder_ / image.file); };
     const auto first = std::find_if(list.begin(), list.end(), there);
     const auto last = std::find_if(list.rbegin(), std::make_reverse_iterator(first), there).base();
     const auto absent = (first - list.begin()) + (list.end() - last);
     if (absent > 0)
-      notes_.push_back((folder_ / "rgb.txt").string() + ": " + std::to_string(absent) + " of " + std::to_string(list.size()) +
-                       " images, before the first and after the last, are not there");
+      notes_.push_back((folder_ / "rgb.txt").string() + ": " + std::to_string(absent) + " of " +
+                       std::to_string(list.size()) + " images, before the first and after the last, are not there");
     list = List(first, last);
   }
 
@@ -180,15 +186,18 @@ class Sequence {
   void read_true_boxes() {
     const auto file = folder_ / "boxes.txt";
     cfp_examples::for_each_line(file, [&](int line, const std::vector<std::string>& words) {
-      if (words.size() != 8) cfp_examples::bad_line(file, line, "expected 'timestamp identity x1 y1 x2 y2 visible_fraction pixels'");
+      if (words.size() != 8)
+        cfp_examples::bad_line(file, line, "expected 'timestamp identity x1 y1 x2 y2 visible_fraction pixels'");
       double v[8];
       for (std::size_t i = 0; i < 8; ++i) {
         v[i] = cfp_examples::parse_number(file, line, words[i], "box");
-        if (!(std::abs(v[i]) < (i == 0 ? 1e18 : 1e9))) cfp_examples::bad_line(file, line, "'" + words[i] + "' out of range");
+        if (!(std::abs(v[i]) < (i == 0 ? 1e18 : 1e9)))
+          cfp_examples::bad_line(file, line, "'" + words[i] + "' out of range");
       }
       true_boxes_.push_back({v[0], int(v[1]), {float(v[2]), float(v[3]), float(v[4]), float(v[5])}, v[6], int(v[7])});
     });
-    std::stable_sort(true_boxes_.begin(), true_boxes_.end(), [](const TrueBox& a, const TrueBox& b) { return a.time_s < b.time_s; });
+    std::stable_sort(true_boxes_.begin(), true_boxes_.end(),
+                     [](const TrueBox& a, const TrueBox& b) { return a.time_s < b.time_s; });
   }
 
   // A pipe under an image's name would be waited for.

@@ -9,16 +9,17 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "cfp/core/span.hpp"
-#include "cfp/pipeline/object_box.hpp"
 #include "../record.hpp"
+#include "cfp/core/span.hpp"
+#include "cfp/frame/object_box.hpp"
 
 namespace cfp_slam {
 
-// Boxes: yellow where detected, orange where compensated, with O. Keypoints: grey outside boxes; inside from red (K = 0) to green
-// (K = 1), filled on the foreground, a ring on the background.
-inline cv::Mat annotate(const cv::Mat& bgr, const std::vector<cv::KeyPoint>& keypoints, cfp::span<const float> static_probability,
-                        cfp::span<const cfp::KeypointLabel> label, const std::vector<BoxRecord>& boxes) {
+// Boxes: yellow where detected, orange where compensated, with O. Keypoints: grey outside boxes; inside from red (K =
+// 0) to green (K = 1), filled on the foreground, a ring on the background.
+inline cv::Mat annotate(const cv::Mat& bgr, const std::vector<cv::KeyPoint>& keypoints,
+                        cfp::span<const float> static_probability, cfp::span<const cfp::KeypointLabel> label,
+                        const std::vector<BoxRecord>& boxes) {
   cv::Mat picture = bgr.clone();
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
     if (label[i] == cfp::KeypointLabel::outside) {
@@ -27,7 +28,8 @@ inline cv::Mat annotate(const cv::Mat& bgr, const std::vector<cv::KeyPoint>& key
     }
     const double k = std::clamp(static_cast<double>(static_probability[i]), 0.0, 1.0);
     const bool foreground = label[i] == cfp::KeypointLabel::foreground;
-    cv::circle(picture, keypoints[i].pt, 3, {0, 255 * std::min(1.0, 2 * k), 255 * std::min(1.0, 2 - 2 * k)}, foreground ? static_cast<int>(cv::FILLED) : 1, cv::LINE_AA);
+    cv::circle(picture, keypoints[i].pt, 3, {0, 255 * std::min(1.0, 2 * k), 255 * std::min(1.0, 2 - 2 * k)},
+               foreground ? static_cast<int>(cv::FILLED) : 1, cv::LINE_AA);
   }
   for (const BoxRecord& box : boxes) {
     const cv::Scalar colour = box.compensated ? cv::Scalar(0, 140, 255) : cv::Scalar(0, 225, 255);
@@ -35,9 +37,11 @@ inline cv::Mat annotate(const cv::Mat& bgr, const std::vector<cv::KeyPoint>& key
     cv::rectangle(picture, corner, {static_cast<int>(box.box.x2), static_cast<int>(box.box.y2)}, colour, 2);
     char text[64];
     if (box.object_known) {
-      std::snprintf(text, sizeof text, "%lld O %.2f%s", static_cast<long long>(box.id), box.object_probability, box.compensated ? " compensated" : "");
+      std::snprintf(text, sizeof text, "%lld O %.2f%s", static_cast<long long>(box.id), box.object_probability,
+                    box.compensated ? " compensated" : "");
     } else {
-      std::snprintf(text, sizeof text, "%lld O unknown%s", static_cast<long long>(box.id), box.compensated ? " compensated" : "");
+      std::snprintf(text, sizeof text, "%lld O unknown%s", static_cast<long long>(box.id),
+                    box.compensated ? " compensated" : "");
     }
     const cv::Point place(std::max(corner.x + 4, 4), std::max(corner.y + 16, 16));
     cv::putText(picture, text, place, cv::FONT_HERSHEY_SIMPLEX, 0.45, {0, 0, 0}, 3, cv::LINE_AA);

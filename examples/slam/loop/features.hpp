@@ -1,5 +1,5 @@
-// ORB keypoints spread over the image. OpenCV's detector keeps the strongest corners of the whole image, which crowd on a few
-// textured things (often the people's clothes); here every cell of the image gives its best corners in turn.
+// ORB keypoints spread over the image. OpenCV's detector keeps the strongest corners of the whole image, which crowd on
+// a few textured things (often the people's clothes); here every cell of the image gives its best corners in turn.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,8 @@ class FeatureExtractor {
  public:
   explicit FeatureExtractor(const FeatureOptions& options = {})
       : options_(options),
-        orb_(cv::ORB::create(options.candidates, options.scale_factor, options.levels, 19, 0, 2, cv::ORB::HARRIS_SCORE, 31, options.fast_threshold)),
+        orb_(cv::ORB::create(options.candidates, options.scale_factor, options.levels, 19, 0, 2, cv::ORB::HARRIS_SCORE,
+                             31, options.fast_threshold)),
         levels_(static_cast<std::size_t>(options.levels)) {}
 
   void operator()(const cv::Mat& gray, std::vector<cv::KeyPoint>& keypoints, cv::Mat& descriptors) {
@@ -28,32 +29,38 @@ class FeatureExtractor {
   }
 
  private:
-  // The same share of every level's corners; within a level the best of each cell, then the second best of each, and so on.
+  // The same share of every level's corners; within a level the best of each cell, then the second best of each, and so
+  // on.
   void select(int width, int height, std::vector<cv::KeyPoint>& keypoints) {
     for (auto& level : levels_) level.clear();
-    for (const cv::KeyPoint& k : candidates_) levels_[static_cast<std::size_t>(std::clamp(k.octave, 0, options_.levels - 1))].push_back(k);
+    for (const cv::KeyPoint& k : candidates_)
+      levels_[static_cast<std::size_t>(std::clamp(k.octave, 0, options_.levels - 1))].push_back(k);
     keypoints.clear();
     const double share = std::min(1.0, double(options_.count) / double(std::max<std::size_t>(candidates_.size(), 1)));
     float cell = static_cast<float>(options_.cell);
     for (auto& level : levels_) {
-      spread(level, cell, width, height, static_cast<std::size_t>(std::lround(share * double(level.size()))), keypoints);
+      spread(level, cell, width, height, static_cast<std::size_t>(std::lround(share * double(level.size()))),
+             keypoints);
       cell *= options_.scale_factor;
     }
   }
 
-  void spread(std::vector<cv::KeyPoint>& level, float cell, int width, int height, std::size_t wanted, std::vector<cv::KeyPoint>& keypoints) {
+  void spread(std::vector<cv::KeyPoint>& level, float cell, int width, int height, std::size_t wanted,
+              std::vector<cv::KeyPoint>& keypoints) {
     if (wanted >= level.size()) {
       keypoints.insert(keypoints.end(), level.begin(), level.end());
       return;
     }
     const int columns = static_cast<int>(float(width) / cell) + 1, rows = static_cast<int>(float(height) / cell) + 1;
     std::sort(level.begin(), level.end(), [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
-      return a.response != b.response ? a.response > b.response : (a.pt.y != b.pt.y ? a.pt.y < b.pt.y : a.pt.x < b.pt.x);
+      return a.response != b.response ? a.response > b.response
+                                      : (a.pt.y != b.pt.y ? a.pt.y < b.pt.y : a.pt.x < b.pt.x);
     });
     in_cell_.assign(static_cast<std::size_t>(columns * rows), 0);
     rank_.clear();
     for (std::size_t i = 0; i < level.size(); ++i) {
-      const int x = std::clamp(static_cast<int>(level[i].pt.x / cell), 0, columns - 1), y = std::clamp(static_cast<int>(level[i].pt.y / cell), 0, rows - 1);
+      const int x = std::clamp(static_cast<int>(level[i].pt.x / cell), 0, columns - 1),
+                y = std::clamp(static_cast<int>(level[i].pt.y / cell), 0, rows - 1);
       rank_.push_back({in_cell_[static_cast<std::size_t>(y * columns + x)]++, i});
     }
     std::sort(rank_.begin(), rank_.end());

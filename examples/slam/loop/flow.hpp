@@ -1,6 +1,6 @@
-// Optical-flow pairs for the object stage by pyramidal Lucas-Kanade: corners, found at half resolution, and the front end's own
-// keypoints inside boxes. Pyramids are built once per image and kept for the next one. What the defaults cost and buy against the
-// usual way: benchmarks/studies/object_flow_study.cpp.
+// Optical-flow pairs for the object stage by pyramidal Lucas-Kanade: corners, found at half resolution, and the front
+// end's own keypoints inside boxes. Pyramids are built once per image and kept for the next one. What the defaults cost
+// and buy against the usual way: benchmarks/studies/object_flow_study.cpp.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +18,7 @@
 namespace cfp_slam {
 
 struct FlowOptions {
-  int corners = 500;             // at most, over the whole image, found at half resolution: they carry the camera's motion
+  int corners = 500;  // at most, over the whole image, found at half resolution: they carry the camera's motion
   double corner_distance = 6;    // between two of them, px
   double corner_quality = 0.01;  // least strength of a corner, as a share of the strongest one's
   int keypoints_per_box = 100;   // at most, besides, in each box, one per cell of a grid
@@ -27,8 +27,9 @@ struct FlowOptions {
   int levels = 4;                // of the pyramid, >= 1
   int iterations = 20;           // per level
   double precision = 0.02;       // an update below this ends the iterations, px
-  // Track back as well, and drop pairs that return further than max_backward_px from where they came. Off: it doubles the time,
-  // tells moving from still people no better, and O of one who moves an arm rises, as the pairs on the arm are those it drops.
+  // Track back as well, and drop pairs that return further than max_backward_px from where they came. Off: it doubles
+  // the time, tells moving from still people no better, and O of one who moves an arm rises, as the pairs on the arm
+  // are those it drops.
   bool backward = false;
   float max_backward_px = 0.5F;
 };
@@ -37,8 +38,9 @@ class FlowTracker {
  public:
   explicit FlowTracker(const FlowOptions& options = {}) : options_(options) {}
 
-  // Makes the pairs between the image of the last call and this one (8-bit grey; none after the first call, or when the size
-  // has changed). keypoints and boxes are those of the previous image, which is where tracking starts; improper boxes hold nothing.
+  // Makes the pairs between the image of the last call and this one (8-bit grey; none after the first call, or when the
+  // size has changed). keypoints and boxes are those of the previous image, which is where tracking starts; improper
+  // boxes hold nothing.
   void track(const cv::Mat& gray, const std::vector<cv::KeyPoint>& keypoints, cfp::span<const cfp::Box<float>> boxes) {
     std::swap(previous_pyramid_, pyramid_);
     const bool first = gray.empty() || previous_pyramid_.empty() || previous_pyramid_[0].size() != gray.size();
@@ -47,16 +49,18 @@ class FlowTracker {
     if (gray.empty()) return reset();
     const cv::Size window(options_.window, options_.window);
     // A copy of the image (the last argument): the caller may overwrite it before the next call.
-    const int top =
-        cv::buildOpticalFlowPyramid(gray, pyramid_, window, options_.levels - 1, true, cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);
+    const int top = cv::buildOpticalFlowPyramid(gray, pyramid_, window, options_.levels - 1, true,
+                                                cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);
     if (first) return;
     choose(keypoints, boxes, gray.size());
     if (from_.empty()) return;
 
-    const cv::TermCriteria stop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, options_.iterations, options_.precision);
+    const cv::TermCriteria stop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, options_.iterations,
+                                options_.precision);
     cv::calcOpticalFlowPyrLK(previous_pyramid_, pyramid_, from_, to_, found_, error_, window, top, stop);
     keep([&](std::size_t i) {
-      return found_[i] != 0 && to_[i].x >= 0 && to_[i].y >= 0 && to_[i].x < float(gray.cols) && to_[i].y < float(gray.rows);
+      return found_[i] != 0 && to_[i].x >= 0 && to_[i].y >= 0 && to_[i].x < float(gray.cols) &&
+             to_[i].y < float(gray.rows);
     });
     if (!options_.backward || from_.empty()) return;
     cv::calcOpticalFlowPyrLK(pyramid_, previous_pyramid_, to_, back_, found_, error_, window, top, stop);
@@ -73,7 +77,8 @@ class FlowTracker {
   void reset() { pyramid_.clear(); }
 
  private:
-  // The strongest keypoint of every cell; the cells of each box are at most as many as it may have points, and so for the rest.
+  // The strongest keypoint of every cell; the cells of each box are at most as many as it may have points, and so for
+  // the rest.
   void choose(const std::vector<cv::KeyPoint>& keypoints, cfp::span<const cfp::Box<float>> boxes, cv::Size size) {
     const auto width = static_cast<float>(size.width), height = static_cast<float>(size.height);
     regions_.clear();
@@ -93,8 +98,8 @@ class FlowTracker {
 
     strongest_.assign(cells, nullptr);
     for (const cv::KeyPoint& k : keypoints) {
-      const auto region =
-          std::find_if(regions_.begin(), regions_.end(), [&](const Region& r) { return cfp::contains(r.box, k.pt.x, k.pt.y); });
+      const auto region = std::find_if(regions_.begin(), regions_.end(),
+                                       [&](const Region& r) { return cfp::contains(r.box, k.pt.x, k.pt.y); });
       if (region == regions_.end() || region->across == 0) continue;
       const auto cell = [](float x, float length, int n) {
         return static_cast<std::size_t>(std::clamp(static_cast<int>(x / length * static_cast<float>(n)), 0, n - 1));

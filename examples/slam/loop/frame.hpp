@@ -33,8 +33,9 @@ struct Frame {
   std::vector<std::array<float, 2>> pixels;  // undistorted
   std::vector<float> depths_m;               // -1: none
   std::vector<float> static_probability;     // K after the last stage
-  std::vector<float> map_point_probability;  // M of the point seen, whether it is in the map or known from the last frame only
-  std::vector<int> map_point;                // index into the map, or no_point
+  std::vector<float>
+      map_point_probability;   // M of the point seen, whether it is in the map or known from the last frame only
+  std::vector<int> map_point;  // index into the map, or no_point
   cfp::SE3<double> T_cam_world;
   bool has_pose = false;
 
@@ -42,7 +43,8 @@ struct Frame {
   // The point that keypoint i sees by its depth, in the camera's frame. Precondition: it has one.
   [[nodiscard]] cfp::Vector3<double> back_project(std::size_t i, const cfp::PinholeCamera<float>& camera) const {
     const double z = static_cast<double>(depths_m[i]);
-    return {z * static_cast<double>((pixels[i][0] - camera.cx) / camera.fx), z * static_cast<double>((pixels[i][1] - camera.cy) / camera.fy), z};
+    return {z * static_cast<double>((pixels[i][0] - camera.cx) / camera.fx),
+            z * static_cast<double>((pixels[i][1] - camera.cy) / camera.fy), z};
   }
 };
 
@@ -64,11 +66,15 @@ class KeypointGrid {
   // visit(index) for every keypoint within `radius` pixels along both axes.
   template <typename Visit>
   void near(float x, float y, float radius, const Visit& visit) const {
-    const int c0 = std::max(0, static_cast<int>((x - radius) / float(cell))), c1 = std::min(columns_ - 1, static_cast<int>((x + radius) / float(cell)));
-    const int r0 = std::max(0, static_cast<int>((y - radius) / float(cell))), r1 = std::min(rows_ - 1, static_cast<int>((y + radius) / float(cell)));
+    const int c0 = std::max(0, static_cast<int>((x - radius) / float(cell))),
+              c1 = std::min(columns_ - 1, static_cast<int>((x + radius) / float(cell)));
+    const int r0 = std::max(0, static_cast<int>((y - radius) / float(cell))),
+              r1 = std::min(rows_ - 1, static_cast<int>((y + radius) / float(cell)));
     for (int r = r0; r <= r1; ++r) {
       const std::size_t row = static_cast<std::size_t>(r * columns_);
-      for (std::size_t k = c0 <= c1 ? start_[row + static_cast<std::size_t>(c0)] : 0, end = c0 <= c1 ? start_[row + static_cast<std::size_t>(c1) + 1] : 0; k < end; ++k) {
+      for (std::size_t k = c0 <= c1 ? start_[row + static_cast<std::size_t>(c0)] : 0,
+                       end = c0 <= c1 ? start_[row + static_cast<std::size_t>(c1) + 1] : 0;
+           k < end; ++k) {
         const auto& p = (*pixels_)[static_cast<std::size_t>(items_[k])];
         if (std::abs(p[0] - x) <= radius && std::abs(p[1] - y) <= radius) visit(static_cast<std::size_t>(items_[k]));
       }
@@ -79,7 +85,8 @@ class KeypointGrid {
   static constexpr int cell = 20;
   // Undistorted pixels may lie outside the image; they belong to the border's cells.
   [[nodiscard]] std::size_t cell_of(const std::array<float, 2>& p) const {
-    const int c = std::clamp(static_cast<int>(p[0] / float(cell)), 0, columns_ - 1), r = std::clamp(static_cast<int>(p[1] / float(cell)), 0, rows_ - 1);
+    const int c = std::clamp(static_cast<int>(p[0] / float(cell)), 0, columns_ - 1),
+              r = std::clamp(static_cast<int>(p[1] / float(cell)), 0, rows_ - 1);
     return static_cast<std::size_t>(r * columns_ + c);
   }
 

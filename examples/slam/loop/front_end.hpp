@@ -1,4 +1,5 @@
-// From images to arrays: ORB keypoints, depths, optical flow and detections, the last two beside the first on threads of their own.
+// From images to arrays: ORB keypoints, depths, optical flow and detections, the last two beside the first on threads
+// of their own.
 #pragma once
 
 #include <array>
@@ -10,22 +11,27 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "../detection/detector_types.hpp"
+#include "../input/sequence.hpp"
+#include "../record.hpp"
 #include "cfp/geometry/radial_tangential_camera.hpp"
 #include "cfp/interop/opencv.hpp"
-#include "../detection/detector_types.hpp"
 #include "features.hpp"
 #include "flow.hpp"
 #include "options.hpp"
-#include "../record.hpp"
-#include "../input/sequence.hpp"
 #include "tracking.hpp"
 
 namespace cfp_slam {
 
 class FrontEnd {
  public:
-  FrontEnd(const cfp::RadialTangentialCamera<float>& camera, double depth_units_per_metre, const FrontEndOptions& options)
-      : options_(options), camera_(camera), metres_per_unit_(1 / depth_units_per_metre), extract_(options.features), flow_(options.flow) {}
+  FrontEnd(const cfp::RadialTangentialCamera<float>& camera, double depth_units_per_metre,
+           const FrontEndOptions& options)
+      : options_(options),
+        camera_(camera),
+        metres_per_unit_(1 / depth_units_per_metre),
+        extract_(options.features),
+        flow_(options.flow) {}
 
   FrameFeatures operator()(const SequenceFrame& images, Detector& detector, FrameRecord& record) {
     FrameFeatures features;
@@ -35,17 +41,23 @@ class FrontEnd {
     const auto timed = [&record](Module module, const auto& work) {
       const auto start = std::chrono::steady_clock::now();
       work();
-      record.milliseconds[static_cast<std::size_t>(module)] = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+      record.milliseconds[static_cast<std::size_t>(module)] =
+          std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     };
     const auto launch = options_.threads ? std::launch::async : std::launch::deferred;
     std::future<void> detection, flow;
-    if (options_.use_detector) detection = std::async(launch, [&] { timed(Module::detection, [&] { features.detections = detector.detect(images.bgr, images.time_s); }); });
-    if (options_.use_flow) flow = std::async(launch, [&] { timed(Module::flow, [&] { flow_.track(gray, last_keypoints_, last_boxes_); }); });
+    if (options_.use_detector)
+      detection = std::async(launch, [&] {
+        timed(Module::detection, [&] { features.detections = detector.detect(images.bgr, images.time_s); });
+      });
+    if (options_.use_flow)
+      flow = std::async(launch, [&] { timed(Module::flow, [&] { flow_.track(gray, last_keypoints_, last_boxes_); }); });
     timed(Module::features, [&] {
       extract_(gray, features.keypoints, features.descriptors);
       undistort(features);
       features.depths_m.resize(features.keypoints.size());
-      cfp::sample_depth(images.depth, cfp::view(features.keypoints), metres_per_unit_, cfp::span<float>(features.depths_m));
+      cfp::sample_depth(images.depth, cfp::view(features.keypoints), metres_per_unit_,
+                        cfp::span<float>(features.depths_m));
     });
     if (flow.valid()) {
       flow.get();
@@ -69,7 +81,9 @@ class FrontEnd {
       const cv::Point2f& p = features.keypoints[i].pt;
       cfp::Vector3<float> ray;
       const bool known = camera_.unproject({p.x, p.y}, ray);
-      features.pixels[i] = known ? std::array<float, 2>{camera_.fx * ray.x() + camera_.cx, camera_.fy * ray.y() + camera_.cy} : std::array<float, 2>{p.x, p.y};
+      features.pixels[i] =
+          known ? std::array<float, 2>{camera_.fx * ray.x() + camera_.cx, camera_.fy * ray.y() + camera_.cy}
+                : std::array<float, 2>{p.x, p.y};
     }
   }
 

@@ -1,6 +1,6 @@
-// Local bundle adjustment beside the tracking: the newest keyframe, its covisible neighbours and their points are copied out,
-// adjusted on another thread, and put back a fixed number of frames later. Since the frame of the hand-over does not depend
-// on how long the solver takes, the same images give the same poses however many threads there are.
+// Local bundle adjustment beside the tracking: the newest keyframe, its covisible neighbours and their points are
+// copied out, adjusted on another thread, and put back a fixed number of frames later. Since the frame of the hand-over
+// does not depend on how long the solver takes, the same images give the same poses however many threads there are.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "cfp/optimization/weighted_ba.hpp"
+#include "cfp/optimization/bundle/bundle_adjustment.hpp"
 #include "map.hpp"
 #include "options.hpp"
 
@@ -19,7 +19,8 @@ namespace cfp_slam {
 class LocalBundle {
  public:
   // Copies the problem around keyframe `newest` out of the map.
-  LocalBundle(const Map& map, int newest, const cfp::PinholeCamera<float>& camera, const std::vector<float>& sigmas, double baseline_fx, const LocalBundleOptions& options)
+  LocalBundle(const Map& map, int newest, const cfp::PinholeCamera<float>& camera, const std::vector<float>& sigmas,
+              double baseline_fx, const LocalBundleOptions& options)
       : options_(options), baseline_fx_(baseline_fx), camera_{camera.fx, camera.fy, camera.cx, camera.cy} {
     choose_keyframes(map, newest);
     for (std::size_t k = 0; k < keyframes_.size(); ++k) {
@@ -34,22 +35,23 @@ class LocalBundle {
 
   void solve() {
     const auto start = std::chrono::steady_clock::now();
-    cfp::BaProblem<cfp::PinholeCamera<double>, float> problem;
+    cfp::BundleProblem<cfp::PinholeCamera<double>, float> problem;
     problem.poses = poses_;
     problem.points = positions_;
     problem.cameras = {&camera_, 1};
     problem.observations = {pose_index_, point_index_, pixels_, u_right_, sigma_, weight_};
     problem.fixed_poses = fixed_;
     problem.baseline_fx = baseline_fx_;
-    cfp::WeightedBaOptions options;
+    cfp::BundleOptions options;
     options.levenberg_marquardt.max_iterations = options_.max_iterations;
     squared_errors_.resize(pose_index_.size());
-    cfp::WeightedBaWorkspace workspace;
+    cfp::BundleWorkspace workspace;
     result_ = cfp::adjust_bundle(problem, options, workspace, cfp::SingleThread{}, cfp::span<double>(squared_errors_));
     milliseconds_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
   }
 
-  // Writes poses and points back and forgets the observations that do not fit. What has gone from the map meanwhile stays away.
+  // Writes poses and points back and forgets the observations that do not fit. What has gone from the map meanwhile
+  // stays away.
   void apply(Map& map) const {
     for (std::size_t k = 0; k < keyframes_.size(); ++k) {
       if (fixed_[k] == 0) map.keyframe(keyframes_[k]).frame.T_cam_world = poses_[k];
@@ -60,15 +62,17 @@ class LocalBundle {
     for (std::size_t o = 0; o < squared_errors_.size(); ++o) {
       const double limit = u_right_[o] > 0 ? 7.815 : 5.991;
       const int point = points_[static_cast<std::size_t>(point_index_[o])];
-      if (map.is_alive(point) && !(squared_errors_[o] >= 0 && squared_errors_[o] <= limit)) map.erase_observation(point, keyframes_[static_cast<std::size_t>(pose_index_[o])]);
+      if (map.is_alive(point) && !(squared_errors_[o] >= 0 && squared_errors_[o] <= limit))
+        map.erase_observation(point, keyframes_[static_cast<std::size_t>(pose_index_[o])]);
     }
   }
 
   [[nodiscard]] double milliseconds() const { return milliseconds_; }
-  [[nodiscard]] const cfp::WeightedBaResult& result() const { return result_; }
+  [[nodiscard]] const cfp::BundleResult& result() const { return result_; }
 
  private:
-  // Free: the newest keyframe and its neighbours, but never the first of all, which is the world's origin. Fixed: others that see their points.
+  // Free: the newest keyframe and its neighbours, but never the first of all, which is the world's origin. Fixed:
+  // others that see their points.
   void choose_keyframes(const Map& map, int newest) {
     keyframes_ = {newest};
     for (const int k : map.keyframe(newest).neighbours) {
@@ -90,7 +94,8 @@ class LocalBundle {
     for (std::size_t k = 0; k < free; ++k) fixed_[k] = keyframes_[k] == 0 ? char(1) : char(0);
   }
 
-  void add_observation(const Map& map, const Frame& frame, std::size_t i, int pose, int point, const std::vector<float>& sigmas) {
+  void add_observation(const Map& map, const Frame& frame, std::size_t i, int pose, int point,
+                       const std::vector<float>& sigmas) {
     pose_index_.push_back(pose);
     point_index_.push_back(point);
     pixels_.push_back(frame.pixels[i]);
@@ -112,7 +117,7 @@ class LocalBundle {
   std::vector<std::array<float, 2>> pixels_;
   std::vector<float> u_right_, sigma_, weight_;
   std::vector<double> squared_errors_;
-  cfp::WeightedBaResult result_;
+  cfp::BundleResult result_;
   double milliseconds_ = 0;
 };
 

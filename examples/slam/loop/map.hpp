@@ -23,13 +23,14 @@ struct Observation {
 };
 
 struct MapPoint {
-  cfp::Vector3<double> position;     // world, m
-  cfp::Vector3<double> normal;       // mean viewing direction, from cameras to the point
-  Descriptor descriptor{};           // of the last keyframe that saw it
-  float max_distance = 0;            // at which level 0 would see what the creating keypoint saw: gives the level at other distances
-  float static_probability = 1;      // M
-  int created_by = 0;                // keyframe
-  int in_view = 1, found = 1;        // frames that should have seen it, and did
+  cfp::Vector3<double> position;  // world, m
+  cfp::Vector3<double> normal;    // mean viewing direction, from cameras to the point
+  Descriptor descriptor{};        // of the last keyframe that saw it
+  float max_distance =
+      0;  // at which level 0 would see what the creating keypoint saw: gives the level at other distances
+  float static_probability = 1;  // M
+  int created_by = 0;            // keyframe
+  int in_view = 1, found = 1;    // frames that should have seen it, and did
   std::vector<Observation> observations;
   bool alive = true;
 };
@@ -44,18 +45,22 @@ class Map {
   std::vector<MapPoint> points;
   std::vector<Keyframe> keyframes;
 
-  [[nodiscard]] bool is_alive(int point) const { return point != no_point && points[static_cast<std::size_t>(point)].alive; }
+  [[nodiscard]] bool is_alive(int point) const {
+    return point != no_point && points[static_cast<std::size_t>(point)].alive;
+  }
   [[nodiscard]] MapPoint& point(int index) { return points[static_cast<std::size_t>(index)]; }
   [[nodiscard]] const MapPoint& point(int index) const { return points[static_cast<std::size_t>(index)]; }
   [[nodiscard]] Keyframe& keyframe(int index) { return keyframes[static_cast<std::size_t>(index)]; }
   [[nodiscard]] const Keyframe& keyframe(int index) const { return keyframes[static_cast<std::size_t>(index)]; }
   [[nodiscard]] std::size_t alive_points() const {
-    return static_cast<std::size_t>(std::count_if(points.begin(), points.end(), [](const MapPoint& p) { return p.alive; }));
+    return static_cast<std::size_t>(
+        std::count_if(points.begin(), points.end(), [](const MapPoint& p) { return p.alive; }));
   }
 
   void erase_point(int index) {
     MapPoint& p = point(index);
-    for (const Observation& o : p.observations) keyframe(o.keyframe).frame.map_point[static_cast<std::size_t>(o.keypoint)] = no_point;
+    for (const Observation& o : p.observations)
+      keyframe(o.keyframe).frame.map_point[static_cast<std::size_t>(o.keypoint)] = no_point;
     p.observations = {};
     p.alive = false;
   }
@@ -63,7 +68,8 @@ class Map {
   // A point without observations is nobody's: it goes, too.
   void erase_observation(int index, int keyframe_index) {
     MapPoint& p = point(index);
-    const auto o = std::find_if(p.observations.begin(), p.observations.end(), [&](const Observation& seen) { return seen.keyframe == keyframe_index; });
+    const auto o = std::find_if(p.observations.begin(), p.observations.end(),
+                                [&](const Observation& seen) { return seen.keyframe == keyframe_index; });
     if (o == p.observations.end()) return;
     keyframe(keyframe_index).frame.map_point[static_cast<std::size_t>(o->keypoint)] = no_point;
     p.observations.erase(o);

@@ -18,21 +18,28 @@ class Mapping {
       : options_(options), sigmas_(level_sigmas(features)), camera_(camera) {}
 
   // The frame's map points must be its inliers. `reference` is the keyframe it shares most points with.
-  [[nodiscard]] bool wants_keyframe(const Map& map, const Frame& frame, int reference, std::size_t inliers, int frames_since) const {
+  [[nodiscard]] bool wants_keyframe(const Map& map, const Frame& frame, int reference, std::size_t inliers,
+                                    int frames_since) const {
     if (frames_since < options_.min_gap) return false;
     if (frames_since >= options_.max_gap) return true;
     std::size_t of_reference = 0, close = 0, close_new = 0;
     for (const int p : map.keyframe(reference).frame.map_point) {
-      if (map.is_alive(p) && (map.keyframes.size() < 3 || map.point(p).observations.size() >= options_.min_observations)) ++of_reference;
+      if (map.is_alive(p) &&
+          (map.keyframes.size() < 3 || map.point(p).observations.size() >= options_.min_observations))
+        ++of_reference;
     }
     for (std::size_t i = 0; i < frame.size(); ++i) {
-      if (!(frame.depths_m[i] > 0 && frame.depths_m[i] < options_.close_m) || frame.static_probability[i] < options_.min_static_probability) continue;
+      if (!(frame.depths_m[i] > 0 && frame.depths_m[i] < options_.close_m) ||
+          frame.static_probability[i] < options_.min_static_probability)
+        continue;
       ++(map.is_alive(frame.map_point[i]) ? close : close_new);
     }
-    return double(inliers) < options_.reference_share * double(of_reference) || (close < options_.min_close && close_new > options_.new_close);
+    return double(inliers) < options_.reference_share * double(of_reference) ||
+           (close < options_.min_close && close_new > options_.new_close);
   }
 
-  // Adds the frame as a keyframe; keypoints with depth that see no point yet and may be static make new ones, M = K. Returns its index.
+  // Adds the frame as a keyframe; keypoints with depth that see no point yet and may be static make new ones, M = K.
+  // Returns its index.
   int insert(Map& map, const Frame& frame) const {
     const int index = static_cast<int>(map.keyframes.size());
     map.keyframes.push_back({frame, {}});
@@ -43,7 +50,8 @@ class Mapping {
         observe(map.point(kept.map_point[i]), kept, i, index, T_world_cam.translation);
       } else {
         kept.map_point[i] = no_point;
-        if (kept.depths_m[i] > 0 && kept.static_probability[i] >= options_.min_static_probability) create(map, kept, i, index, T_world_cam);
+        if (kept.depths_m[i] > 0 && kept.static_probability[i] >= options_.min_static_probability)
+          create(map, kept, i, index, T_world_cam);
       }
     }
     std::vector<int> neighbours = map.covisible(kept.map_point, 15);
@@ -73,8 +81,10 @@ class Mapping {
   [[nodiscard]] const std::vector<float>& sigmas() const { return sigmas_; }
 
  private:
-  void observe(MapPoint& point, const Frame& frame, std::size_t i, int keyframe, const cfp::Vector3<double>& camera_centre) const {
-    point.normal = (point.normal * double(point.observations.size()) + (point.position - camera_centre).normalized()).normalized();
+  void observe(MapPoint& point, const Frame& frame, std::size_t i, int keyframe,
+               const cfp::Vector3<double>& camera_centre) const {
+    point.normal =
+        (point.normal * double(point.observations.size()) + (point.position - camera_centre).normalized()).normalized();
     point.observations.push_back({keyframe, static_cast<int>(i)});
     point.descriptor = frame.descriptors[i];
   }
@@ -84,7 +94,8 @@ class Mapping {
     MapPoint point;
     point.position = T_world_cam * in_camera;
     point.normal.setZero();
-    point.max_distance = static_cast<float>(in_camera.norm()) * sigmas_[static_cast<std::size_t>(frame.keypoints[i].octave)];
+    point.max_distance =
+        static_cast<float>(in_camera.norm()) * sigmas_[static_cast<std::size_t>(frame.keypoints[i].octave)];
     point.static_probability = frame.static_probability[i];
     point.created_by = keyframe;
     observe(point, frame, i, keyframe, T_world_cam.translation);

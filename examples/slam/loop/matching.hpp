@@ -32,11 +32,12 @@ struct Match {
   float turn = 0;  // degrees between the two keypoints' orientations; only between known ones
 };
 
-// The nearest keypoint of each expected point among those for which `free(keypoint)`. One to one: a keypoint goes to the point
-// with the smaller distance. `ratio` below 1 asks that the second nearest on the same level be farther by that factor.
+// The nearest keypoint of each expected point among those for which `free(keypoint)`. One to one: a keypoint goes to
+// the point with the smaller distance. `ratio` below 1 asks that the second nearest on the same level be farther by
+// that factor.
 template <typename Free>
-void match_expected(const Frame& frame, const KeypointGrid& grid, const std::vector<Expected>& expected, int max_distance, float ratio, const Free& free,
-                    std::vector<Match>& matches) {
+void match_expected(const Frame& frame, const KeypointGrid& grid, const std::vector<Expected>& expected,
+                    int max_distance, float ratio, const Free& free, std::vector<Match>& matches) {
   std::vector<int> taken(frame.size(), -1);  // index into matches
   matches.clear();
   for (const Expected& e : expected) {
@@ -74,16 +75,20 @@ void match_expected(const Frame& frame, const KeypointGrid& grid, const std::vec
 inline void keep_common_turn(std::vector<Match>& matches) {
   constexpr std::size_t bins = 30;
   std::array<int, bins> count{};
-  const auto bin = [](const Match& m) { return static_cast<std::size_t>(std::lround(m.turn * float(bins) / 360.0F)) % bins; };
+  const auto bin = [](const Match& m) {
+    return static_cast<std::size_t>(std::lround(m.turn * float(bins) / 360.0F)) % bins;
+  };
   for (const Match& m : matches) ++count[bin(m)];
   std::array<int, bins> sorted = count;
   std::sort(sorted.begin(), sorted.end(), std::greater<>());
   const int least = std::max({sorted[2], sorted[0] / 10, 1});
-  matches.erase(std::remove_if(matches.begin(), matches.end(), [&](const Match& m) { return count[bin(m)] < least; }), matches.end());
+  matches.erase(std::remove_if(matches.begin(), matches.end(), [&](const Match& m) { return count[bin(m)] < least; }),
+                matches.end());
 }
 
 // Mutual nearest descriptors with a ratio test, without any idea where the points may be: for relocalisation.
-inline void match_descriptors(const Frame& frame, const Map& map, const std::vector<int>& candidates, int max_distance, float ratio, std::vector<Match>& matches) {
+inline void match_descriptors(const Frame& frame, const Map& map, const std::vector<int>& candidates, int max_distance,
+                              float ratio, std::vector<Match>& matches) {
   struct Nearest {
     int distance = std::numeric_limits<int>::max(), index = no_point;
   };
@@ -103,9 +108,14 @@ inline void match_descriptors(const Frame& frame, const Map& map, const std::vec
         second = distance;
       }
     }
-    if (best <= max_distance && float(best) <= ratio * float(second)) matches.push_back({i, static_cast<int>(nearest), best, 0});
+    if (best <= max_distance && float(best) <= ratio * float(second))
+      matches.push_back({i, static_cast<int>(nearest), best, 0});
   }
-  matches.erase(std::remove_if(matches.begin(), matches.end(), [&](const Match& m) { return of_point[static_cast<std::size_t>(m.index)].index != static_cast<int>(m.keypoint); }),
+  matches.erase(std::remove_if(matches.begin(), matches.end(),
+                               [&](const Match& m) {
+                                 return of_point[static_cast<std::size_t>(m.index)].index !=
+                                        static_cast<int>(m.keypoint);
+                               }),
                 matches.end());
   for (Match& m : matches) m.index = candidates[static_cast<std::size_t>(m.index)];
 }

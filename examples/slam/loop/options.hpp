@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "cfp/optimization/weighted_pnp_types.hpp"
-#include "cfp/pipeline/options.hpp"
+#include "cfp/frame/options.hpp"
+#include "cfp/optimization/pose/pose_refinement_types.hpp"
 #include "flow.hpp"
 
 namespace cfp_slam {
@@ -21,14 +21,14 @@ struct FeatureOptions {
 };
 
 struct MappingOptions {
-  int min_gap = 3;                    // frames between keyframes, at least; the bundle adjustment is handed over within it
-  int max_gap = 30;                   // and at most
-  double reference_share = 0.75;      // fewer inliers than this share of the reference keyframe's points: take one
-  float close_m = 3.2F;               // points whose depth says much about the position (ORB-SLAM2: 40 baselines)
+  int min_gap = 3;                // frames between keyframes, at least; the bundle adjustment is handed over within it
+  int max_gap = 30;               // and at most
+  double reference_share = 0.75;  // fewer inliers than this share of the reference keyframe's points: take one
+  float close_m = 3.2F;           // points whose depth says much about the position (ORB-SLAM2: 40 baselines)
   std::size_t min_close = 100, new_close = 70;  // fewer close ones tracked, and more to be had: take one
   float min_static_probability = 0.3F;          // keypoints below make no points; the paper's deletion threshold of M
-  double min_found_share = 0.25;      // points seen in a smaller share of the frames that should see them go
-  std::size_t min_observations = 2;   // as do points in fewer keyframes than this, three keyframes after their own
+  double min_found_share = 0.25;                // points seen in a smaller share of the frames that should see them go
+  std::size_t min_observations = 2;  // as do points in fewer keyframes than this, three keyframes after their own
 };
 
 struct LocalBundleOptions {
@@ -42,10 +42,10 @@ struct TrackingOptions {
   FeatureOptions features;
   MappingOptions mapping;
   LocalBundleOptions bundle;
-  cfp::WeightedPnPOptions pose;
-  std::uint64_t seed = 1;             // of the relocalisation; the pipeline has its own
-  bool threads = true;                // bundle adjustment beside the tracking
-  double baseline_fx = 40;            // ORB-SLAM2's Camera.bf for this sensor
+  cfp::PoseOptions pose;
+  std::uint64_t seed = 1;              // of the relocalisation; the pipeline has its own
+  bool threads = true;                 // bundle adjustment beside the tracking
+  double baseline_fx = 40;             // ORB-SLAM2's Camera.bf for this sensor
   std::size_t min_first_inliers = 10;  // for the first stage's pose
   std::size_t min_inliers = 20;        // for a tracked frame
   std::size_t min_initial_points = 100;
@@ -63,11 +63,11 @@ struct FrontEndOptions {
 struct RunOptions {
   cfp::Variant variant = cfp::Variant::cfp;
   std::uint64_t seed = 1;
-  bool threads = true;              // false: everything on one thread; the trajectory is the same, bit for bit
-  std::size_t max_frames = 0;       // 0: all
-  std::size_t pictures = 0;         // annotated frames to keep for the report
+  bool threads = true;                   // false: everything on one thread; the trajectory is the same, bit for bit
+  std::size_t max_frames = 0;            // 0: all
+  std::size_t pictures = 0;              // annotated frames to keep for the report
   std::filesystem::path picture_folder;  // every annotated frame goes here; empty: none is written
-  cfp::PipelineOptions pipeline;    // before the variant switches parts of it off
+  cfp::PipelineOptions pipeline;         // before the variant switches parts of it off
   FrontEndOptions front_end;
   TrackingOptions tracking;
 };

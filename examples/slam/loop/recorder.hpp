@@ -7,9 +7,9 @@
 
 #include <opencv2/core.hpp>
 
-#include "cfp/pipeline/static_probability_pipeline.hpp"
-#include "frame.hpp"
 #include "../record.hpp"
+#include "cfp/frame/static_probability_pipeline.hpp"
+#include "frame.hpp"
 
 namespace cfp_slam {
 
@@ -23,9 +23,11 @@ class Recorder {
   // Called after every step of the pipeline.
   void operator()(cfp::PipelineStep step, const cfp::FrameResult<float>& known, const Frame& frame) {
     if (step == cfp::PipelineStep::objects) note_boxes(known);
-    if (step == cfp::PipelineStep::first_keypoints) first_.assign(known.static_probability.begin(), known.static_probability.end());
+    if (step == cfp::PipelineStep::first_keypoints)
+      first_.assign(known.static_probability.begin(), known.static_probability.end());
     // The step before the last pose: K is the first stage's or, where that could run, the second's.
-    if (step == cfp::PipelineStep::first_keypoints || step == cfp::PipelineStep::second_keypoints) note_keypoints(known);
+    if (step == cfp::PipelineStep::first_keypoints || step == cfp::PipelineStep::second_keypoints)
+      note_keypoints(known);
     if (step == cfp::PipelineStep::second_keypoints && !labels_.empty()) note_samples(known, frame);
   }
 
@@ -45,10 +47,13 @@ class Recorder {
 
   // A box counts as moving when a third of the person in it moves, as static when less than a twentieth does.
   void note_object(const cfp::Box<float>& box, double probability) {
-    const cv::Rect inside = cv::Rect(cv::Point(static_cast<int>(box.x1), static_cast<int>(box.y1)), cv::Point(static_cast<int>(box.x2), static_cast<int>(box.y2))) & cv::Rect(0, 0, labels_.cols, labels_.rows);
+    const cv::Rect inside = cv::Rect(cv::Point(static_cast<int>(box.x1), static_cast<int>(box.y1)),
+                                     cv::Point(static_cast<int>(box.x2), static_cast<int>(box.y2))) &
+                            cv::Rect(0, 0, labels_.cols, labels_.rows);
     if (inside.empty()) return;
     const cv::Mat part = labels_(inside);
-    const double moving = cv::countNonZero(part == static_cast<int>(PixelLabel::moving)), still = cv::countNonZero(part == static_cast<int>(PixelLabel::still_part));
+    const double moving = cv::countNonZero(part == static_cast<int>(PixelLabel::moving)),
+                 still = cv::countNonZero(part == static_cast<int>(PixelLabel::still_part));
     if (moving + still < 200) return;
     const double share = moving / (moving + still);
     if (share >= 0.05 && share <= 1.0 / 3) return;
@@ -67,8 +72,9 @@ class Recorder {
     }
   }
 
-  // Keypoints inside boxes with a match, so that both stages are judged on the same ones. Two kinds have no side to be on and are
-  // left out: parts of people that happen to be still, and corners whose patch shows a person and the room, which move with the outline.
+  // Keypoints inside boxes with a match, so that both stages are judged on the same ones. Two kinds have no side to be
+  // on and are left out: parts of people that happen to be still, and corners whose patch shows a person and the room,
+  // which move with the outline.
   void note_samples(const cfp::FrameResult<float>& known, const Frame& frame) {
     const auto add = [](LabelledSamples& samples, float probability, bool is_static) {
       samples.probability.push_back(probability);
@@ -86,8 +92,10 @@ class Recorder {
 
   // The label that all pixels of the corner's circle (radius 3 at its level) share; still_part where they differ.
   [[nodiscard]] PixelLabel label_of_patch(const cv::KeyPoint& keypoint) const {
-    const int radius = static_cast<int>(std::ceil(3 * keypoint.size / 31)), x = cvRound(keypoint.pt.x), y = cvRound(keypoint.pt.y);
-    const cv::Rect patch = cv::Rect(x - radius, y - radius, 2 * radius + 1, 2 * radius + 1) & cv::Rect(0, 0, labels_.cols, labels_.rows);
+    const int radius = static_cast<int>(std::ceil(3 * keypoint.size / 31)), x = cvRound(keypoint.pt.x),
+              y = cvRound(keypoint.pt.y);
+    const cv::Rect patch =
+        cv::Rect(x - radius, y - radius, 2 * radius + 1, 2 * radius + 1) & cv::Rect(0, 0, labels_.cols, labels_.rows);
     if (patch.empty()) return PixelLabel::still_part;
     const unsigned char first = labels_.at<unsigned char>(patch.tl());
     return cv::countNonZero(labels_(patch) != first) == 0 ? static_cast<PixelLabel>(first) : PixelLabel::still_part;

@@ -1,4 +1,5 @@
-// A pose for a frame that the motion model lost: descriptors against the map, then P3P RANSAC whose samples follow the static probabilities.
+// A pose for a frame that the motion model lost: descriptors against the map, then P3P RANSAC whose samples follow the
+// static probabilities.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 #include <vector>
 
 #include "cfp/core/span.hpp"
-#include "cfp/optimization/pnp_ransac.hpp"
+#include "cfp/robust/pnp_ransac.hpp"
 #include "matching.hpp"
 
 namespace cfp_slam {
@@ -17,10 +18,13 @@ class Relocalization {
  public:
   explicit Relocalization(std::uint64_t seed) { options_.seed = seed; }
 
-  // On success the pose, and the frame's map points set to the consensus; false: frame untouched. weight: of the keypoints.
-  bool operator()(Frame& frame, const Map& map, const std::vector<int>& local_points, cfp::span<const float> weight, const cfp::PinholeCamera<float>& camera) {
+  // On success the pose, and the frame's map points set to the consensus; false: frame untouched. weight: of the
+  // keypoints.
+  bool operator()(Frame& frame, const Map& map, const std::vector<int>& local_points, cfp::span<const float> weight,
+                  const cfp::PinholeCamera<float>& camera) {
     if (try_points(frame, map, local_points, weight, camera)) return true;
-    // Then keyframe by keyframe, the newest first, a few in each lost frame, so that a lost frame costs no more than a bounded time.
+    // Then keyframe by keyframe, the newest first, a few in each lost frame, so that a lost frame costs no more than a
+    // bounded time.
     for (int tries = 0; tries < 8 && !map.keyframes.empty(); ++tries) {
       const std::size_t back = next_++ % map.keyframes.size();
       candidates_.clear();
@@ -38,7 +42,8 @@ class Relocalization {
  private:
   static constexpr std::size_t min_inliers = 15;
 
-  bool try_points(Frame& frame, const Map& map, const std::vector<int>& points, cfp::span<const float> weight, const cfp::PinholeCamera<float>& camera) {
+  bool try_points(Frame& frame, const Map& map, const std::vector<int>& points, cfp::span<const float> weight,
+                  const cfp::PinholeCamera<float>& camera) {
     match_descriptors(frame, map, points, near_descriptor, 0.8F, matches_);
     if (matches_.size() < min_inliers) return false;
     world_.clear();
@@ -46,13 +51,15 @@ class Relocalization {
     weights_.clear();
     for (const Match& m : matches_) {
       const MapPoint& point = map.point(m.index);
-      world_.push_back({static_cast<float>(point.position.x()), static_cast<float>(point.position.y()), static_cast<float>(point.position.z())});
+      world_.push_back({static_cast<float>(point.position.x()), static_cast<float>(point.position.y()),
+                        static_cast<float>(point.position.z())});
       pixels_.push_back(frame.pixels[m.keypoint]);
       weights_.push_back(weight[m.keypoint] * point.static_probability);
     }
     inlier_.resize(matches_.size());
     options_.min_inliers = min_inliers;
-    const auto found = cfp::pnp_ransac<cfp::PinholeCamera<float>, float>(camera, world_, pixels_, weights_, cfp::span<char>(inlier_), options_, workspace_);
+    const auto found = cfp::pnp_ransac<cfp::PinholeCamera<float>, float>(
+        camera, world_, pixels_, weights_, cfp::span<char>(inlier_), options_, workspace_);
     if (!found.has_pose()) return false;
     frame.T_cam_world = found.T_cam_world.cast<double>();
     frame.has_pose = true;

@@ -34,7 +34,8 @@ void evaluate(RunRecord& run) {
 }
 
 cfp::RadialTangentialCamera<float> single_precision(const cfp::RadialTangentialCamera<double>& c) {
-  return {float(c.fx), float(c.fy), float(c.cx), float(c.cy), float(c.k1), float(c.k2), float(c.p1), float(c.p2), float(c.k3)};
+  return {float(c.fx), float(c.fy), float(c.cx), float(c.cy), float(c.k1),
+          float(c.k2), float(c.p1), float(c.p2), float(c.k3)};
 }
 
 double milliseconds_since(std::chrono::steady_clock::time_point start) {
@@ -43,7 +44,8 @@ double milliseconds_since(std::chrono::steady_clock::time_point start) {
 
 }  // namespace
 
-RunRecord run_slam(const Sequence& sequence, Detector& detector, const RunOptions& options, const std::function<void(std::size_t)>& progress) {
+RunRecord run_slam(const Sequence& sequence, Detector& detector, const RunOptions& options,
+                   const std::function<void(std::size_t)>& progress) {
   RunRecord run;
   run.sequence = sequence.name();
   run.variant = cfp::to_string(options.variant);
@@ -60,7 +62,8 @@ RunRecord run_slam(const Sequence& sequence, Detector& detector, const RunOption
   FrontEndOptions front_end_options = options.front_end;
   front_end_options.threads = options.threads;
   front_end_options.use_detector = tracking_options.pipeline.use_boxes;
-  front_end_options.use_flow = tracking_options.pipeline.use_boxes && tracking_options.pipeline.first.use_object_probability;
+  front_end_options.use_flow =
+      tracking_options.pipeline.use_boxes && tracking_options.pipeline.first.use_object_probability;
   const cfp_examples::TumCamera& calibration = sequence.calibration();
   const cfp::RadialTangentialCamera<float> camera = single_precision(sequence.camera());
   FrontEnd front_end(camera, calibration.depth_units_per_metre, front_end_options);
@@ -92,9 +95,11 @@ RunRecord run_slam(const Sequence& sequence, Detector& detector, const RunOption
 
     const bool keep = picture_every > 0 && k % picture_every == picture_every / 2;
     if (keep || !options.picture_folder.empty()) {
-      const cv::Mat picture = annotate(images.bgr, tracking.last_frame().keypoints, recorder.static_probability(), recorder.label(), record.boxes);
+      const cv::Mat picture = annotate(images.bgr, tracking.last_frame().keypoints, recorder.static_probability(),
+                                       recorder.label(), record.boxes);
       if (keep) run.pictures.push_back({record.time_s, to_string(record.outcome), jpeg_of(picture)});
-      if (!options.picture_folder.empty()) cv::imwrite((options.picture_folder / (std::to_string(1000000 + k).substr(1) + ".png")).string(), picture);
+      if (!options.picture_folder.empty())
+        cv::imwrite((options.picture_folder / (std::to_string(1000000 + k).substr(1) + ".png")).string(), picture);
     }
     run.frames.push_back(std::move(record));
     progress(k + 1);

@@ -14,7 +14,8 @@ class Stopwatch {
   // The time since the last lap, or since the construction, goes to the module.
   void lap(Module module) {
     const auto now = std::chrono::steady_clock::now();
-    (*milliseconds_)[static_cast<std::size_t>(module)] += std::chrono::duration<double, std::milli>(now - last_).count();
+    (*milliseconds_)[static_cast<std::size_t>(module)] +=
+        std::chrono::duration<double, std::milli>(now - last_).count();
     last_ = now;
   }
 

@@ -16,15 +16,15 @@
 
 #include <opencv2/core.hpp>
 
+#include "../record.hpp"
+#include "cfp/frame/static_probability_pipeline.hpp"
 #include "cfp/geometry/radial_tangential_camera.hpp"
 #include "cfp/interop/opencv.hpp"
-#include "cfp/optimization/weighted_pnp.hpp"
-#include "cfp/pipeline/static_probability_pipeline.hpp"
+#include "cfp/optimization/pose/pose_refinement.hpp"
 #include "local_bundle.hpp"
 #include "mapping.hpp"
 #include "matching.hpp"
 #include "options.hpp"
-#include "../record.hpp"
 #include "relocalization.hpp"
 #include "stopwatch.hpp"
 
@@ -44,10 +44,18 @@ struct FrameFeatures {
 class Tracking {
  public:
   Tracking(const cfp::RadialTangentialCamera<float>& camera, int width, int height, const TrackingOptions& options)
-      : options_(options), camera_(camera), pinhole_(camera.pinhole()), solver_camera_{camera.fx, camera.fy, camera.cx, camera.cy}, width_(width), height_(height),
-        pipeline_(options.pipeline), mapping_(options.mapping, options.features, pinhole_), relocalization_(options.seed) {}
+      : options_(options),
+        camera_(camera),
+        pinhole_(camera.pinhole()),
+        solver_camera_{camera.fx, camera.fy, camera.cx, camera.cy},
+        width_(width),
+        height_(height),
+        pipeline_(options.pipeline),
+        mapping_(options.mapping, options.features, pinhole_),
+        relocalization_(options.seed) {}
 
-  // The outcome goes into the record, which will be the record_index-th of the run. observe(PipelineStep, FrameResult, Frame): for recordings.
+  // The outcome goes into the record, which will be the record_index-th of the run. observe(PipelineStep, FrameResult,
+  // Frame): for recordings.
   template <typename Observer>
   void track(FrameFeatures&& features, FrameRecord& record, std::size_t record_index, Observer&& observe) {
     Stopwatch watch(record.milliseconds);
@@ -72,23 +80,28 @@ class Tracking {
     if (has_image_motion_) input.image_motion = &image_motion_;
     relocalised_ = false;
     searched_ = false;
-    const auto solve = [&](cfp::Stage stage, cfp::span<const float> weight) { return stage == cfp::Stage::first ? solve_first(frame, weight) : solve_second(frame, weight, watch); };
-    const cfp::FrameResult<float> result = pipeline_.process(input, camera_, solve, [&](cfp::PipelineStep step, const cfp::FrameResult<float>& known) {
-      watch.lap(module_of(step));
-      observe(step, known, frame);
-    });
+    const auto solve = [&](cfp::Stage stage, cfp::span<const float> weight) {
+      return stage == cfp::Stage::first ? solve_first(frame, weight) : solve_second(frame, weight, watch);
+    };
+    const cfp::FrameResult<float> result =
+        pipeline_.process(input, camera_, solve, [&](cfp::PipelineStep step, const cfp::FrameResult<float>& known) {
+          watch.lap(module_of(step));
+          observe(step, known, frame);
+        });
     frame.static_probability.assign(result.static_probability.begin(), result.static_probability.end());
-    if (frame.has_pose && !searched_) solve_second(frame, result.weight, watch);  // no second stage: the last frame has no pose, or nothing matched
+    if (frame.has_pose && !searched_)
+      solve_second(frame, result.weight, watch);  // no second stage: the last frame has no pose, or nothing matched
     watch.lap(Module::pose);
     finish_frame(frame, record, result);
     watch.lap(Module::mapping);
   }
 
-  // Puts the last bundle adjustment's result into the map and gives every record its final pose: relative to its reference
-  // keyframe, as ORB-SLAM2 writes trajectories.
+  // Puts the last bundle adjustment's result into the map and gives every record its final pose: relative to its
+  // reference keyframe, as ORB-SLAM2 writes trajectories.
   void finish(std::vector<FrameRecord>& records) {
     finish_bundle(true);
-    for (const auto& [index, pose] : poses_) records[index].T_world_cam = (pose.T_cam_reference * map_.keyframe(pose.reference).frame.T_cam_world).inverse();
+    for (const auto& [index, pose] : poses_)
+      records[index].T_world_cam = (pose.T_cam_reference * map_.keyframe(pose.reference).frame.T_cam_world).inverse();
   }
   [[nodiscard]] const Map& map() const { return map_; }
   [[nodiscard]] const Frame& last_frame() const { return last_; }
@@ -101,12 +114,17 @@ class Tracking {
 
   static Module module_of(cfp::PipelineStep step) {
     switch (step) {
-      case cfp::PipelineStep::boxes: return Module::boxes;
-      case cfp::PipelineStep::objects: return Module::objects;
-      case cfp::PipelineStep::first_keypoints: return Module::keypoints_first;
-      case cfp::PipelineStep::second_keypoints: return Module::keypoints_second;
+      case cfp::PipelineStep::boxes:
+        return Module::boxes;
+      case cfp::PipelineStep::objects:
+        return Module::objects;
+      case cfp::PipelineStep::first_keypoints:
+        return Module::keypoints_first;
+      case cfp::PipelineStep::second_keypoints:
+        return Module::keypoints_second;
       case cfp::PipelineStep::first_pose:
-      case cfp::PipelineStep::second_pose: break;
+      case cfp::PipelineStep::second_pose:
+        break;
     }
     return Module::pose;
   }
@@ -126,7 +144,8 @@ class Tracking {
     return frame;
   }
 
-  // Constant velocity. The rotation also moves the boxes of the tracker, whose own motion model knows nothing of the camera.
+  // Constant velocity. The rotation also moves the boxes of the tracker, whose own motion model knows nothing of the
+  // camera.
   void predict(double time_s) {
     predicted_ = last_.T_cam_world;
     has_image_motion_ = false;
@@ -152,11 +171,13 @@ class Tracking {
     for (std::size_t j = 0; j < last_.size(); ++j) {
       const bool mapped = map_.is_alive(last_.map_point[j]);
       if (!mapped && !(last_.depths_m[j] > 0)) continue;
-      last_points_[j] = mapped ? map_.point(last_.map_point[j]).position : T_world_last * last_.back_project(j, pinhole_);
+      last_points_[j] =
+          mapped ? map_.point(last_.map_point[j]).position : T_world_last * last_.back_project(j, pinhole_);
       cfp::Vector2<double> pixel;
       if (!solver_camera_.project(predicted_ * last_points_[j], pixel) || !in_image(pixel)) continue;
       const int level = last_.keypoints[j].octave;
-      expected_.push_back({float(pixel.x()), float(pixel.y()), level, options_.search_radius * sigma(level), &last_.descriptors[j], last_.keypoints[j].angle, static_cast<int>(j)});
+      expected_.push_back({float(pixel.x()), float(pixel.y()), level, options_.search_radius * sigma(level),
+                           &last_.descriptors[j], last_.keypoints[j].angle, static_cast<int>(j)});
     }
     const auto all = [](std::size_t) { return true; };
     match_expected(frame, grid_, expected_, far_descriptor, 1.0F, all, matches_);
@@ -170,7 +191,8 @@ class Tracking {
       match_[m.keypoint] = m.index;
       const bool mapped = map_.is_alive(last_.map_point[j]);
       if (mapped) frame.map_point[m.keypoint] = last_.map_point[j];
-      frame.map_point_probability[m.keypoint] = mapped ? map_.point(last_.map_point[j]).static_probability : last_.map_point_probability[j];
+      frame.map_point_probability[m.keypoint] =
+          mapped ? map_.point(last_.map_point[j]).static_probability : last_.map_point_probability[j];
     }
   }
 
@@ -195,8 +217,8 @@ class Tracking {
     return {frame.T_cam_world * last_.T_cam_world.inverse(), inliers_, frame.has_pose};
   }
 
-  // Weighted pose refinement over everything the frame sees. Outliers lose their map point when `prune`. Returns the number of
-  // inliers that count (weight above a tenth); the pose is left alone when there is none.
+  // Weighted pose refinement over everything the frame sees. Outliers lose their map point when `prune`. Returns the
+  // number of inliers that count (weight above a tenth); the pose is left alone when there is none.
   std::size_t refine(Frame& frame, cfp::span<const float> weight, bool prune) {
     points_.clear();
     pixels_.clear();
@@ -207,7 +229,8 @@ class Tracking {
     for (std::size_t i = 0; i < frame.size(); ++i) {
       const bool mapped = map_.is_alive(frame.map_point[i]);
       if (!mapped && match_[i] == cfp::no_match) continue;
-      const cfp::Vector3<double>& X = mapped ? map_.point(frame.map_point[i]).position : last_points_[static_cast<std::size_t>(match_[i])];
+      const cfp::Vector3<double>& X =
+          mapped ? map_.point(frame.map_point[i]).position : last_points_[static_cast<std::size_t>(match_[i])];
       points_.push_back({X.x(), X.y(), X.z()});
       pixels_.push_back({static_cast<double>(frame.pixels[i][0]), static_cast<double>(frame.pixels[i][1])});
       depths_.push_back(static_cast<double>(frame.depths_m[i]));
@@ -225,7 +248,8 @@ class Tracking {
     observations.depths = depths_;
     observations.baseline_fx = options_.baseline_fx;
     inlier_.resize(keypoint_.size());
-    const cfp::WeightedPnPResult result = cfp::refine_pose(observations, solver_camera_, frame.T_cam_world, options_.pose, pose_workspace_, cfp::span<char>(inlier_));
+    const cfp::PoseResult result = cfp::refine_pose(observations, solver_camera_, frame.T_cam_world, options_.pose,
+                                                    pose_workspace_, cfp::span<char>(inlier_));
     if (!cfp::is_refined(result.reason)) return 0;
     frame.T_cam_world = result.T_cam_world;
     std::size_t count = 0;
@@ -259,14 +283,17 @@ class Tracking {
       if (!solver_camera_.project(frame.T_cam_world * point.position, pixel) || !in_image(pixel)) continue;
       const cfp::Vector3<double> ray = point.position - centre;
       const double distance = ray.norm(), cosine = ray.dot(point.normal) / distance;
-      const int level = static_cast<int>(std::ceil(std::log(static_cast<double>(point.max_distance) / distance) / log_scale - 0.5));
+      const int level =
+          static_cast<int>(std::ceil(std::log(static_cast<double>(point.max_distance) / distance) / log_scale - 0.5));
       if (cosine < 0.5 || level < -1 || level > options_.features.levels) continue;
       ++point.in_view;
       const int clamped = std::clamp(level, 0, options_.features.levels - 1);
       const float radius = (cosine > 0.998 ? 2.5F : 4.0F) * (relocalised_ ? 5.0F : 3.0F) * sigma(clamped);
       expected_.push_back({float(pixel.x()), float(pixel.y()), clamped, radius, &point.descriptor, -1, p});
     }
-    match_expected(frame, grid_, expected_, far_descriptor, 0.8F, [&](std::size_t i) { return !map_.is_alive(frame.map_point[i]); }, matches_);
+    match_expected(
+        frame, grid_, expected_, far_descriptor, 0.8F,
+        [&](std::size_t i) { return !map_.is_alive(frame.map_point[i]); }, matches_);
     for (const Match& m : matches_) frame.map_point[m.keypoint] = m.index;
   }
 
@@ -301,21 +328,25 @@ class Tracking {
       record.outcome = relocalised_ ? Outcome::relocalised : Outcome::tracked;
       update_points(frame);
       ++frames_since_keyframe_;
-      if (mapping_.wants_keyframe(map_, frame, reference_, inliers_, frames_since_keyframe_)) make_keyframe(frame, record);
+      if (mapping_.wants_keyframe(map_, frame, reference_, inliers_, frames_since_keyframe_))
+        make_keyframe(frame, record);
     } else {
       record.outcome = Outcome::lost;
       record.note = inliers_ > 0 ? "too few inliers" : "no pose agrees with the map";
     }
     if (frame.has_pose) {
-      poses_.push_back({record_index_, {reference_, frame.T_cam_world * map_.keyframe(reference_).frame.T_cam_world.inverse()}});
+      poses_.push_back(
+          {record_index_, {reference_, frame.T_cam_world * map_.keyframe(reference_).frame.T_cam_world.inverse()}});
       record.T_world_cam = frame.T_cam_world.inverse();
     }
     record.keypoints = frame.size();
-    record.matches = static_cast<std::size_t>(std::count_if(match_.begin(), match_.end(), [](std::int32_t j) { return j != cfp::no_match; }));
+    record.matches = static_cast<std::size_t>(
+        std::count_if(match_.begin(), match_.end(), [](std::int32_t j) { return j != cfp::no_match; }));
     record.inliers = inliers_;
     record.health = result.health;
     has_velocity_ = frame.has_pose && last_.has_pose && frame.time_s > last_.time_s;
-    if (has_velocity_) velocity_ = cfp::se3_log<double>(frame.T_cam_world * last_.T_cam_world.inverse()) / (frame.time_s - last_.time_s);
+    if (has_velocity_)
+      velocity_ = cfp::se3_log<double>(frame.T_cam_world * last_.T_cam_world.inverse()) / (frame.time_s - last_.time_s);
     inliers_ = 0;
     last_ = std::move(frame);
   }
@@ -323,10 +354,13 @@ class Tracking {
   // The first frame is the world. It needs enough points that may be static.
   void initialize(Frame& frame, FrameRecord& record) {
     std::size_t usable = 0;
-    for (std::size_t i = 0; i < frame.size(); ++i) usable += frame.depths_m[i] > 0 && frame.static_probability[i] >= options_.mapping.min_static_probability ? 1U : 0U;
+    for (std::size_t i = 0; i < frame.size(); ++i)
+      usable +=
+          frame.depths_m[i] > 0 && frame.static_probability[i] >= options_.mapping.min_static_probability ? 1U : 0U;
     if (usable < options_.min_initial_points) {
       record.outcome = Outcome::lost;
-      record.note = "waiting for " + std::to_string(options_.min_initial_points) + " static points with depth, this frame has " + std::to_string(usable);
+      record.note = "waiting for " + std::to_string(options_.min_initial_points) +
+                    " static points with depth, this frame has " + std::to_string(usable);
       return;
     }
     frame.T_cam_world = {};
@@ -336,7 +370,8 @@ class Tracking {
     make_keyframe(frame, record);
   }
 
-  // M of what the frame sees, from the pipeline for what the last frame saw, too, from K alone for what the local map added.
+  // M of what the frame sees, from the pipeline for what the last frame saw, too, from K alone for what the local map
+  // added.
   void update_points(Frame& frame) {
     const cfp::MapPointOptions& policy = options_.pipeline.second.map_point;
     for (std::size_t i = 0; i < frame.size(); ++i) {
@@ -345,7 +380,10 @@ class Tracking {
       if (mapped) {
         MapPoint& point = map_.point(frame.map_point[i]);
         ++point.found;
-        point.static_probability = match_[i] != cfp::no_match && m >= 0 ? m : cfp::updated_map_point(point.static_probability, frame.static_probability[i], policy);
+        point.static_probability =
+            match_[i] != cfp::no_match && m >= 0
+                ? m
+                : cfp::updated_map_point(point.static_probability, frame.static_probability[i], policy);
         m = point.static_probability;
         if (cfp::is_deletable(m, policy)) {
           map_.erase_point(frame.map_point[i]);
@@ -370,7 +408,8 @@ class Tracking {
   }
 
   void start_bundle() {
-    bundle_ = std::make_unique<LocalBundle>(map_, reference_, pinhole_, mapping_.sigmas(), options_.baseline_fx, options_.bundle);
+    bundle_ = std::make_unique<LocalBundle>(map_, reference_, pinhole_, mapping_.sigmas(), options_.baseline_fx,
+                                            options_.bundle);
     frames_since_bundle_ = 0;
     if (options_.threads) {
       bundle_thread_ = std::async(std::launch::async, [bundle = bundle_.get()] { bundle->solve(); });
@@ -379,7 +418,8 @@ class Tracking {
     }
   }
 
-  // Hands the result over `min_gap` frames after the start, whenever it was ready. The last frame moves with its reference.
+  // Hands the result over `min_gap` frames after the start, whenever it was ready. The last frame moves with its
+  // reference.
   void finish_bundle(bool now) {
     bundle_milliseconds_ = 0;
     if (bundle_ == nullptr || (!now && ++frames_since_bundle_ < options_.mapping.min_gap)) return;
@@ -392,7 +432,9 @@ class Tracking {
   }
 
   [[nodiscard]] float sigma(int level) const { return mapping_.sigmas()[static_cast<std::size_t>(level)]; }
-  [[nodiscard]] bool in_image(const cfp::Vector2<double>& pixel) const { return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < width_ && pixel.y() < height_; }
+  [[nodiscard]] bool in_image(const cfp::Vector2<double>& pixel) const {
+    return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < width_ && pixel.y() < height_;
+  }
 
   TrackingOptions options_;
   cfp::RadialTangentialCamera<float> camera_;
@@ -428,7 +470,7 @@ class Tracking {
   std::vector<std::array<double, 2>> pixels_;
   std::vector<double> depths_, sigmas_, weights_;
   std::vector<std::size_t> keypoint_;
-  cfp::WeightedPnPWorkspace<double> pose_workspace_;
+  cfp::PoseWorkspace<double> pose_workspace_;
 };
 
 }  // namespace cfp_slam

@@ -48,7 +48,8 @@ inline std::vector<Tick> ticks(double low, double high, int count) {
 inline std::vector<Tick> log_ticks(double low, double high) {
   std::vector<Tick> out;
   const bool few = high / low < 50;
-  for (int exponent = static_cast<int>(std::floor(std::log10(low))); exponent <= std::log10(high) && out.size() < 50; ++exponent) {
+  for (int exponent = static_cast<int>(std::floor(std::log10(low))); exponent <= std::log10(high) && out.size() < 50;
+       ++exponent) {
     for (const double factor : {1.0, 2.0, 5.0}) {
       const double value = factor * std::pow(10.0, exponent);
       if ((factor > 1 && !few) || value < low * 0.999 || value > high * 1.001) continue;
@@ -68,7 +69,8 @@ struct Axis {
 
   // 0 to 1 inside; what lies outside stays at the border.
   [[nodiscard]] double place(double value) const {
-    const double share = logarithmic ? std::log((std::max)(value, low) / low) / std::log(high / low) : (value - low) / (high - low);
+    const double share =
+        logarithmic ? std::log((std::max)(value, low) / low) / std::log(high / low) : (value - low) / (high - low);
     return (std::min)((std::max)(0.0, share), 1.0);  // in this order not a number is 0
   }
 };

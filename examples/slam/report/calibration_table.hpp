@@ -25,13 +25,15 @@ inline Table calibration_table(const std::vector<RunSummary>& runs, const std::s
   for (const std::string& variant : variants_of(runs)) {
     for (std::size_t k = 0; k < fields.size(); ++k) {
       const auto spread = [&](auto&& value) {
-        return spread_of(values_of(
-            runs, "", variant, [&](const RunSummary& run) { return (run.*fields[k]).samples > 0 ? value(run.*fields[k]) : not_known; }));
+        return spread_of(values_of(runs, "", variant, [&](const RunSummary& run) {
+          return (run.*fields[k]).samples > 0 ? value(run.*fields[k]) : not_known;
+        }));
       };
       const Spread samples = spread([](const CalibrationSummary& c) { return static_cast<double>(c.samples); });
       if (samples.known == 0) continue;
       const auto cell = [](const Spread& s, int decimals) {
-        return Cell{number(s.median, decimals), range_text({s.median, s.minimum, s.maximum, s.known, s.known}, decimals), Rank::none};
+        return Cell{number(s.median, decimals),
+                    range_text({s.median, s.minimum, s.maximum, s.known, s.known}, decimals), Rank::none};
       };
       table.rows.push_back(
           {{variant, "", Rank::none},
@@ -39,12 +41,13 @@ inline Table calibration_table(const std::vector<RunSummary>& runs, const std::s
            cell(spread([](const CalibrationSummary& c) { return c.auc; }), 4),
            cell(spread([](const CalibrationSummary& c) { return c.brier; }), 4),
            cell(spread([](const CalibrationSummary& c) { return c.ece; }), 4),
-           {number(100 * spread([](const CalibrationSummary& c) { return c.static_fraction; }).median, 1) + " %", "", Rank::none},
+           {number(100 * spread([](const CalibrationSummary& c) { return c.static_fraction; }).median, 1) + " %", "",
+            Rank::none},
            {number(samples.median, 0), "", Rank::none}});
     }
   }
-  table.note =
-      table.rows.empty() ? "No sequence with labels." : "AUC 1, Brier 0, ECE 0 are best; medians and ranges over sequences and seeds.";
+  table.note = table.rows.empty() ? "No sequence with labels."
+                                  : "AUC 1, Brier 0, ECE 0 are best; medians and ranges over sequences and seeds.";
   return table;
 }
 

@@ -41,8 +41,8 @@ struct VariantError {
   Spread ate, coverage;  // metres, percent
   bool lost = false;     // coverage more than 2 points below the best variant's, or no result at all
 
-  // A variant that lost the camera is worse than any that held it, whatever its error over the rest; of two the one with less
-  // coverage.
+  // A variant that lost the camera is worse than any that held it, whatever its error over the rest; of two the one
+  // with less coverage.
   [[nodiscard]] bool worse_than(const VariantError& other) const {
     if (lost != other.lost) return lost;
     return lost ? coverage.median < other.coverage.median : ate.median > other.ate.median;
@@ -58,7 +58,8 @@ struct SequenceErrors {
 
   [[nodiscard]] bool is(std::string_view word) const { return sequence.find(word) != std::string::npos; }
   [[nodiscard]] const VariantError* find(std::string_view variant) const {
-    const auto at = std::find_if(variants.begin(), variants.end(), [variant](const VariantError& v) { return v.variant == variant; });
+    const auto at = std::find_if(variants.begin(), variants.end(),
+                                 [variant](const VariantError& v) { return v.variant == variant; });
     return at == variants.end() ? nullptr : &*at;
   }
   [[nodiscard]] const VariantError& best() const {
@@ -84,7 +85,8 @@ inline std::vector<SequenceErrors> sequence_errors(const std::vector<RunSummary>
     for (const std::string& variant : variants_of(runs)) {
       const Spread coverage = spread_of(values_of(runs, sequence, variant, coverage_percent));
       if (coverage.known == 0) continue;
-      errors.variants.push_back({variant, spread_of(runs, sequence, variant, &RunSummary::ate_rmse_m), coverage, false});
+      errors.variants.push_back(
+          {variant, spread_of(runs, sequence, variant, &RunSummary::ate_rmse_m), coverage, false});
       best_coverage = (std::max)(best_coverage, coverage.median);
     }
     for (VariantError& v : errors.variants) v.lost = v.ate.known == 0 || v.coverage.median < best_coverage - 2;
@@ -94,7 +96,8 @@ inline std::vector<SequenceErrors> sequence_errors(const std::vector<RunSummary>
 }
 
 inline Claim claim_five_times(const std::vector<SequenceErrors>& all) {
-  Claim claim{"In every walking sequence the ATE of cfp is at least 5 times smaller than that of plain.", "", Verdict::not_tested};
+  Claim claim{"In every walking sequence the ATE of cfp is at least 5 times smaller than that of plain.", "",
+              Verdict::not_tested};
   for (const SequenceErrors& s : all) {
     const VariantError *cfp = s.find("cfp"), *plain = s.find("plain");
     if (!s.is("walking") || plain == nullptr) continue;
@@ -106,22 +109,25 @@ inline Claim claim_five_times(const std::vector<SequenceErrors>& all) {
 }
 
 inline Claim claim_harmless(const std::vector<SequenceErrors>& all) {
-  Claim claim{"In no sitting sequence is the ATE of cfp more than 2 % above the best variant's.", "", Verdict::not_tested};
+  Claim claim{"In no sitting sequence is the ATE of cfp more than 2 % above the best variant's.", "",
+              Verdict::not_tested};
   for (const SequenceErrors& s : all) {
     if (!s.is("sitting") || s.variants.size() < 2) continue;
     const VariantError &cfp = *s.find("cfp"), &best = s.best();
     const double excess = 100 * (cfp.ate.median / best.ate.median - 1);
-    claim.add(
-        shown_name(s.sequence) + ": " + cfp.text() + ", best " + best.text() + (excess < 0 ? " (" : " (+") + number(excess, 1) + " %)",
-        !cfp.lost && excess <= 2);
+    claim.add(shown_name(s.sequence) + ": " + cfp.text() + ", best " + best.text() + (excess < 0 ? " (" : " (+") +
+                  number(excess, 1) + " %)",
+              !cfp.lost && excess <= 2);
   }
   return claim;
 }
 
 // Noise: at most 2 % above the best, or, with several seeds, ranges that overlap.
 inline Claim claim_best(const std::vector<SequenceErrors>& all) {
-  Claim claim{"In every walking sequence cfp is the best variant, or within noise of it (2 %, or overlapping ranges of the seeds).", "",
-              Verdict::not_tested};
+  Claim claim{
+      "In every walking sequence cfp is the best variant, or within noise of it (2 %, or overlapping ranges of the "
+      "seeds).",
+      "", Verdict::not_tested};
   for (const SequenceErrors& s : all) {
     if (!s.is("walking") || s.variants.size() < 2) continue;
     const VariantError &cfp = *s.find("cfp"), &best = s.best();
@@ -133,8 +139,8 @@ inline Claim claim_best(const std::vector<SequenceErrors>& all) {
 }
 
 inline Claim claim_mdc(const std::vector<SequenceErrors>& all) {
-  Claim claim{"In walking/rpy leaving out missed-detection compensation is the worst of all variants that use boxes.", "",
-              Verdict::not_tested};
+  Claim claim{"In walking/rpy leaving out missed-detection compensation is the worst of all variants that use boxes.",
+              "", Verdict::not_tested};
   for (const SequenceErrors& s : all) {
     const VariantError* mdc = s.find("no-mdc");
     if (!s.is("walking") || !s.is("rpy") || mdc == nullptr) continue;
@@ -162,12 +168,15 @@ inline Claim claim_boxes(const std::vector<SequenceErrors>& all) {
 
 // The two claims on K, over the sequences with labels.
 inline std::array<Claim, 2> claims_on_probability(const std::vector<RunSummary>& runs) {
-  Claim auc{"K of cfp after the second stage has an AUC of at least 0.95 on the keypoints inside boxes.", "", Verdict::not_tested};
-  Claim calibrated{"K of cfp is better calibrated after the second stage than after the first: smaller Brier score and ECE.", "",
-                   Verdict::not_tested};
+  Claim auc{"K of cfp after the second stage has an AUC of at least 0.95 on the keypoints inside boxes.", "",
+            Verdict::not_tested};
+  Claim calibrated{
+      "K of cfp is better calibrated after the second stage than after the first: smaller Brier score and ECE.", "",
+      Verdict::not_tested};
   for (const std::string& sequence : sequences_of(runs)) {
     const auto median = [&](CalibrationSummary RunSummary::*stage, double CalibrationSummary::*figure) {
-      return spread_of(values_of(runs, sequence, "cfp", [&](const RunSummary& run) { return run.*stage.*figure; })).median;
+      return spread_of(values_of(runs, sequence, "cfp", [&](const RunSummary& run) { return run.*stage.*figure; }))
+          .median;
     };
     const std::string name = shown_name(sequence) + ": ";
     const double second = median(&RunSummary::second_stage, &CalibrationSummary::auc);
@@ -177,9 +186,9 @@ inline std::array<Claim, 2> claims_on_probability(const std::vector<RunSummary>&
     const double brier_2 = median(&RunSummary::second_stage, &CalibrationSummary::brier),
                  ece_2 = median(&RunSummary::second_stage, &CalibrationSummary::ece);
     if (!std::isfinite(brier_1) || !std::isfinite(brier_2)) continue;
-    calibrated.add(
-        name + "Brier " + number(brier_1, 4) + " to " + number(brier_2, 4) + ", ECE " + number(ece_1, 4) + " to " + number(ece_2, 4),
-        brier_2 < brier_1 && ece_2 < ece_1);
+    calibrated.add(name + "Brier " + number(brier_1, 4) + " to " + number(brier_2, 4) + ", ECE " + number(ece_1, 4) +
+                       " to " + number(ece_2, 4),
+                   brier_2 < brier_1 && ece_2 < ece_1);
   }
   return {auc, calibrated};
 }
@@ -204,7 +213,8 @@ inline Table claims_table(const std::vector<RunSummary>& runs, const std::string
                           {claim.figures.empty() ? "–" : claim.figures, "", Rank::none}});
   }
   table.note =
-      "A variant whose coverage is more than 2 points below the best one has lost the camera and counts as worse than any that held it.";
+      "A variant whose coverage is more than 2 points below the best one has lost the camera and counts as worse than "
+      "any that held it.";
   return table;
 }
 

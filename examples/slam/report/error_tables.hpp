@@ -34,10 +34,12 @@ inline constexpr std::array<ErrorKind, 3> error_kinds{
      {"III", "rotational drift (RPE)", "°/s", 4, &RunSummary::rpe_rmse_deg, &RunSummary::rpe_sd_deg, &paper_rpe_deg}}};
 
 // Our names for the rows of Table IV, in its order.
-inline constexpr std::array<const char*, 6> ablation_variants{"cfp", "cfp-minus", "no-mdc", "no-dbscan", "no-ksp", "only-boxes"};
+inline constexpr std::array<const char*, 6> ablation_variants{"cfp",       "cfp-minus", "no-mdc",
+                                                              "no-dbscan", "no-ksp",    "only-boxes"};
 
 inline constexpr const char* rank_note =
-    "Bold: best; second best underlined or in italics. Coverage: matched poses, of all frames; a figure whose coverage is more than 2 "
+    "Bold: best; second best underlined or in italics. Coverage: matched poses, of all frames; a figure whose coverage "
+    "is more than 2 "
     "points below the best one is not ranked, for a small error over few poses is no merit.";
 
 inline Table error_table(const std::vector<RunSummary>& runs, const ErrorKind& kind, const std::string& protocol) {
@@ -69,19 +71,23 @@ inline Table error_table(const std::vector<RunSummary>& runs, const ErrorKind& k
     rank({&row[1], &row[4], &row[7]}, comparable(medians, coverages), kind.decimals);
     table.rows.push_back(row);
   }
-  table.note =
-      std::string(rank_note) + " S.D.: standard deviation of the errors within a run. Better: 100 (plain - cfp) / plain of the RMSE.";
+  table.note = std::string(rank_note) +
+               " S.D.: standard deviation of the errors within a run. Better: 100 (plain - cfp) / plain of the RMSE.";
   return table;
 }
 
 inline constexpr const char* evidence_note =
-    "Evidence: P printed by the authors themselves, 2 printed in somebody else's table, – not recorded which. Published figures are "
-    "single runs nearly all, on other machines, seldom with coverage; below about 1 mm or 10 % a ranking is noise, and three printed "
+    "Evidence: P printed by the authors themselves, 2 printed in somebody else's table, – not recorded which. "
+    "Published figures are "
+    "single runs nearly all, on other machines, seldom with coverage; below about 1 mm or 10 % a ranking is noise, and "
+    "three printed "
     "digits cannot be ranked against four.";
 
-inline Table published_error_table(const std::vector<RunSummary>& runs, const ErrorKind& kind, const std::string& protocol) {
-  SystemTable out(std::string("Table ") + kind.number + " beside published figures: " + kind.name + ", RMSE, " + kind.unit, protocol,
-                  published_sequences(runs));
+inline Table published_error_table(const std::vector<RunSummary>& runs, const ErrorKind& kind,
+                                   const std::string& protocol) {
+  SystemTable out(
+      std::string("Table ") + kind.number + " beside published figures: " + kind.name + ", RMSE, " + kind.unit,
+      protocol, published_sequences(runs));
   for (const PublishedRow& row : *kind.paper) out.add_published(row, std::string(row.system) + " (paper)", true);
   const bool absolute = kind.rmse == &RunSummary::ate_rmse_m;
   if (absolute) {
@@ -93,7 +99,8 @@ inline Table published_error_table(const std::vector<RunSummary>& runs, const Er
   }
   return out.finished(
       std::string(evidence_note) +
-      (absolute ? " Rows with Sim(3) are aligned with scale, which hides scale error: not comparable and not ranked." : ""));
+      (absolute ? " Rows with Sim(3) are aligned with scale, which hides scale error: not comparable and not ranked."
+                : ""));
 }
 
 inline Table ablation_table(const std::vector<RunSummary>& runs, const std::string& protocol) {

@@ -20,7 +20,8 @@ namespace cfp_slam {
 // The columns of Tables I, II, III and V.
 inline constexpr std::array<const char*, 3> compared_variants{"plain", "cfp-minus", "cfp"};
 
-// Where a sequence stands in the tables: the paper's order for names that hold one of its keys ("walking_xyz"), then the others.
+// Where a sequence stands in the tables: the paper's order for names that hold one of its keys ("walking_xyz"), then
+// the others.
 inline std::size_t sequence_order(std::string_view name) {
   std::size_t k = 0;
   while (k < paper_sequence_count && name.find(paper_keys[k]) == std::string_view::npos) ++k;
@@ -52,7 +53,8 @@ inline std::vector<std::string> variants_of(const std::vector<RunSummary>& runs)
 
 // One value per seed of a sequence and a variant; an empty sequence stands for all.
 template <typename Value>
-std::vector<double> values_of(const std::vector<RunSummary>& runs, std::string_view sequence, std::string_view variant, Value&& value) {
+std::vector<double> values_of(const std::vector<RunSummary>& runs, std::string_view sequence, std::string_view variant,
+                              Value&& value) {
   std::vector<double> out;
   for (const RunSummary& run : runs) {
     if ((sequence.empty() || run.sequence == sequence) && run.variant == variant) out.push_back(value(run));
@@ -109,9 +111,9 @@ inline std::string protocol_of(const std::vector<RunSummary>& runs, const std::s
   };
   std::set<std::string> delta_texts;
   for (const double delta : deltas) delta_texts.insert(number(delta, 2) + " s");
-  return "Alignment " + joined(alignments) + "; RPE over a fixed interval of " + joined(delta_texts) + "; n = " + range(seeds) +
-         " seeds per figure; " + range(frames) + " frames per sequence; detector: " + joined(detectors) +
-         "; machine: " + (machine.empty() ? "–" : machine) +
+  return "Alignment " + joined(alignments) + "; RPE over a fixed interval of " + joined(delta_texts) +
+         "; n = " + range(seeds) + " seeds per figure; " + range(frames) +
+         " frames per sequence; detector: " + joined(detectors) + "; machine: " + (machine.empty() ? "–" : machine) +
          ". Figures are medians over the seeds, beside them the smallest and the largest.";
 }
 

@@ -42,9 +42,11 @@ inline std::string escape(std::string_view text) {
 inline std::string number(double value, int decimals) {
   if (!std::isfinite(value)) return "–";
   char text[64];
-  std::snprintf(text, sizeof text, std::abs(value) < 1e9 ? "%.*f" : "%.*e", std::abs(value) < 1e9 ? decimals : 1, value);
+  std::snprintf(text, sizeof text, std::abs(value) < 1e9 ? "%.*f" : "%.*e", std::abs(value) < 1e9 ? decimals : 1,
+                value);
   const std::string_view shown(text);
-  return std::string(shown.find_first_of("123456789") == std::string_view::npos && shown[0] == '-' ? shown.substr(1) : shown);
+  return std::string(shown.find_first_of("123456789") == std::string_view::npos && shown[0] == '-' ? shown.substr(1)
+                                                                                                   : shown);
 }
 inline std::string number(std::size_t value) { return std::to_string(value); }
 
@@ -55,7 +57,8 @@ inline std::string base64(const std::vector<unsigned char>& bytes) {
   out.reserve((bytes.size() + 2) / 3 * 4);
   for (std::size_t i = 0; i < bytes.size(); i += 3) {
     const std::size_t left = bytes.size() - i;
-    const unsigned block = (static_cast<unsigned>(bytes[i]) << 16) | (left > 1 ? static_cast<unsigned>(bytes[i + 1]) << 8 : 0u) |
+    const unsigned block = (static_cast<unsigned>(bytes[i]) << 16) |
+                           (left > 1 ? static_cast<unsigned>(bytes[i + 1]) << 8 : 0u) |
                            (left > 2 ? static_cast<unsigned>(bytes[i + 2]) : 0u);
     out += digits[block >> 18];
     out += digits[(block >> 12) & 63u];

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "../record.hpp"
 #include "experiment.hpp"
 #include "html.hpp"
 #include "published.hpp"
-#include "../record.hpp"
 #include "statistics.hpp"
 #include "summary.hpp"
 #include "table.hpp"
@@ -33,10 +33,12 @@ inline Table latency_table(const std::vector<RunSummary>& runs, const std::strin
     std::vector<Cell> row{{to_string(module), "", Rank::none}};
     bool any = false;
     for (const std::string& variant : variants) {
-      const Spread median = spread_of(values_of(runs, "", variant, [m](const RunSummary& run) { return run.median_ms[m]; }));
+      const Spread median =
+          spread_of(values_of(runs, "", variant, [m](const RunSummary& run) { return run.median_ms[m]; }));
       const Spread p95 = spread_of(values_of(runs, "", variant, [m](const RunSummary& run) { return run.p95_ms[m]; }));
       any = any || median.known > 0;
-      row.push_back({number(median.median, 2), range_text({median.median, median.minimum, median.maximum, median.known, median.known}, 2),
+      row.push_back({number(median.median, 2),
+                     range_text({median.median, median.minimum, median.maximum, median.known, median.known}, 2),
                      Rank::none});
       row.push_back({number(p95.median, 2), "", Rank::none});
     }
@@ -48,8 +50,10 @@ inline Table latency_table(const std::vector<RunSummary>& runs, const std::strin
     if (any) table.rows.push_back(row);
   }
   table.note =
-      "Of the frames in which a module ran; medians over all runs. The paper gives means, on an Intel i7 with an RTX 3060. The detector "
-      "runs beside feature extraction, reading and bundle adjustment beside the tracking thread. The paper's object probability (17.93 "
+      "Of the frames in which a module ran; medians over all runs. The paper gives means, on an Intel i7 with an RTX "
+      "3060. The detector "
+      "runs beside feature extraction, reading and bundle adjustment beside the tracking thread. The paper's object "
+      "probability (17.93 "
       "ms) holds the optical flow, ours stands in its own row.";
   return table;
 }

@@ -62,9 +62,11 @@ svg.plot{display:block;width:100%;height:auto;font-size:11px}
 }
 
 inline std::string page(const std::string& title, const std::string& body) {
-  return "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, "
+  return "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" "
+         "content=\"width=device-width, "
          "initial-scale=1\">\n<title>" +
-         escape(title) + "</title>\n<style>" + style_sheet() + "</style>\n</head>\n<body>\n" + body + "</body>\n</html>\n";
+         escape(title) + "</title>\n<style>" + style_sheet() + "</style>\n</head>\n<body>\n" + body +
+         "</body>\n</html>\n";
 }
 
 // Throws when the file cannot be written. A reader never sees half of it: it is renamed into place when complete.

@@ -1,4 +1,5 @@
-// One small picture of a comparison, for a README: trajectories and a frame in a single SVG that needs nothing beside it.
+// One small picture of a comparison, for a README: trajectories and a frame in a single SVG that needs nothing beside
+// it.
 #pragma once
 
 #include <algorithm>
@@ -8,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "../record.hpp"
 #include "html.hpp"
 #include "page.hpp"
-#include "../record.hpp"
 #include "report_trajectory.hpp"
 #include "series.hpp"
 #include "style.hpp"
@@ -18,8 +19,8 @@
 
 namespace cfp_slam {
 
-// The picture with the most boxes, compensated ones counted twice, that fits into a number of base64 characters; of the run of the full
-// model when it has any. None: nullptr.
+// The picture with the most boxes, compensated ones counted twice, that fits into a number of base64 characters; of the
+// run of the full model when it has any. None: nullptr.
 inline const AnnotatedFrame* telling_picture(const std::vector<Series>& all, std::size_t largest) {
   const AnnotatedFrame* best = nullptr;
   std::size_t best_score = 0;
@@ -40,8 +41,8 @@ inline const AnnotatedFrame* telling_picture(const std::vector<Series>& all, std
   return best;
 }
 
-// Runs of one sequence, plain and cfp say: the trajectories at the left, a frame at the right (without one that fits, the view from
-// the side), the errors below. At most `largest_bytes` long, unless the curves alone are longer.
+// Runs of one sequence, plain and cfp say: the trajectories at the left, a frame at the right (without one that fits,
+// the view from the side), the errors below. At most `largest_bytes` long, unless the curves alone are longer.
 inline std::string summary_picture(const std::vector<RunRecord>& runs, std::size_t largest_bytes = 150000) {
   std::vector<const RunRecord*> same;
   for (const RunRecord& run : runs) {
@@ -55,7 +56,8 @@ inline std::string summary_picture(const std::vector<RunRecord>& runs, std::size
 
   std::string words;
   const auto text = [&words](double x, double y, const char* css, const std::string& what) {
-    words += "<text class=\"" + std::string(css) + "\" x=\"" + number(x, 0) + "\" y=\"" + number(y, 0) + "\">" + escape(what) + "</text>\n";
+    words += "<text class=\"" + std::string(css) + "\" x=\"" + number(x, 0) + "\" y=\"" + number(y, 0) + "\">" +
+             escape(what) + "</text>\n";
   };
   double x = margin, y = margin + content + line;
   const auto entry = [&](const std::string& css, const std::string& what) {
@@ -68,7 +70,8 @@ inline std::string summary_picture(const std::vector<RunRecord>& runs, std::size
     text(x + 33, y, "words", what);
     x += needed + 14;
   };
-  if (std::any_of(same.begin(), same.end(), [](const RunRecord* run) { return !run->truth.empty(); })) entry("truth", "truth");
+  if (std::any_of(same.begin(), same.end(), [](const RunRecord* run) { return !run->truth.empty(); }))
+    entry("truth", "truth");
   for (const Series& s : all) {
     const double ate = summarize(*s.run).ate_rmse_m;
     entry(s.css("curve"), s.name + (std::isfinite(ate) ? ": ATE " + number(ate, 3) + " m" : ""));
@@ -78,22 +81,27 @@ inline std::string summary_picture(const std::vector<RunRecord>& runs, std::size
   const double height = y + margin;
 
   const auto placed = [content](const Plot& plot, double left) {
-    return "<svg x=\"" + number(left, 0) + "\" y=\"" + number(margin + (content - plot.height()) / 2, 0) + "\" width=\"" +
-           number(plot.width(), 0) + "\" height=\"" + number(plot.height(), 0) + "\">" + plot.svg() + "</svg>\n";
+    return "<svg x=\"" + number(left, 0) + "\" y=\"" + number(margin + (content - plot.height()) / 2, 0) +
+           "\" width=\"" + number(plot.width(), 0) + "\" height=\"" + number(plot.height(), 0) + "\">" + plot.svg() +
+           "</svg>\n";
   };
   const std::string size = "width=\"" + number(width, 0) + "\" height=\"" + number(height, 0) + '"';
-  std::string out = "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + number(width, 0) + ' ' + number(height, 0) + "\" " + size +
-                    " role=\"img\" aria-label=\"Trajectories of the variants and the truth\" font-family=\"system-ui,'Segoe "
-                    "UI',Roboto,sans-serif\">\n<style>" +
-                    plot_style() + "text{font-size:12px}.words{font-size:15px;fill:var(--ink)}.quiet{fill:var(--soft)}</style>\n<rect " +
-                    size + " rx=\"8\" style=\"fill:var(--card)\"/>\n" + placed(views[0].plot, margin);
+  std::string out =
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 " + number(width, 0) + ' ' + number(height, 0) + "\" " +
+      size +
+      " role=\"img\" aria-label=\"Trajectories of the variants and the truth\" font-family=\"system-ui,'Segoe "
+      "UI',Roboto,sans-serif\">\n<style>" +
+      plot_style() +
+      "text{font-size:12px}.words{font-size:15px;fill:var(--ink)}.quiet{fill:var(--soft)}</style>\n<rect " + size +
+      " rx=\"8\" style=\"fill:var(--card)\"/>\n" + placed(views[0].plot, margin);
   const std::size_t used = out.size() + words.size() + 1000;
   if (const AnnotatedFrame* picture = telling_picture(all, largest_bytes > used ? largest_bytes - used : 0)) {
-    out += "<image x=\"" + number(right, 0) + "\" y=\"" + number(margin + (content - frame_height) / 2, 0) + "\" width=\"" +
-           number(column, 0) + "\" height=\"" + number(frame_height, 0) + "\" href=\"data:image/jpeg;base64," + base64(picture->jpeg) +
-           "\"/>\n";
+    out += "<image x=\"" + number(right, 0) + "\" y=\"" + number(margin + (content - frame_height) / 2, 0) +
+           "\" width=\"" + number(column, 0) + "\" height=\"" + number(frame_height, 0) +
+           "\" href=\"data:image/jpeg;base64," + base64(picture->jpeg) + "\"/>\n";
     text(right, margin + content + line, "quiet words", "Boxes: yellow detected, orange compensated.");
-    text(right, margin + content + 2 * line, "quiet words", "Keypoints inside boxes: from red, moving, to green, static.");
+    text(right, margin + content + 2 * line, "quiet words",
+         "Keypoints inside boxes: from red, moving, to green, static.");
   } else {
     out += placed(views[1].plot, right);
   }

@@ -46,21 +46,30 @@ inline std::vector<Saving> savings_of(const RunSummary& s, int features) {
   const double side = std::max({median(Module::features), median(Module::flow), median(Module::detection)});
   const auto without = [&](Module m, double left) {
     double rest = 0;
-    for (const Module other : {Module::features, Module::flow, Module::detection}) rest = std::max(rest, other == m ? left : median(other));
+    for (const Module other : {Module::features, Module::flow, Module::detection})
+      rest = std::max(rest, other == m ? left : median(other));
     return side - rest;
   };
   std::vector<Saving> savings;
-  // Half of the extractor's time is the pyramid and the corner test, which do not depend on how many keypoints are kept.
+  // Half of the extractor's time is the pyramid and the corner test, which do not depend on how many keypoints are
+  // kept.
   savings.push_back({"--features " + std::to_string(features / 2) + ": keypoints, their matching and their poses",
-                     without(Module::features, 0.75 * median(Module::features)) + (median(Module::matching) + median(Module::pose) + median(Module::keypoints_second)) / 2});
-  if (median(Module::detection) > 0) savings.push_back({"a smaller network, or --detector FILE.txt from an earlier pass", without(Module::detection, 0)});
+                     without(Module::features, 0.75 * median(Module::features)) +
+                         (median(Module::matching) + median(Module::pose) + median(Module::keypoints_second)) / 2});
+  if (median(Module::detection) > 0)
+    savings.push_back(
+        {"a smaller network, or --detector FILE.txt from an earlier pass", without(Module::detection, 0)});
   if (median(Module::flow) > 0) {
     savings.push_back({"half the flow points (FlowOptions)", without(Module::flow, median(Module::flow) / 2)});
-    savings.push_back({"--variant cfp-minus: no optical flow, no object probability", without(Module::flow, 0) + median(Module::objects)});
+    savings.push_back({"--variant cfp-minus: no optical flow, no object probability",
+                       without(Module::flow, 0) + median(Module::objects)});
   }
-  if (median(Module::objects) > 0) savings.push_back({"FundamentalRansacOptions::confidence 0.95: fewer samples for F", median(Module::objects) / 2});
-  if (median(Module::keypoints_second) > 0) savings.push_back({"--variant no-ksp: no second stage", median(Module::keypoints_second)});
-  std::stable_sort(savings.begin(), savings.end(), [](const Saving& a, const Saving& b) { return a.milliseconds > b.milliseconds; });
+  if (median(Module::objects) > 0)
+    savings.push_back({"FundamentalRansacOptions::confidence 0.95: fewer samples for F", median(Module::objects) / 2});
+  if (median(Module::keypoints_second) > 0)
+    savings.push_back({"--variant no-ksp: no second stage", median(Module::keypoints_second)});
+  std::stable_sort(savings.begin(), savings.end(),
+                   [](const Saving& a, const Saving& b) { return a.milliseconds > b.milliseconds; });
   return savings;
 }
 
@@ -70,22 +79,28 @@ inline std::string profile_text(const RunRecord& run, double target_fps, int fea
   std::string out = "  where the time of a frame goes (ms; modules beside the tracking thread are marked *)\n";
   for (std::size_t m = 0; m < module_count; ++m) {
     const auto module = static_cast<Module>(m);
-    const bool beside = module == Module::reading || module == Module::detection || module == Module::flow || module == Module::bundle_adjustment;
+    const bool beside = module == Module::reading || module == Module::detection || module == Module::flow ||
+                        module == Module::bundle_adjustment;
     if (!(s.median_ms[m] > 0)) continue;
-    std::snprintf(line, sizeof line, "  %c %-22s median %7.3f   95 %% %7.3f\n", beside ? '*' : ' ', to_string(module), s.median_ms[m], s.p95_ms[m]);
+    std::snprintf(line, sizeof line, "  %c %-22s median %7.3f   95 %% %7.3f\n", beside ? '*' : ' ', to_string(module),
+                  s.median_ms[m], s.p95_ms[m]);
     out += line;
   }
   const double now = s.median_ms[static_cast<std::size_t>(Module::tracking)], budget = 1000 / target_fps;
   if (!(now > 0)) return out;
   if (now <= budget) {
-    std::snprintf(line, sizeof line, "  %.1f ms per frame is within the %.1f ms of %g frames/s; %.1f ms to spare\n", now, budget, target_fps, budget - now);
+    std::snprintf(line, sizeof line, "  %.1f ms per frame is within the %.1f ms of %g frames/s; %.1f ms to spare\n",
+                  now, budget, target_fps, budget - now);
     return out + line;
   }
-  std::snprintf(line, sizeof line, "  %.1f ms per frame is %.1f ms too much for %g frames/s. What gives time back, about:\n", now, now - budget, target_fps);
+  std::snprintf(line, sizeof line,
+                "  %.1f ms per frame is %.1f ms too much for %g frames/s. What gives time back, about:\n", now,
+                now - budget, target_fps);
   out += line;
   for (const Saving& saving : savings_of(s, features)) {
     if (saving.milliseconds < 0.01) continue;
-    std::snprintf(line, sizeof line, "    %6.2f ms  %s%s\n", saving.milliseconds, saving.what.c_str(), now - saving.milliseconds <= budget ? "  <- enough" : "");
+    std::snprintf(line, sizeof line, "    %6.2f ms  %s%s\n", saving.milliseconds, saving.what.c_str(),
+                  now - saving.milliseconds <= budget ? "  <- enough" : "");
     out += line;
   }
   return out;

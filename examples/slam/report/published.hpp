@@ -1,7 +1,8 @@
 // Published figures on the eight dynamic fr3 sequences of the TUM RGB-D benchmark, to stand beside ours.
 //
-// Evidence: P printed by the authors of the system themselves, 2 printed in somebody else's table, – not recorded which. Single runs
-// nearly all of them, on different machines, coverage seldom given: differences below about 1 mm or 10 % are noise.
+// Evidence: P printed by the authors of the system themselves, 2 printed in somebody else's table, – not recorded
+// which. Single runs nearly all of them, on different machines, coverage seldom given: differences below about 1 mm or
+// 10 % are noise.
 #pragma once
 
 #include <array>
@@ -15,14 +16,14 @@ namespace cfp_slam {
 
 inline constexpr std::size_t paper_sequence_count = 8;
 // In the paper's order. TUM's folder is rgbd_dataset_freiburg3_<key>.
-inline constexpr std::array<const char*, paper_sequence_count> paper_keys{"sitting_xyz",    "sitting_halfsphere", "sitting_static",
-                                                                          "sitting_rpy",    "walking_xyz",        "walking_halfsphere",
-                                                                          "walking_static", "walking_rpy"};
-inline constexpr std::array<const char*, paper_sequence_count> paper_names{"fr3/s/xyz", "fr3/s/half", "fr3/s/static", "fr3/s/rpy",
-                                                                           "fr3/w/xyz", "fr3/w/half", "fr3/w/static", "fr3/w/rpy"};
+inline constexpr std::array<const char*, paper_sequence_count> paper_keys{
+    "sitting_xyz", "sitting_halfsphere", "sitting_static", "sitting_rpy",
+    "walking_xyz", "walking_halfsphere", "walking_static", "walking_rpy"};
+inline constexpr std::array<const char*, paper_sequence_count> paper_names{
+    "fr3/s/xyz", "fr3/s/half", "fr3/s/static", "fr3/s/rpy", "fr3/w/xyz", "fr3/w/half", "fr3/w/static", "fr3/w/rpy"};
 
-// Index of a sequence in the paper's tables; paper_sequence_count for any other. Only TUM's own names count: neither a rendered
-// "walking_xyz" nor an excerpt may stand beside published figures.
+// Index of a sequence in the paper's tables; paper_sequence_count for any other. Only TUM's own names count: neither a
+// rendered "walking_xyz" nor an excerpt may stand beside published figures.
 inline std::size_t paper_sequence(std::string_view name) {
   constexpr std::string_view prefix = "rgbd_dataset_freiburg3_";
   while (!name.empty() && name.back() == '/') name.remove_suffix(1);
@@ -151,8 +152,8 @@ inline constexpr std::array<PublishedRow, 5> scaled_ate_m{{
       {0.017, no}, {0.016, no}, {0.003, no}, {no, no}}}, 3}}};
 // clang-format on
 
-// Table V: mean milliseconds on an Intel i7 with an RTX 3060; `no` where the paper gives none. "cfp-minus" has no object stage and
-// a shorter frame; the paper's times for the other variants are not published.
+// Table V: mean milliseconds on an Intel i7 with an RTX 3060; `no` where the paper gives none. "cfp-minus" has no
+// object stage and a shorter frame; the paper's times for the other variants are not published.
 inline double paper_milliseconds(Module module, std::string_view variant) {
   const bool minus = variant == "cfp-minus";
   if (!minus && variant != "cfp") return no;

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "../record.hpp"
 #include "html.hpp"
 #include "published.hpp"
-#include "../record.hpp"
 #include "series.hpp"
 #include "summary.hpp"
 #include "svg.hpp"
@@ -84,9 +84,12 @@ inline std::string latency_section(const std::vector<Series>& all) {
   std::string figures = latency_over_time(all);
   for (const Series& s : all) figures += latency_bars(s);
   if (figures.empty()) return {};
-  return "<h3>Time</h3>\n<p class=\"note\">Bar and figure: median over the frames in which the module ran; whisker: 95th percentile. "
-         "Diamond and brackets: the paper's mean on an Intel i7, its detector on an RTX 3060. The paper's 17.93 ms for the object "
-         "probability hold the optical flow, which has its own bar here. Reading, detection and bundle adjustment run beside the "
+  return "<h3>Time</h3>\n<p class=\"note\">Bar and figure: median over the frames in which the module ran; whisker: "
+         "95th percentile. "
+         "Diamond and brackets: the paper's mean on an Intel i7, its detector on an RTX 3060. The paper's 17.93 ms for "
+         "the object "
+         "probability hold the optical flow, which has its own bar here. Reading, detection and bundle adjustment run "
+         "beside the "
          "tracking thread.</p>\n"
          "<div class=\"grid\">\n" +
          figures + "</div>\n";

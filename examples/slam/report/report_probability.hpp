@@ -9,10 +9,10 @@
 #include <tuple>
 #include <vector>
 
+#include "../record.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/evaluation/calibration.hpp"
 #include "html.hpp"
-#include "../record.hpp"
 #include "series.hpp"
 #include "summary.hpp"
 #include "svg.hpp"
@@ -49,7 +49,8 @@ inline std::string histogram_plot(const std::vector<Series>& all) {
   unit.add(0);
   unit.add(1);
   share.add(share.high * 1.05);
-  Plot plot("K of the keypoints inside boxes", linear_axis(unit, "K, 1 = static"), linear_axis(share, "share of the keypoints"));
+  Plot plot("K of the keypoints inside boxes", linear_axis(unit, "K, 1 = static"),
+            linear_axis(share, "share of the keypoints"));
   for (const std::size_t k : drawing_order(all)) {
     std::vector<double> x, y;
     for (std::size_t b = 0; b < histogram_bins; ++b) {
@@ -100,7 +101,8 @@ inline std::string histogram_over_time(const Series& series, double start_s, dou
                                    step * static_cast<double>(c + 1), static_cast<double>(b + 1) / histogram_bins);
     }
   }
-  for (std::size_t k = 1; k < shapes.size(); ++k) plot.shape(shapes[k], series.css("bar"), static_cast<double>(k) / strengths);
+  for (std::size_t k = 1; k < shapes.size(); ++k)
+    plot.shape(shapes[k], series.css("bar"), static_cast<double>(k) / strengths);
   return figure("K inside boxes over time: " + series.name, plot.svg(), {}, "s" + number(series.style));
 }
 
@@ -110,7 +112,8 @@ inline std::string objects_over_time(const Series& series, double start_s, doubl
   time.add(end_s - start_s);
   unit.add(0);
   unit.add(1);
-  Plot plot("O of the boxes over time, " + series.name, linear_axis(time, "time [s]"), linear_axis(unit, "O, 1 = static"), 480, 200);
+  Plot plot("O of the boxes over time, " + series.name, linear_axis(time, "time [s]"),
+            linear_axis(unit, "O, 1 = static"), 480, 200);
   std::string detected, compensated;
   for (const FrameRecord& frame : series.run->frames) {
     for (const BoxRecord& box : frame.boxes) {
@@ -130,7 +133,8 @@ inline std::string reliability_plot(const Series& series) {
   Range unit;
   unit.add(0);
   unit.add(1);
-  Plot plot("Reliability, " + series.name, linear_axis(unit, "static probability"), linear_axis(unit, "share that is static"), 480, 380);
+  Plot plot("Reliability, " + series.name, linear_axis(unit, "static probability"),
+            linear_axis(unit, "share that is static"), 480, 380);
   plot.curve({0, 1}, {0, 1}, "guide");
   std::string rows, key;
   const auto samples = labelled(*series.run);
@@ -139,8 +143,9 @@ inline std::string reliability_plot(const Series& series) {
     const CalibrationSummary c = summarize(*samples[k]);
     if (c.samples == 0) continue;
     cfp::CalibrationWorkspace workspace;
-    const auto result = cfp::evaluate_calibration(cfp::span<const float>(samples[k]->probability),
-                                                  cfp::span<const char>(samples[k]->is_static), cfp::span<const float>(), workspace);
+    const auto result =
+        cfp::evaluate_calibration(cfp::span<const float>(samples[k]->probability),
+                                  cfp::span<const char>(samples[k]->is_static), cfp::span<const float>(), workspace);
     const std::string colour = "c" + number(styles[k]);
     std::vector<double> x, y;
     for (const cfp::ReliabilityBin& bin : result.table) {
@@ -153,22 +158,24 @@ inline std::string reliability_plot(const Series& series) {
       if (bin.count == 0) continue;
       const double share = static_cast<double>(bin.count) / static_cast<double>(result.used);
       plot.dot(bin.mean_probability, bin.static_fraction, 2 + 6 * std::sqrt(share), "dot " + colour,
-               std::string(probability_names[k]) + ": " + number(bin.count) + " samples, mean " + number(bin.mean_probability, 3) +
-                   ", static " + number(bin.static_fraction, 3));
+               std::string(probability_names[k]) + ": " + number(bin.count) + " samples, mean " +
+                   number(bin.mean_probability, 3) + ", static " + number(bin.static_fraction, 3));
     }
-    key += "<span><svg viewBox=\"0 0 26 10\"><path class=\"curve " + colour + "\" d=\"M1 5H25\"/></svg>" + probability_names[k] + "</span>";
-    rows += std::string("<tr><th scope=\"row\">") + probability_names[k] + "</th><td>" + number(c.auc, 4) + "</td><td>" +
-            number(c.brier, 4) + "</td><td>" + number(c.ece, 4) + "</td><td>" + number(100 * c.static_fraction, 1) + " %</td><td>" +
-            number(c.samples) + "</td></tr>\n";
+    key += "<span><svg viewBox=\"0 0 26 10\"><path class=\"curve " + colour + "\" d=\"M1 5H25\"/></svg>" +
+           probability_names[k] + "</span>";
+    rows += std::string("<tr><th scope=\"row\">") + probability_names[k] + "</th><td>" + number(c.auc, 4) +
+            "</td><td>" + number(c.brier, 4) + "</td><td>" + number(c.ece, 4) + "</td><td>" +
+            number(100 * c.static_fraction, 1) + " %</td><td>" + number(c.samples) + "</td></tr>\n";
   }
   if (rows.empty()) return {};
-  return figure(
-      "Reliability: " + series.name,
-      "<div class=\"legend\">" + key + "</div>" + plot.svg() +
-          "<div class=\"scroll\"><table><thead><tr><th></th><th>AUC</th><th>Brier</th><th>ECE</th><th>static</th><th>samples</th></tr>"
-          "</thead><tbody>\n" +
-          rows + "</tbody></table></div>",
-      {}, "s" + number(series.style));
+  return figure("Reliability: " + series.name,
+                "<div class=\"legend\">" + key + "</div>" + plot.svg() +
+                    "<div "
+                    "class=\"scroll\"><table><thead><tr><th></th><th>AUC</th><th>Brier</th><th>ECE</th><th>static</"
+                    "th><th>samples</th></tr>"
+                    "</thead><tbody>\n" +
+                    rows + "</tbody></table></div>",
+                {}, "s" + number(series.style));
 }
 
 // The curves over time fill a screen per variant: folded away when there are many.
@@ -184,14 +191,18 @@ inline std::string probability_section(const std::vector<Series>& all) {
     return "<h3>Static probability</h3>\n<p class=\"note\">No boxes, so no probabilities.</p>\n";
   }
   std::string out =
-      "<h3>Static probability</h3>\n<p class=\"note\">1 = static throughout. K: keypoint, M: map point, O: object. Reliability: what means "
-      "what it says lies on the diagonal; a dot's area grows with the samples in its tenth. AUC 1, Brier 0, ECE 0 are best.</p>\n"
+      "<h3>Static probability</h3>\n<p class=\"note\">1 = static throughout. K: keypoint, M: map point, O: object. "
+      "Reliability: what means "
+      "what it says lies on the diagonal; a dot's area grows with the samples in its tenth. AUC 1, Brier 0, ECE 0 are "
+      "best.</p>\n"
       "<div class=\"grid\">\n" +
       figures + "</div>\n";
   if (!(keypoints + objects).empty()) {
     out += std::string("<details") + (all.size() <= 3 ? " open" : "") +
-           "><summary>K and O over time, per variant</summary>\n<p class=\"note\">K: the stronger the colour, the larger the share of the "
-           "frame's in-box keypoints. O: dots are detected boxes, crosses compensated ones; boxes without an O are left out.</p>\n"
+           "><summary>K and O over time, per variant</summary>\n<p class=\"note\">K: the stronger the colour, the "
+           "larger the share of the "
+           "frame's in-box keypoints. O: dots are detected boxes, crosses compensated ones; boxes without an O are "
+           "left out.</p>\n"
            "<div class=\"grid\">\n" +
            keypoints + objects + "</div></details>\n";
   }

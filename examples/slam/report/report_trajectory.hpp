@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "html.hpp"
 #include "../record.hpp"
+#include "html.hpp"
 #include "series.hpp"
 #include "statistics.hpp"
 #include "summary.hpp"
@@ -27,7 +27,8 @@ inline std::string row_of(const Series& series) {
   cell(number(s.ate_max_m, 4));
   cell(number(s.rpe_rmse_m, 4));
   cell(number(s.rpe_rmse_deg, 3));
-  cell(s.expected > 0 ? number(s.matched) + " of " + number(s.expected) + " (" + number(coverage_percent(s), 1) + " %)" : "–");
+  cell(s.expected > 0 ? number(s.matched) + " of " + number(s.expected) + " (" + number(coverage_percent(s), 1) + " %)"
+                      : "–");
   cell(number(s.lost) + " / " + number(s.skipped) + " / " + number(s.relocalised));
   cell(number(s.largest_gap_s, 2));
   cell(s.expected > 0 ? escape(s.alignment) : "–");
@@ -38,19 +39,23 @@ inline std::string row_of(const Series& series) {
 
 inline std::string summary_table(const std::vector<Series>& all) {
   std::string out =
-      "<div class=\"scroll\"><table><thead><tr><th>variant</th><th>ATE rmse [m]</th><th>median</th><th>max</th><th>RPE rmse [m/s]</th>"
-      "<th>RPE rmse [°/s]</th><th>coverage: matched poses</th><th>lost / skipped / relocalised frames</th><th>largest gap [s]</th>"
+      "<div class=\"scroll\"><table><thead><tr><th>variant</th><th>ATE rmse [m]</th><th>median</th><th>max</th><th>RPE "
+      "rmse [m/s]</th>"
+      "<th>RPE rmse [°/s]</th><th>coverage: matched poses</th><th>lost / skipped / relocalised frames</th><th>largest "
+      "gap [s]</th>"
       "<th>alignment</th><th>ms per frame, median / p95</th><th>keyframes / map points</th></tr></thead><tbody>\n";
   for (const Series& s : all) out += row_of(s);
   return out +
-         "</tbody></table></div>\n<p class=\"note\">ATE: distance of the matched poses to the truth after the alignment named. RPE: rmse "
-         "over all intervals of one second. A lost frame has no pose and none is invented: read every error beside its coverage. "
+         "</tbody></table></div>\n<p class=\"note\">ATE: distance of the matched poses to the truth after the "
+         "alignment named. RPE: rmse "
+         "over all intervals of one second. A lost frame has no pose and none is invented: read every error beside its "
+         "coverage. "
          "ms: the tracking thread, the detector only as far as it was waited for.</p>\n";
 }
 
-// Truth and variants in metres and one scale, the longest direction of the motion to the right: first the view that shows most, along
-// the shortest direction, then the one from the side. What is farther from the truth than twice its extent (at least 1 m) is cut
-// off: one variant that flew away must not shrink the rest to a dot.
+// Truth and variants in metres and one scale, the longest direction of the motion to the right: first the view that
+// shows most, along the shortest direction, then the one from the side. What is farther from the truth than twice its
+// extent (at least 1 m) is cut off: one variant that flew away must not shrink the rest to a dot.
 struct View {
   std::string title;
   Plot plot;
@@ -74,7 +79,8 @@ inline std::vector<View> trajectory_views(const std::vector<Series>& all) {
   extend(truth);
   if (!with_truth) std::for_each(estimates.begin(), estimates.end(), extend);
   std::array<std::size_t, 3> axes{0, 1, 2};
-  std::stable_sort(axes.begin(), axes.end(), [&](std::size_t a, std::size_t b) { return range[a].size() > range[b].size(); });
+  std::stable_sort(axes.begin(), axes.end(),
+                   [&](std::size_t a, std::size_t b) { return range[a].size() > range[b].size(); });
   const double reach = (std::max)(2 * range[axes[0]].size(), 1.0);
   const std::array<Range, 3> inner = range;
   bool cut_off = false;
@@ -144,18 +150,22 @@ inline std::string outcome_plot(const std::vector<Series>& all) {
     for (std::size_t i = 0; i < frames.size();) {
       std::size_t next = i + 1;
       while (next < frames.size() && frames[next].outcome == frames[i].outcome) ++next;
-      const double from = frames[i].time_s - start, to = (next < frames.size() ? frames[next].time_s : frames[next - 1].time_s) - start;
+      const double from = frames[i].time_s - start,
+                   to = (next < frames.size() ? frames[next].time_s : frames[next - 1].time_s) - start;
       if (frames[i].outcome != Outcome::tracked && std::isfinite(from) && std::isfinite(to)) {
         // At least 2 units wide: one frame in a thousand must still be seen.
-        plot.shape(plot.box(from, row + 0.15, (std::max)(to, from + end / 200), row + 0.85), to_string(frames[i].outcome));
+        plot.shape(plot.box(from, row + 0.15, (std::max)(to, from + end / 200), row + 0.85),
+                   to_string(frames[i].outcome));
       }
       i = next;
     }
   }
   const std::string key =
-      "<div class=\"legend\"><span><svg viewBox=\"0 0 26 10\"><rect class=\"lost\" width=\"26\" height=\"10\"/></svg>lost</span>"
+      "<div class=\"legend\"><span><svg viewBox=\"0 0 26 10\"><rect class=\"lost\" width=\"26\" "
+      "height=\"10\"/></svg>lost</span>"
       "<span><svg viewBox=\"0 0 26 10\"><rect class=\"skipped\" width=\"26\" height=\"10\"/></svg>skipped</span>"
-      "<span><svg viewBox=\"0 0 26 10\"><rect class=\"relocalised\" width=\"26\" height=\"10\"/></svg>relocalised</span></div>";
+      "<span><svg viewBox=\"0 0 26 10\"><rect class=\"relocalised\" width=\"26\" "
+      "height=\"10\"/></svg>relocalised</span></div>";
   return figure("Frames without a pose, and where the map was found again", key + plot.svg());
 }
 
@@ -169,16 +179,18 @@ inline std::string notes_of(const std::vector<Series>& all) {
     }
     constexpr std::size_t shown = 20;
     for (std::size_t i = 0; i < (std::min)(noted.size(), shown); ++i) {
-      rows += "<tr><th scope=\"row\">" + escape(s.name) + "</th><td>" + number(noted[i]->time_s, 3) + "</td><td class=\"words\">" +
-              to_string(noted[i]->outcome) + ": " + escape(noted[i]->note) + "</td></tr>\n";
+      rows += "<tr><th scope=\"row\">" + escape(s.name) + "</th><td>" + number(noted[i]->time_s, 3) +
+              "</td><td class=\"words\">" + to_string(noted[i]->outcome) + ": " + escape(noted[i]->note) +
+              "</td></tr>\n";
     }
     if (noted.size() > shown) {
-      rows += "<tr><th scope=\"row\">" + escape(s.name) + "</th><td></td><td class=\"words\">and " + number(noted.size() - shown) +
-              " more</td></tr>\n";
+      rows += "<tr><th scope=\"row\">" + escape(s.name) + "</th><td></td><td class=\"words\">and " +
+              number(noted.size() - shown) + " more</td></tr>\n";
     }
   }
   if (rows.empty()) return {};
-  return "<details><summary>Why frames were skipped or lost</summary><div class=\"scroll\"><table><thead><tr><th>variant</th><th>time "
+  return "<details><summary>Why frames were skipped or lost</summary><div "
+         "class=\"scroll\"><table><thead><tr><th>variant</th><th>time "
          "[s]</th>"
          "<th>reason</th></tr></thead><tbody>\n" +
          rows + "</tbody></table></div></details>\n";
@@ -189,7 +201,8 @@ inline std::string trajectory_section(const std::vector<Series>& all) {
   for (const View& view : trajectory_views(all)) {
     views += figure(view.title, view.plot.svg(), view.cut_off ? "Poses far from the truth are cut off." : "");
   }
-  return summary_table(all) + "<div class=\"grid\">\n" + views + error_plot(all) + outcome_plot(all) + "</div>\n" + notes_of(all);
+  return summary_table(all) + "<div class=\"grid\">\n" + views + error_plot(all) + outcome_plot(all) + "</div>\n" +
+         notes_of(all);
 }
 
 }  // namespace cfp_slam

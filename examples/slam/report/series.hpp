@@ -8,24 +8,27 @@
 #include <string>
 #include <vector>
 
+#include "../record.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/evaluation/trajectory_error.hpp"
 #include "html.hpp"
-#include "../record.hpp"
 #include "statistics.hpp"
 #include "style.hpp"
 #include "summary.hpp"
 
 namespace cfp_slam {
 
-inline constexpr std::array<const char*, 7> variant_names{"plain", "cfp", "cfp-minus", "no-mdc", "no-dbscan", "no-ksp", "only-boxes"};
+inline constexpr std::array<const char*, 7> variant_names{"plain",     "cfp",    "cfp-minus", "no-mdc",
+                                                          "no-dbscan", "no-ksp", "only-boxes"};
 
 struct Series {
   const RunRecord* run = nullptr;
   std::string name;
   std::size_t style = 0;  // into series_styles
 
-  [[nodiscard]] std::string css(const char* what) const { return std::string(what) + " c" + number(style) + " s" + number(style); }
+  [[nodiscard]] std::string css(const char* what) const {
+    return std::string(what) + " c" + number(style) + " s" + number(style);
+  }
 };
 
 // A known variant has its own colour in every report; others, and further seeds of the same, take the next free one.
@@ -146,16 +149,17 @@ inline std::string legend_of(const std::vector<Series>& all, bool with_truth) {
   if (with_truth) out += "<span><svg viewBox=\"0 0 26 10\"><path class=\"truth\" d=\"M1 5H25\"/></svg>truth</span>";
   for (const Series& s : all) {
     const std::string k = number(s.style);
-    out += "<label><input type=\"checkbox\" checked class=\"t" + k + "\"><svg viewBox=\"0 0 26 10\"><path class=\"curve c" + k +
-           "\" d=\"M1 5H25\"/></svg>" + escape(s.name) + "</label>";
+    out += "<label><input type=\"checkbox\" checked class=\"t" + k +
+           "\"><svg viewBox=\"0 0 26 10\"><path class=\"curve c" + k + "\" d=\"M1 5H25\"/></svg>" + escape(s.name) +
+           "</label>";
   }
   return out + "</div>\n";
 }
 
 inline std::string figure(const std::string& title, const std::string& content, const std::string& caption = {},
                           const std::string& css = {}) {
-  return "<figure" + (css.empty() ? "" : " class=\"" + css + '"') + "><strong>" + escape(title) + "</strong>" + content +
-         (caption.empty() ? "" : "<figcaption>" + escape(caption) + "</figcaption>") + "</figure>\n";
+  return "<figure" + (css.empty() ? "" : " class=\"" + css + '"') + "><strong>" + escape(title) + "</strong>" +
+         content + (caption.empty() ? "" : "<figcaption>" + escape(caption) + "</figcaption>") + "</figure>\n";
 }
 
 }  // namespace cfp_slam

@@ -1,4 +1,5 @@
-// Order statistics over frames and over seeds. Values that are not finite (a run without a result) are counted, never averaged.
+// Order statistics over frames and over seeds. Values that are not finite (a run without a result) are counted, never
+// averaged.
 #pragma once
 
 #include <algorithm>
@@ -44,7 +45,8 @@ inline Spread spread_of(const std::vector<double>& values) {
 
 // How much smaller than `reference`, in percent of it: 100 (reference - value) / reference.
 inline double improvement_percent(double reference, double value) {
-  return reference > 0 && std::isfinite(reference) && std::isfinite(value) ? 100 * (reference - value) / reference : not_known;
+  return reference > 0 && std::isfinite(reference) && std::isfinite(value) ? 100 * (reference - value) / reference
+                                                                           : not_known;
 }
 
 }  // namespace cfp_slam

@@ -9,8 +9,8 @@
 
 namespace cfp_slam {
 
-// One colour per series for light and for dark ground, and the dashes that tell them apart without colour. Series k has the
-// classes `c<k>` (colour) and `s<k>` (hidden while its box in the legend is not ticked).
+// One colour per series for light and for dark ground, and the dashes that tell them apart without colour. Series k has
+// the classes `c<k>` (colour) and `s<k>` (hidden while its box in the legend is not ticked).
 struct SeriesStyle {
   const char *light, *dark, *dashes;
 };
@@ -36,7 +36,8 @@ inline std::string series_css(bool dark) {
 // Style rules of everything that a Plot draws, light and dark.
 inline std::string plot_style() {
   std::string css =
-      ":root{--ground:#fff;--ink:#1b2028;--soft:#5c6673;--line:#d9dee5;--grid:#e9ecf0;--card:#f6f8fa;--good:#137333;--bad:#b3261e}\n" +
+      ":root{--ground:#fff;--ink:#1b2028;--soft:#5c6673;--line:#d9dee5;--grid:#e9ecf0;--card:#f6f8fa;--good:#137333;--"
+      "bad:#b3261e}\n" +
       series_css(false) + R"(text{fill:var(--soft)}
 .value{fill:var(--ink)}
 .grid-line{stroke:var(--grid);stroke-width:1}
@@ -55,7 +56,8 @@ inline std::string plot_style() {
     css += ".curve.c" + number(k) + "{stroke-dasharray:" + series_styles[k].dashes + "}\n";
   }
   return css +
-         "@media(prefers-color-scheme:dark){:root{--ground:#12161c;--ink:#e6e9ee;--soft:#9aa5b4;--line:#343c48;--grid:#262d37;"
+         "@media(prefers-color-scheme:dark){:root{--ground:#12161c;--ink:#e6e9ee;--soft:#9aa5b4;--line:#343c48;--grid:#"
+         "262d37;"
          "--card:#1a2028;--good:#5fd07f;--bad:#ff8278}\n" +
          series_css(true) + "}\n";
 }

@@ -1,5 +1,5 @@
-// The figures of one run that the tables need: some hundred bytes, so that thousands of runs fit in memory and in a file that a
-// long experiment is resumed from.
+// The figures of one run that the tables need: some hundred bytes, so that thousands of runs fit in memory and in a
+// file that a long experiment is resumed from.
 #pragma once
 
 #include <array>
@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "../record.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/evaluation/calibration.hpp"
-#include "../record.hpp"
 #include "statistics.hpp"
 
 namespace cfp_slam {
@@ -25,9 +25,12 @@ struct CalibrationSummary {
 struct RunSummary {
   std::string sequence, variant, detector, alignment;
   std::uint64_t seed = 0;
-  std::size_t frames = 0, tracked = 0, relocalised = 0, lost = 0, skipped = 0, fallbacks = 0, keyframes = 0, map_points = 0;
-  double ate_rmse_m = not_known, ate_sd_m = not_known, ate_mean_m = not_known, ate_median_m = not_known, ate_max_m = not_known;
-  double rpe_rmse_m = not_known, rpe_sd_m = not_known, rpe_rmse_deg = not_known, rpe_sd_deg = not_known, rpe_delta_s = not_known;
+  std::size_t frames = 0, tracked = 0, relocalised = 0, lost = 0, skipped = 0, fallbacks = 0, keyframes = 0,
+              map_points = 0;
+  double ate_rmse_m = not_known, ate_sd_m = not_known, ate_mean_m = not_known, ate_median_m = not_known,
+         ate_max_m = not_known;
+  double rpe_rmse_m = not_known, rpe_sd_m = not_known, rpe_rmse_deg = not_known, rpe_sd_deg = not_known,
+         rpe_delta_s = not_known;
   std::size_t matched = 0, expected = 0;  // poses with a truth; frames, 0 when the run has no truth
   double time_fraction = not_known, largest_gap_s = not_known;
   // Over the frames in which the module ran.
@@ -35,7 +38,8 @@ struct RunSummary {
   CalibrationSummary first_stage, second_stage, map_point, object;
 };
 
-inline constexpr std::array<const char*, 4> probability_names{"K, first stage", "K, second stage", "M of the map point", "O of the box"};
+inline constexpr std::array<const char*, 4> probability_names{"K, first stage", "K, second stage", "M of the map point",
+                                                              "O of the box"};
 inline std::array<const LabelledSamples*, 4> labelled(const RunRecord& run) {
   return {&run.first_stage, &run.second_stage, &run.map_point, &run.object};
 }
@@ -44,8 +48,9 @@ inline CalibrationSummary summarize(const LabelledSamples& samples) {
   CalibrationSummary out;
   if (samples.probability.size() != samples.is_static.size()) return out;
   cfp::CalibrationWorkspace workspace;
-  const auto result = cfp::evaluate_calibration(cfp::span<const float>(samples.probability), cfp::span<const char>(samples.is_static),
-                                                cfp::span<const float>(), workspace);
+  const auto result =
+      cfp::evaluate_calibration(cfp::span<const float>(samples.probability), cfp::span<const char>(samples.is_static),
+                                cfp::span<const float>(), workspace);
   out.samples = result.used;
   if (result.used == 0) return out;
   out.static_fraction = result.static_fraction;
@@ -61,10 +66,12 @@ inline double coverage_percent(const RunSummary& run) {
 }
 
 // A detector's file without the folders of this machine; other names as they are.
-inline std::string shown_detector(const std::string& detector) { return detector.substr(detector.find_last_of("/\\") + 1); }
+inline std::string shown_detector(const std::string& detector) {
+  return detector.substr(detector.find_last_of("/\\") + 1);
+}
 
-// Milliseconds of the frames in which a module ran, in order. A module that does not run takes no time: zeros are left out, so
-// that the figure is what it costs when it is needed.
+// Milliseconds of the frames in which a module ran, in order. A module that does not run takes no time: zeros are left
+// out, so that the figure is what it costs when it is needed.
 inline std::vector<double> milliseconds_of(const RunRecord& run, Module module) {
   std::vector<double> values;
   for (const FrameRecord& frame : run.frames) {
@@ -78,7 +85,9 @@ inline std::vector<double> milliseconds_of(const RunRecord& run, Module module) 
 inline bool has_error(const cfp::AbsoluteErrorResult& r) {
   return r.translation_m.count > 0 && (r.status == cfp::Status::ok || r.status == cfp::Status::degenerate);
 }
-inline bool has_error(const cfp::RelativeErrorResult& r) { return r.translation_m.count > 0 && r.status == cfp::Status::ok; }
+inline bool has_error(const cfp::RelativeErrorResult& r) {
+  return r.translation_m.count > 0 && r.status == cfp::Status::ok;
+}
 
 inline RunSummary summarize(const RunRecord& run) {
   RunSummary s;

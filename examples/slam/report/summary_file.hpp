@@ -94,8 +94,8 @@ inline std::string json_value(double value) {
   return text;
 }
 
-// One flat object of strings, numbers and null, as to_json_line writes it; any other JSON is refused. Values keep their text,
-// strings without quotes.
+// One flat object of strings, numbers and null, as to_json_line writes it; any other JSON is refused. Values keep their
+// text, strings without quotes.
 struct JsonField {
   std::string text;
   bool quoted = false;
@@ -152,7 +152,8 @@ inline bool parse(const JsonField& field, std::string& value) {
 inline bool parse(const JsonField& field, std::uint64_t& value) {
   char* end = nullptr;
   value = std::strtoull(field.text.c_str(), &end, 10);
-  return !field.quoted && !field.text.empty() && std::isdigit(static_cast<unsigned char>(field.text[0])) != 0 && *end == '\0';
+  return !field.quoted && !field.text.empty() && std::isdigit(static_cast<unsigned char>(field.text[0])) != 0 &&
+         *end == '\0';
 }
 inline bool parse(const JsonField& field, double& value) {
   if (field.quoted) return false;
@@ -185,8 +186,8 @@ inline std::optional<RunSummary> from_json_line(std::string_view line) {
   return complete ? std::optional<RunSummary>(summary) : std::nullopt;
 }
 
-// The runs of a file; none when it does not exist. Lines that do not parse, such as the last one of an experiment that was killed, are
-// left out: their runs are done again.
+// The runs of a file; none when it does not exist. Lines that do not parse, such as the last one of an experiment that
+// was killed, are left out: their runs are done again.
 inline std::vector<RunSummary> read_summaries(const std::filesystem::path& file) {
   std::vector<RunSummary> out;
   std::ifstream stream(file);

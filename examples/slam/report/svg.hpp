@@ -1,4 +1,5 @@
-// A small plotter: one axis pair as inline SVG, styled by the page through CSS classes. Points that are not finite interrupt a curve.
+// A small plotter: one axis pair as inline SVG, styled by the page through CSS classes. Points that are not finite
+// interrupt a curve.
 #pragma once
 
 #include <algorithm>
@@ -20,8 +21,8 @@ class Plot {
   // Size of the drawing in units of which the page shows about one per CSS pixel. `title` is for screen readers.
   Plot(const std::string& title, Axis x, Axis y, double width = 480, double height = 270, double left = usual_left)
       : x_(std::move(x)), y_(std::move(y)), width_(width), height_(height), left_(left) {
-    out_ = "<svg class=\"plot\" viewBox=\"0 0 " + number(width, 0) + ' ' + number(height, 0) + "\" role=\"img\" aria-label=\"" +
-           escape(title) + "\">";
+    out_ = "<svg class=\"plot\" viewBox=\"0 0 " + number(width, 0) + ' ' + number(height, 0) +
+           "\" role=\"img\" aria-label=\"" + escape(title) + "\">";
     for (const Tick& tick : x_.marks) {
       line(px(tick.value), top, px(tick.value), height - bottom, "grid-line");
       text(px(tick.value), height - bottom + 15, tick.label, "middle");
@@ -32,12 +33,13 @@ class Plot {
     }
     text((left_ + width - right) / 2, height - 6, x_.label, "middle");
     const double middle = (top + height - bottom) / 2;
-    out_ +=
-        "<text transform=\"translate(12 " + number(middle, 1) + ") rotate(-90)\" text-anchor=\"middle\">" + escape(y_.label) + "</text>";
+    out_ += "<text transform=\"translate(12 " + number(middle, 1) + ") rotate(-90)\" text-anchor=\"middle\">" +
+            escape(y_.label) + "</text>";
   }
 
   // Both axes in one scale, which the larger extent decides; height as needed, between 200 and 420.
-  static Plot equal_scale(const std::string& title, Range x, Range y, const std::string& x_label, const std::string& y_label) {
+  static Plot equal_scale(const std::string& title, Range x, Range y, const std::string& x_label,
+                          const std::string& y_label) {
     for (Range* r : {&x, &y}) {
       if (r->empty) r->add(0);
       const double margin = (std::max)(0.04 * r->size(), 0.005);
@@ -84,31 +86,33 @@ class Plot {
   // Path text of a box and of a point in the axes' units, clipped to the plot; many of one look make one shape.
   [[nodiscard]] std::string box(double x1, double y1, double x2, double y2) const {
     const double u1 = px(x1), u2 = px(x2), v1 = py(y1), v2 = py(y2);
-    return 'M' + number((std::min)(u1, u2), 1) + ' ' + number((std::min)(v1, v2), 1) + 'h' + number(std::abs(u2 - u1), 1) + 'v' +
-           number(std::abs(v2 - v1), 1) + 'h' + number(-std::abs(u2 - u1), 1) + 'z';
+    return 'M' + number((std::min)(u1, u2), 1) + ' ' + number((std::min)(v1, v2), 1) + 'h' +
+           number(std::abs(u2 - u1), 1) + 'v' + number(std::abs(v2 - v1), 1) + 'h' + number(-std::abs(u2 - u1), 1) +
+           'z';
   }
   [[nodiscard]] std::string point(double x, double y) const { return 'M' + number(px(x), 1) + ' ' + number(py(y), 1); }
 
   void shape(const std::string& path, const std::string& style, double opacity = 1) {
     if (path.empty()) return;
-    out_ += "<path class=\"" + escape(style) + "\" d=\"" + path + '"' + (opacity < 1 ? " fill-opacity=\"" + number(opacity, 2) + '"' : "") +
-            "/>";
+    out_ += "<path class=\"" + escape(style) + "\" d=\"" + path + '"' +
+            (opacity < 1 ? " fill-opacity=\"" + number(opacity, 2) + '"' : "") + "/>";
   }
 
   void dot(double x, double y, double radius, const std::string& style, const std::string& hint = {}) {
     if (!std::isfinite(x) || !std::isfinite(y)) return;
-    out_ += "<circle class=\"" + escape(style) + "\" cx=\"" + number(px(x), 1) + "\" cy=\"" + number(py(y), 1) + "\" r=\"" +
-            number(radius, 1) + "\">" + (hint.empty() ? std::string() : "<title>" + escape(hint) + "</title>") + "</circle>";
+    out_ += "<circle class=\"" + escape(style) + "\" cx=\"" + number(px(x), 1) + "\" cy=\"" + number(py(y), 1) +
+            "\" r=\"" + number(radius, 1) + "\">" +
+            (hint.empty() ? std::string() : "<title>" + escape(hint) + "</title>") + "</circle>";
   }
 
   // In drawing units.
   void line(double u1, double v1, double u2, double v2, const std::string& style) {
-    out_ += "<line class=\"" + escape(style) + "\" x1=\"" + number(u1, 1) + "\" y1=\"" + number(v1, 1) + "\" x2=\"" + number(u2, 1) +
-            "\" y2=\"" + number(v2, 1) + "\"/>";
+    out_ += "<line class=\"" + escape(style) + "\" x1=\"" + number(u1, 1) + "\" y1=\"" + number(v1, 1) + "\" x2=\"" +
+            number(u2, 1) + "\" y2=\"" + number(v2, 1) + "\"/>";
   }
   void text(double u, double v, const std::string& words, const char* anchor, const std::string& style = {}) {
-    out_ += "<text" + (style.empty() ? std::string() : " class=\"" + escape(style) + '"') + " x=\"" + number(u, 1) + "\" y=\"" +
-            number(v, 1) + "\" text-anchor=\"" + anchor + "\">" + escape(words) + "</text>";
+    out_ += "<text" + (style.empty() ? std::string() : " class=\"" + escape(style) + '"') + " x=\"" + number(u, 1) +
+            "\" y=\"" + number(v, 1) + "\" text-anchor=\"" + anchor + "\">" + escape(words) + "</text>";
   }
 
   [[nodiscard]] double width() const { return width_; }

@@ -38,7 +38,8 @@ inline void rank(const std::vector<Cell*>& cells, std::vector<double> values, in
   }
 }
 
-// Only figures with about the same coverage can be compared: not_known for those more than 2 points below the best covered one.
+// Only figures with about the same coverage can be compared: not_known for those more than 2 points below the best
+// covered one.
 inline std::vector<double> comparable(std::vector<double> values, const std::vector<double>& coverage_percent) {
   double best = 0;
   for (const double c : coverage_percent) best = c > best ? c : best;
@@ -53,7 +54,8 @@ inline Cell cell_of(const Spread& spread, int decimals) {
 }
 inline Cell cell_of(const Spread& spread, const Spread& coverage_percent, int decimals) {
   Cell cell = cell_of(spread, decimals);
-  if (coverage_percent.known > 0) cell.range += (cell.range.empty() ? "" : "; ") + number(coverage_percent.median, 1) + " %";
+  if (coverage_percent.known > 0)
+    cell.range += (cell.range.empty() ? "" : "; ") + number(coverage_percent.median, 1) + " %";
   return cell;
 }
 
@@ -85,7 +87,8 @@ class SystemTable {
     for (const auto& sequence : sequences_) {
       const PublishedError& e = row.error[sequence.first];
       any = any || std::isfinite(e.rmse);
-      cells.push_back({number(e.rmse, row.decimals), std::isfinite(e.sd) ? "S.D. " + number(e.sd, row.decimals) : "", Rank::none});
+      cells.push_back(
+          {number(e.rmse, row.decimals), std::isfinite(e.sd) ? "S.D. " + number(e.sd, row.decimals) : "", Rank::none});
       values_.push_back(ranked ? e.rmse : not_known);
     }
     if (any) {

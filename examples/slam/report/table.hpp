@@ -32,7 +32,9 @@ struct Table {
 // Text in a Markdown table's cell: the pipe and what would be read as mark-up. An underscore inside a word is none.
 inline std::string markdown_escape(const std::string& text) {
   std::string out;
-  const auto is_word = [&text](std::size_t k) { return k < text.size() && std::isalnum(static_cast<unsigned char>(text[k])) != 0; };
+  const auto is_word = [&text](std::size_t k) {
+    return k < text.size() && std::isalnum(static_cast<unsigned char>(text[k])) != 0;
+  };
   for (std::size_t k = 0; k < text.size(); ++k) {
     const char c = text[k];
     const bool underscore = c == '_' && !(k > 0 && is_word(k - 1) && is_word(k + 1));
@@ -62,7 +64,8 @@ inline std::string to_markdown(const Table& table) {
     out += '|';
     for (const Cell& cell : row) {
       const char* mark = cell.rank == Rank::best ? "**" : cell.rank == Rank::second ? "*" : "";
-      out += ' ' + (mark + markdown_escape(cell.text) + mark) + (cell.range.empty() ? "" : " (" + markdown_escape(cell.range) + ')') + " |";
+      out += ' ' + (mark + markdown_escape(cell.text) + mark) +
+             (cell.range.empty() ? "" : " (" + markdown_escape(cell.range) + ')') + " |";
     }
     out += '\n';
   }
@@ -72,7 +75,8 @@ inline std::string to_markdown(const Table& table) {
 
 // The parts of a range below each other: a column no wider than it must be.
 inline std::string in_lines(std::string range) {
-  for (std::size_t at = range.find("; "); at != std::string::npos; at = range.find("; ", at)) range.replace(at, 2, "<br>");
+  for (std::size_t at = range.find("; "); at != std::string::npos; at = range.find("; ", at))
+    range.replace(at, 2, "<br>");
   return range;
 }
 
@@ -86,7 +90,8 @@ inline std::string to_html(const Table& table) {
     out += table.own.count(static_cast<std::size_t>(&row - table.rows.data())) > 0 ? "<tr class=\"own\">" : "<tr>";
     for (std::size_t c = 0; c < row.size(); ++c) {
       const char* mark = row[c].rank == Rank::best ? "b" : row[c].rank == Rank::second ? "u" : "span";
-      out += std::string(c == 0 ? "<th scope=\"row\">" : "<td>") + '<' + mark + '>' + escape(row[c].text) + "</" + mark + '>' +
+      out += std::string(c == 0 ? "<th scope=\"row\">" : "<td>") + '<' + mark + '>' + escape(row[c].text) + "</" +
+             mark + '>' +
              (row[c].range.empty() ? "" : "<br><span class=\"range\">" + in_lines(escape(row[c].range)) + "</span>") +
              (c == 0 ? "</th>" : "</td>");
     }

@@ -42,13 +42,16 @@ inline std::string tables_html(const std::vector<RunSummary>& runs, const std::s
   return out;
 }
 
-// <base>.md and <base>.html. `machine` in a few words: processor, cores, compiler. Throws when a file cannot be written.
-inline void write_tables(const std::filesystem::path& base, const std::vector<RunSummary>& runs, const std::string& machine) {
+// <base>.md and <base>.html. `machine` in a few words: processor, cores, compiler. Throws when a file cannot be
+// written.
+inline void write_tables(const std::filesystem::path& base, const std::vector<RunSummary>& runs,
+                         const std::string& machine) {
   std::filesystem::path markdown = base, html = base;
   markdown += ".md";
   html += ".html";
   write_text(markdown, tables_markdown(runs, machine));
-  write_text(html, page("SLAM tables", "<h1>RGB-D SLAM with static probabilities: tables</h1>\n" + tables_html(runs, machine)));
+  write_text(html, page("SLAM tables",
+                        "<h1>RGB-D SLAM with static probabilities: tables</h1>\n" + tables_html(runs, machine)));
 }
 
 }  // namespace cfp_slam

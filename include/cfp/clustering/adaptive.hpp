@@ -1,6 +1,7 @@
 /// @file adaptive.hpp
-/// eps and min_pts of the depth clustering from the depths themselves (paper IV-C: "we adaptively determine eps and minPts",
-/// without saying how). All rules stand behind one enum; `dbscan_study` compares them and is why the default is the default.
+/// eps and min_pts of the depth clustering from the depths themselves (paper IV-C: "we adaptively determine eps and
+/// minPts", without saying how). All rules stand behind one enum; `dbscan_study` compares them and is why the default
+/// is the default.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +21,8 @@ namespace cfp {
 /// One standard deviation of a depth measurement, in metres: constant + quadratic (z - nearest)^2.
 struct DepthNoise {
   double constant_m = 0.0012;  ///< >= 0
-  double quadratic = 0.0019;   ///< 1/m, >= 0; for stereo: constant_m 0, nearest_m 0, quadratic = sigma_disparity_px / (fx_px baseline_m)
+  double quadratic = 0.0019;   ///< 1/m, >= 0; for stereo: constant_m 0, nearest_m 0, quadratic = sigma_disparity_px /
+                               ///< (fx_px baseline_m)
   double nearest_m = 0.4;      ///< defaults: structured light, Nguyen, Izadi and Lovell, 3DIMPVT 2012
 
   /// Example: 0.0140 m at z = 3 m with the defaults.
@@ -41,23 +43,30 @@ struct AdaptiveOptions {
   AdaptiveRule rule = AdaptiveRule::foreground_density;
   DbscanOptions fixed;  ///< for `fixed`, and where a rule has too few values to work on
   DepthNoise noise;
-  double noise_factor = 3.0;    ///< eps of every rule but `fixed` is at least so many sigmas at the foreground's depth; >= 0
-  double min_eps_m = 0.1;       ///< foreground_density: smallest radius; a smaller one tears bodies, limbs become background; > 0
-  double max_eps_m = 0.3;       ///< foreground_density: a larger one bridges to the wall; >= min_eps_m
-  double spacing_factor = 3.0;  ///< foreground_density: eps follows so many mean spacings, for boxes with few points; > 0
-  double min_share = 0.15;      ///< nearer ones may be a hand or spray: the foreground's depth is read at this share of all; (0, 1)
-  double min_density = 0.15;    ///< foreground_density: first share of the foreground's density that a core point must have; (0, 1]
-  double max_density = 0.6;     ///< foreground_density: last share tried; [min_density, 1]
-  double body_depth_m = 0.5;    ///< foreground_density: the share is raised while the foreground reaches farther behind its depth; > 0
-  double k_factor = 3.0;        ///< k_distance_median; > 0
-  double k_fraction = 0.05;     ///< k_distance_median: k = max(2, fraction of n); (0, 1)
+  double noise_factor =
+      3.0;  ///< eps of every rule but `fixed` is at least so many sigmas at the foreground's depth; >= 0
+  double min_eps_m =
+      0.1;  ///< foreground_density: smallest radius; a smaller one tears bodies, limbs become background; > 0
+  double max_eps_m = 0.3;  ///< foreground_density: a larger one bridges to the wall; >= min_eps_m
+  double spacing_factor =
+      3.0;  ///< foreground_density: eps follows so many mean spacings, for boxes with few points; > 0
+  double min_share =
+      0.15;  ///< nearer ones may be a hand or spray: the foreground's depth is read at this share of all; (0, 1)
+  double min_density =
+      0.15;  ///< foreground_density: first share of the foreground's density that a core point must have; (0, 1]
+  double max_density = 0.6;  ///< foreground_density: last share tried; [min_density, 1]
+  double body_depth_m =
+      0.5;  ///< foreground_density: the share is raised while the foreground reaches farther behind its depth; > 0
+  double k_factor = 3.0;     ///< k_distance_median; > 0
+  double k_fraction = 0.05;  ///< k_distance_median: k = max(2, fraction of n); (0, 1)
 };
 
 [[nodiscard]] constexpr const char* invalid_field(const AdaptiveOptions& o) noexcept {
   if (const char* field = invalid_field(o.fixed)) return field;
   const auto positive = [](double x) { return x > 0.0 && is_finite(x); };
   const auto non_negative = [](double x) { return x >= 0.0 && is_finite(x); };
-  if (!non_negative(o.noise.constant_m) || !non_negative(o.noise.quadratic) || !is_finite(o.noise.nearest_m)) return "noise";
+  if (!non_negative(o.noise.constant_m) || !non_negative(o.noise.quadratic) || !is_finite(o.noise.nearest_m))
+    return "noise";
   if (!non_negative(o.noise_factor)) return "noise_factor";
   if (!positive(o.min_eps_m)) return "min_eps_m";
   if (!(o.max_eps_m >= o.min_eps_m) || !is_finite(o.max_eps_m)) return "max_eps_m";
@@ -87,7 +96,8 @@ constexpr std::size_t foreground_position(std::size_t n, const AdaptiveOptions& 
 
 // The last core point of the first cluster that ends at or behind position `least`; n when no cluster does.
 template <typename Scalar>
-std::size_t foreground_end(span<const Scalar> values, Scalar eps, std::size_t least, const std::vector<unsigned char>& core) noexcept {
+std::size_t foreground_end(span<const Scalar> values, Scalar eps, std::size_t least,
+                           const std::vector<unsigned char>& core) noexcept {
   const std::size_t n = values.size();
   std::size_t last = n;
   for (std::size_t i = 0; i < n; ++i) {
@@ -102,9 +112,11 @@ template <typename Scalar>
 DbscanOptions density_options(span<const Scalar> depths, const AdaptiveOptions& options, double floor_m, std::size_t at,
                               AdaptiveWorkspace<Scalar>& workspace) {
   const std::size_t n = depths.size();
-  const auto around = (std::max)(std::size_t(3), static_cast<std::size_t>(std::lround(0.5 * std::sqrt(static_cast<double>(n)))));
+  const auto around =
+      (std::max)(std::size_t(3), static_cast<std::size_t>(std::lround(0.5 * std::sqrt(static_cast<double>(n)))));
   const std::size_t low = at > around ? at - around : 0, high = (std::min)(n - 1, at + around);
-  const double spacing = (static_cast<double>(depths[high]) - static_cast<double>(depths[low])) / static_cast<double>(high - low);
+  const double spacing =
+      (static_cast<double>(depths[high]) - static_cast<double>(depths[low])) / static_cast<double>(high - low);
   DbscanOptions chosen;
   chosen.eps = (std::min)((std::max)(options.min_eps_m, options.spacing_factor * spacing), options.max_eps_m);
   chosen.eps = (std::max)(chosen.eps, floor_m);
@@ -118,7 +130,8 @@ DbscanOptions density_options(span<const Scalar> depths, const AdaptiveOptions& 
 
   std::size_t nearest = n, tried = 0;
   for (double share = options.min_density; share <= options.max_density; share *= 1.4) {
-    const auto min_pts = (std::max)(std::size_t(2), static_cast<std::size_t>(std::ceil(share * static_cast<double>(peak))));
+    const auto min_pts =
+        (std::max)(std::size_t(2), static_cast<std::size_t>(std::ceil(share * static_cast<double>(peak))));
     if (min_pts == tried) continue;
     tried = min_pts;
     find_core_points(depths, eps, min_pts, workspace.core);
@@ -134,13 +147,13 @@ DbscanOptions density_options(span<const Scalar> depths, const AdaptiveOptions& 
 }  // namespace detail
 
 /// eps (metres) and min_pts for depths that are valid and ascending.
-/// The default reads the foreground's depth z at `min_share`, sets eps to `spacing_factor` mean spacings around it within
-/// [min_eps_m, max_eps_m], counts the neighbours of the points up to z + eps, and asks of a core point `min_density` of the
-/// largest count, at least 2. So min_pts grows with n and with the density of the foreground, not of the wall. While the foreground
-/// then reaches more than `body_depth_m` behind z, that share is raised by 1.4: what connects a body to a wall or to a
-/// slanted plane is thinner than the body. The share with the nearest end stands.
-/// Fewer than three depths, or an eps that overflows: `fixed`. eps of every other rule is at least noise_factor sigmas at z.
-/// O(n), but O(n min(n / 2, 200)) for KANN and O(n k) for the median. Allocates only when the workspace grows.
+/// The default reads the foreground's depth z at `min_share`, sets eps to `spacing_factor` mean spacings around it
+/// within [min_eps_m, max_eps_m], counts the neighbours of the points up to z + eps, and asks of a core point
+/// `min_density` of the largest count, at least 2. So min_pts grows with n and with the density of the foreground, not
+/// of the wall. While the foreground then reaches more than `body_depth_m` behind z, that share is raised by 1.4: what
+/// connects a body to a wall or to a slanted plane is thinner than the body. The share with the nearest end stands.
+/// Fewer than three depths, or an eps that overflows: `fixed`. eps of every other rule is at least noise_factor sigmas
+/// at z. O(n), but O(n min(n / 2, 200)) for KANN and O(n k) for the median. Allocates only when the workspace grows.
 /// Source: ours; paper IV-C leaves it open.
 template <typename Scalar>
 [[nodiscard]] DbscanOptions adaptive_options(span<const Scalar> depths, const AdaptiveOptions& options,

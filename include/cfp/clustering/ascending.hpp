@@ -15,7 +15,8 @@
 
 namespace cfp {
 
-/// Sorted values; value i stood at `index[i]` of the input. Views into the workspace that made them, valid until its next use.
+/// Sorted values; value i stood at `index[i]` of the input. Views into the workspace that made them, valid until its
+/// next use.
 template <typename Scalar>
 struct Ascending {
   span<const Scalar> values;
@@ -36,8 +37,9 @@ struct AscendingWorkspace {
 
 namespace detail {
 
-// Two counting passes over 2 * digit_bits bits of the value's position between the smallest and the largest; what shares a
-// position keeps its order. Monotone in floating point, so the result is sorted but for values nearer than range / 4^digit_bits.
+// Two counting passes over 2 * digit_bits bits of the value's position between the smallest and the largest; what
+// shares a position keeps its order. Monotone in floating point, so the result is sorted but for values nearer than
+// range / 4^digit_bits.
 template <int digit_bits, typename Scalar>
 void counting_sort(Scalar low, Scalar scale, AscendingWorkspace<Scalar>& workspace) noexcept {
   constexpr std::size_t buckets = std::size_t(1) << digit_bits;
@@ -87,8 +89,9 @@ bool insertion_sort(Scalar* values, std::uint32_t* index, std::size_t n, std::si
 template <typename Scalar>
 void comparison_sort(AscendingWorkspace<Scalar>& workspace) noexcept {
   using Item = typename AscendingWorkspace<Scalar>::Item;
-  std::sort(workspace.items.begin(), workspace.items.end(),
-            [](const Item& a, const Item& b) { return a.value < b.value || (!(b.value < a.value) && a.index < b.index); });
+  std::sort(workspace.items.begin(), workspace.items.end(), [](const Item& a, const Item& b) {
+    return a.value < b.value || (!(b.value < a.value) && a.index < b.index);
+  });
   for (std::size_t i = 0; i < workspace.items.size(); ++i) {
     workspace.values[i] = workspace.items[i].value;
     workspace.index[i] = workspace.items[i].index;
@@ -97,9 +100,9 @@ void comparison_sort(AscendingWorkspace<Scalar>& workspace) noexcept {
 
 }  // namespace detail
 
-/// Those of `values` for which `keep(value)` holds, ascending, equal values by ascending index (-0 equals +0). `keep` must
-/// refuse NaN and infinities. Counting passes over the value's position in the range, finished by insertion; O(n) for
-/// values without wild outliers, at worst (one outlier that presses all others together) std::sort's O(n log n).
+/// Those of `values` for which `keep(value)` holds, ascending, equal values by ascending index (-0 equals +0). `keep`
+/// must refuse NaN and infinities. Counting passes over the value's position in the range, finished by insertion; O(n)
+/// for values without wild outliers, at worst (one outlier that presses all others together) std::sort's O(n log n).
 template <typename Scalar, typename Keep>
 Ascending<Scalar> sort_ascending(span<const Scalar> values, AscendingWorkspace<Scalar>& workspace, const Keep& keep) {
   CFP_ASSERT(values.size() < 0xffffffffU);
@@ -119,8 +122,8 @@ Ascending<Scalar> sort_ascending(span<const Scalar> values, AscendingWorkspace<S
   workspace.values.resize(n);
   workspace.index.resize(n);
 
-  // Measured: below about 40 values the counters cost more than plain insertion; two 8-bit digits win up to about 1500 values,
-  // beyond they leave too much to insertion.
+  // Measured: below about 40 values the counters cost more than plain insertion; two 8-bit digits win up to about 1500
+  // values, beyond they leave too much to insertion.
   const bool few = n < 40;
   const int digit_bits = n < 1500 ? 8 : 11;
   const Scalar positions = static_cast<Scalar>((1L << (2 * digit_bits)) - 2);
@@ -135,7 +138,8 @@ Ascending<Scalar> sort_ascending(span<const Scalar> values, AscendingWorkspace<S
   } else {
     detail::counting_sort<11>(low, scale, workspace);
   }
-  if (!detail::insertion_sort(workspace.values.data(), workspace.index.data(), n, few ? n * n : 8 * n)) detail::comparison_sort(workspace);
+  if (!detail::insertion_sort(workspace.values.data(), workspace.index.data(), n, few ? n * n : 8 * n))
+    detail::comparison_sort(workspace);
   return {workspace.values, workspace.index};
 }
 

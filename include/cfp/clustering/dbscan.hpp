@@ -21,7 +21,7 @@ namespace cfp {
 inline constexpr int dbscan_noise = -1;
 
 struct DbscanOptions {
-  double eps = 0.15;        ///< radius of the neighbourhood, unit of the values, finite, >= 0; |a - b| <= eps are neighbours
+  double eps = 0.15;  ///< radius of the neighbourhood, unit of the values, finite, >= 0; |a - b| <= eps are neighbours
   std::size_t min_pts = 5;  ///< a value with at least so many neighbours, itself included, is a core point; >= 1
 };
 
@@ -50,7 +50,8 @@ namespace detail {
 // eps in the type of the values; a finite double beyond the range of float counts as the largest float.
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar radius(double eps) noexcept {
-  return eps < static_cast<double>((std::numeric_limits<Scalar>::max)()) ? static_cast<Scalar>(eps) : (std::numeric_limits<Scalar>::max)();
+  return eps < static_cast<double>((std::numeric_limits<Scalar>::max)()) ? static_cast<Scalar>(eps)
+                                                                         : (std::numeric_limits<Scalar>::max)();
 }
 
 // core[i] = whether at least min_pts of the ascending values lie within eps of value i.
@@ -61,9 +62,11 @@ void find_core_points(span<const Scalar> values, Scalar eps, std::size_t min_pts
   if (min_pts > n) return;
   const Scalar* v = values.data();
   const std::size_t reach = min_pts - 1;
-  // One-sided test first: whoever has min_pts values within eps on one side alone. It settles nearly all core points and vectorises.
+  // One-sided test first: whoever has min_pts values within eps on one side alone. It settles nearly all core points
+  // and vectorises.
   for (std::size_t i = 0; i < n - reach; ++i) core[i] = v[i + reach] - v[i] <= eps ? 1 : 0;
-  for (std::size_t i = reach; i < n; ++i) core[i] = static_cast<unsigned char>(core[i] | (v[i] - v[i - reach] <= eps ? 1 : 0));
+  for (std::size_t i = reach; i < n; ++i)
+    core[i] = static_cast<unsigned char>(core[i] | (v[i] - v[i - reach] <= eps ? 1 : 0));
   // The rest: the first of the min_pts - 1 values before i that is a neighbour starts the only run that can suffice.
   for (std::size_t i = 0; i < n; ++i) {
     if (core[i] != 0) continue;
@@ -81,7 +84,8 @@ void find_core_points(span<const Scalar> values, Scalar eps, std::size_t min_pts
 
 // Calls emit(i, label) once for every ascending value i.
 template <typename Scalar, typename Emit>
-DbscanResult sweep(span<const Scalar> values, const DbscanOptions& options, std::vector<unsigned char>& core, const Emit& emit) {
+DbscanResult sweep(span<const Scalar> values, const DbscanOptions& options, std::vector<unsigned char>& core,
+                   const Emit& emit) {
   DbscanResult result;
   const std::size_t n = values.size();
   if (invalid_field(options) != nullptr) {
@@ -121,11 +125,11 @@ DbscanResult sweep(span<const Scalar> values, const DbscanOptions& options, std:
 
 }  // namespace detail
 
-/// DBSCAN of values that are finite and ascending already (asserted in debug builds): `labels[i]` belongs to `values[i]`.
-/// As `dbscan` otherwise. O(n log min_pts), in practice O(n).
+/// DBSCAN of values that are finite and ascending already (asserted in debug builds): `labels[i]` belongs to
+/// `values[i]`. As `dbscan` otherwise. O(n log min_pts), in practice O(n).
 template <typename Scalar>
-DbscanResult dbscan_ascending(span<const Scalar> values, const DbscanOptions& options, DbscanWorkspace<Scalar>& workspace,
-                              span<int> labels) {
+DbscanResult dbscan_ascending(span<const Scalar> values, const DbscanOptions& options,
+                              DbscanWorkspace<Scalar>& workspace, span<int> labels) {
   CFP_ASSERT(labels.size() == values.size());
   CFP_ASSERT(std::is_sorted(values.begin(), values.end()));
   int* out = labels.data();
@@ -133,16 +137,19 @@ DbscanResult dbscan_ascending(span<const Scalar> values, const DbscanOptions& op
 }
 
 /// Labels every value: clusters are numbered by ascending position, `dbscan_noise` marks the rest.
-/// Core point: at least min_pts values, itself included, within eps (inclusive). Core points within eps of each other share a
-/// cluster. A border point (not core, but within eps of a core point) joins its nearest core point; of two equally near ones
-/// the lower value (which leaves no choice: equal values are core together and share their cluster). So the labels depend on
-/// the values alone and not on their order. Distances are differences as rounded in Scalar; eps is rounded to Scalar.
-/// NaN and infinite values are noise. O(n log n), in practice O(n); deterministic; allocates only when the workspace grows.
-/// Departure: the original lets a border point join the cluster that happens to find it first.
+/// Core point: at least min_pts values, itself included, within eps (inclusive). Core points within eps of each other
+/// share a cluster. A border point (not core, but within eps of a core point) joins its nearest core point; of two
+/// equally near ones the lower value (which leaves no choice: equal values are core together and share their cluster).
+/// So the labels depend on the values alone and not on their order. Distances are differences as rounded in Scalar; eps
+/// is rounded to Scalar. NaN and infinite values are noise. O(n log n), in practice O(n); deterministic; allocates only
+/// when the workspace grows. Departure: the original lets a border point join the cluster that happens to find it
+/// first.
 template <typename Scalar>
-DbscanResult dbscan(span<const Scalar> values, const DbscanOptions& options, DbscanWorkspace<Scalar>& workspace, span<int> labels) {
+DbscanResult dbscan(span<const Scalar> values, const DbscanOptions& options, DbscanWorkspace<Scalar>& workspace,
+                    span<int> labels) {
   CFP_ASSERT(labels.size() == values.size());
-  const Ascending<Scalar> ascending = sort_ascending(values, workspace.ascending, [](Scalar value) { return is_finite(value); });
+  const Ascending<Scalar> ascending =
+      sort_ascending(values, workspace.ascending, [](Scalar value) { return is_finite(value); });
   int* out = labels.data();
   const std::size_t invalid = values.size() - ascending.values.size();
   if (invalid > 0) std::fill(out, out + values.size(), dbscan_noise);

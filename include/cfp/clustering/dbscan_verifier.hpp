@@ -44,8 +44,12 @@ DbscanVerdict verify_dbscan(span<const Scalar> values, const DbscanOptions& opti
   const std::size_t n = values.size();
   if (labels.size() != n) return {DbscanFault::label_count, 0};
   const Scalar eps = detail::radius<Scalar>(options.eps);
-  const auto distance = [&](std::size_t a, std::size_t b) { return values[a] < values[b] ? values[b] - values[a] : values[a] - values[b]; };
-  const auto near = [&](std::size_t a, std::size_t b) { return is_finite(values[a]) && is_finite(values[b]) && distance(a, b) <= eps; };
+  const auto distance = [&](std::size_t a, std::size_t b) {
+    return values[a] < values[b] ? values[b] - values[a] : values[a] - values[b];
+  };
+  const auto near = [&](std::size_t a, std::size_t b) {
+    return is_finite(values[a]) && is_finite(values[b]) && distance(a, b) <= eps;
+  };
 
   std::vector<char> core(n, 0);
   for (std::size_t i = 0; i < n; ++i) {
@@ -85,8 +89,10 @@ DbscanVerdict verify_dbscan(span<const Scalar> values, const DbscanOptions& opti
         if (core[j] == 0) continue;
         if (component[i] == component[j] && labels[i] != labels[j]) report(DbscanFault::cluster_torn, i);
         if (component[i] != component[j] && labels[i] == labels[j]) report(DbscanFault::clusters_joined, i);
-        if (strictness.ascending_numbers && values[j] < values[i] && labels[j] > labels[i]) report(DbscanFault::numbering, i);
-        if (strictness.ascending_numbers && values[i] < values[j] && labels[i] > labels[j]) report(DbscanFault::numbering, i);
+        if (strictness.ascending_numbers && values[j] < values[i] && labels[j] > labels[i])
+          report(DbscanFault::numbering, i);
+        if (strictness.ascending_numbers && values[i] < values[j] && labels[i] > labels[j])
+          report(DbscanFault::numbering, i);
       }
       continue;
     }
@@ -95,8 +101,8 @@ DbscanVerdict verify_dbscan(span<const Scalar> values, const DbscanOptions& opti
     for (std::size_t j = 0; j < n; ++j) {
       if (core[j] == 0 || !near(i, j)) continue;
       own = own || labels[j] == labels[i];
-      const bool better =
-          nearest == n || distance(i, j) < distance(i, nearest) || (distance(i, j) == distance(i, nearest) && values[j] < values[nearest]);
+      const bool better = nearest == n || distance(i, j) < distance(i, nearest) ||
+                          (distance(i, j) == distance(i, nearest) && values[j] < values[nearest]);
       if (better) nearest = j;
     }
     if (nearest == n) {

@@ -1,6 +1,6 @@
 /// @file depth_foreground.hpp
-/// Which keypoints of a person's box lie on the person and which on what is behind (paper IV-C, "DBSCAN density clustering
-/// algorithm"): depth clustering, then the nearest layer. Depths in metres, one call per box.
+/// Which keypoints of a person's box lie on the person and which on what is behind (paper IV-C, "DBSCAN density
+/// clustering algorithm"): depth clustering, then the nearest layer. Depths in metres, one call per box.
 #pragma once
 
 #include <algorithm>
@@ -19,9 +19,10 @@ namespace cfp {
 
 struct ForegroundOptions {
   AdaptiveOptions adaptive;
-  double merge_gap_m = 0.2;    ///< a cluster that begins so near behind the foreground and ends within body_depth_m joins it; >= 0, 0: none
-  std::size_t min_points = 6;  ///< fewer valid depths: too_few_points; >= 1
-  std::size_t sure_points = 18;       ///< with fewer valid depths the split must also hold for a smaller and a larger eps
+  double merge_gap_m = 0.2;  ///< a cluster that begins so near behind the foreground and ends within body_depth_m joins
+                             ///< it; >= 0, 0: none
+  std::size_t min_points = 6;    ///< fewer valid depths: too_few_points; >= 1
+  std::size_t sure_points = 18;  ///< with fewer valid depths the split must also hold for a smaller and a larger eps
   bool invalid_is_foreground = true;  ///< label of points without a valid depth: true is the safe side
 };
 
@@ -31,8 +32,8 @@ struct ForegroundOptions {
   return options.min_points >= 1 ? nullptr : "min_points";
 }
 
-/// Every way of ending but `ok` says that the depths cannot tell, and labels every point with a valid depth foreground: the safe
-/// side, as the paper gives foreground points of a moving person the probability 0.
+/// Every way of ending but `ok` says that the depths cannot tell, and labels every point with a valid depth foreground:
+/// the safe side, as the paper gives foreground points of a moving person the probability 0.
 enum class ForegroundStatus : std::uint8_t {
   ok,
   too_few_points,  ///< fewer valid depths than min_points
@@ -77,8 +78,9 @@ namespace detail {
 
 // How many of the ascending depths belong to the foreground under these parameters; 0 for none.
 template <typename Scalar>
-std::size_t foreground_count(span<const Scalar> depths, const DbscanOptions& parameters, const ForegroundOptions& options,
-                             ForegroundWorkspace<Scalar>& workspace, std::size_t& clusters) {
+std::size_t foreground_count(span<const Scalar> depths, const DbscanOptions& parameters,
+                             const ForegroundOptions& options, ForegroundWorkspace<Scalar>& workspace,
+                             std::size_t& clusters) {
   const std::size_t n = depths.size();
   workspace.labels.resize(n);
   clusters = dbscan_ascending(depths, parameters, workspace.dbscan, span<int>(workspace.labels)).clusters;
@@ -107,21 +109,23 @@ std::size_t foreground_count(span<const Scalar> depths, const DbscanOptions& par
 
 }  // namespace detail
 
-/// mask[i] = 1 for foreground, 0 for background. Clusters the valid depths (finite, > 0) with `adaptive_options`. The foreground ends
-/// where the first cluster ends that reaches past the nearest `adaptive.min_share` of the points; a cluster that begins within
-/// `merge_gap_m` behind it, and ends within `adaptive.body_depth_m` of the foreground's depth, joins it; everything nearer goes with
-/// it, smaller clusters (a hand) and noise (spray at silhouettes) alike. The result is a cut in depth.
-/// Fewer than `sure_points` valid depths: the split is repeated with eps x 0.7 and x 1.4, and unless both agree to within one
-/// point in ten, the status is `unstable`. One cluster only is `ok`: everything is foreground because it is one layer.
-/// Points without a valid depth take no part and get the label `invalid_is_foreground` says, whatever the status.
-/// O(n log n), in practice O(n); deterministic; permuting the points permutes the mask; allocates only when the workspace grows.
-/// Departures from the paper, which takes the cluster of the lowest mean depth (dbscan_study shows what they bring): the minimum share,
-/// for without it a tiny near cluster wins; and joining, for plain clothes leave gaps in a body.
+/// mask[i] = 1 for foreground, 0 for background. Clusters the valid depths (finite, > 0) with `adaptive_options`. The
+/// foreground ends where the first cluster ends that reaches past the nearest `adaptive.min_share` of the points; a
+/// cluster that begins within `merge_gap_m` behind it, and ends within `adaptive.body_depth_m` of the foreground's
+/// depth, joins it; everything nearer goes with it, smaller clusters (a hand) and noise (spray at silhouettes) alike.
+/// The result is a cut in depth. Fewer than `sure_points` valid depths: the split is repeated with eps x 0.7 and x 1.4,
+/// and unless both agree to within one point in ten, the status is `unstable`. One cluster only is `ok`: everything is
+/// foreground because it is one layer. Points without a valid depth take no part and get the label
+/// `invalid_is_foreground` says, whatever the status. O(n log n), in practice O(n); deterministic; permuting the points
+/// permutes the mask; allocates only when the workspace grows. Departures from the paper, which takes the cluster of
+/// the lowest mean depth (dbscan_study shows what they bring): the minimum share, for without it a tiny near cluster
+/// wins; and joining, for plain clothes leave gaps in a body.
 template <typename Scalar>
-ForegroundResult depth_foreground(span<const Scalar> depths_m, const ForegroundOptions& options, ForegroundWorkspace<Scalar>& workspace,
-                                  span<char> mask) {
+ForegroundResult depth_foreground(span<const Scalar> depths_m, const ForegroundOptions& options,
+                                  ForegroundWorkspace<Scalar>& workspace, span<char> mask) {
   CFP_ASSERT(mask.size() == depths_m.size());
-  const Ascending<Scalar> ascending = sort_ascending(depths_m, workspace.ascending, [](Scalar depth) { return is_valid_depth(depth); });
+  const Ascending<Scalar> ascending =
+      sort_ascending(depths_m, workspace.ascending, [](Scalar depth) { return is_valid_depth(depth); });
   const span<const Scalar> depths = ascending.values;
   const std::size_t n = depths.size();
   ForegroundResult result;
@@ -136,8 +140,8 @@ ForegroundResult depth_foreground(span<const Scalar> depths_m, const ForegroundO
     if (count > 0 && n < options.sure_points) {
       for (const double factor : {0.7, 1.4}) {
         std::size_t clusters = 0;
-        const std::size_t other =
-            detail::foreground_count(depths, {result.dbscan.eps * factor, result.dbscan.min_pts}, options, workspace, clusters);
+        const std::size_t other = detail::foreground_count(depths, {result.dbscan.eps * factor, result.dbscan.min_pts},
+                                                           options, workspace, clusters);
         if (10 * (other > count ? other - count : count - other) > n) result.status = ForegroundStatus::unstable;
       }
     }

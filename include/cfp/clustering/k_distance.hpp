@@ -1,6 +1,7 @@
 /// @file k_distance.hpp
 /// Rules of the literature that read DBSCAN's eps and min_pts off the distances to the k-th neighbour (k-distance
-/// median, k-distance knee, KANN-DBSCAN), on ascending values, where a neighbour search is a walk. `adaptive.hpp` offers them by name.
+/// median, k-distance knee, KANN-DBSCAN), on ascending values, where a neighbour search is a walk. `adaptive.hpp`
+/// offers them by name.
 #pragma once
 
 #include <algorithm>
@@ -32,7 +33,8 @@ void start_k_distances(std::size_t n, KDistanceWorkspace<Scalar>& workspace) {
   for (std::size_t i = 0; i < n; ++i) workspace.first[i] = i;
 }
 
-// From the k-th to the (k + 1)-th neighbour of every value: the run [first, first + k] grows by its nearer outer neighbour.
+// From the k-th to the (k + 1)-th neighbour of every value: the run [first, first + k] grows by its nearer outer
+// neighbour.
 template <typename Scalar>
 void next_k_distances(span<const Scalar> values, std::size_t k, KDistanceWorkspace<Scalar>& workspace) noexcept {
   const std::size_t n = values.size();
@@ -46,18 +48,20 @@ void next_k_distances(span<const Scalar> values, std::size_t k, KDistanceWorkspa
 
 }  // namespace detail
 
-/// Distance of every ascending, finite value to its k-th nearest other value, into `workspace.distances`, in the order of the
-/// values. k is cut to n - 1. O(n k). Empty for n < 2.
+/// Distance of every ascending, finite value to its k-th nearest other value, into `workspace.distances`, in the order
+/// of the values. k is cut to n - 1. O(n k). Empty for n < 2.
 template <typename Scalar>
 void k_distances(span<const Scalar> values, std::size_t k, KDistanceWorkspace<Scalar>& workspace) {
   detail::start_k_distances(values.size() < 2 ? 0 : values.size(), workspace);
   if (values.size() < 2) return;
-  for (std::size_t have = 0; have < (std::min)(k, values.size() - 1); ++have) detail::next_k_distances(values, have, workspace);
+  for (std::size_t have = 0; have < (std::min)(k, values.size() - 1); ++have)
+    detail::next_k_distances(values, have, workspace);
 }
 
 /// Median of the k-distances; 0 for n < 2. Reorders `workspace.distances`.
 template <typename Scalar>
-[[nodiscard]] Scalar median_k_distance(span<const Scalar> values, std::size_t k, KDistanceWorkspace<Scalar>& workspace) {
+[[nodiscard]] Scalar median_k_distance(span<const Scalar> values, std::size_t k,
+                                       KDistanceWorkspace<Scalar>& workspace) {
   k_distances(values, k, workspace);
   if (workspace.distances.empty()) return Scalar(0);
   const auto middle = workspace.distances.begin() + static_cast<std::ptrdiff_t>(workspace.distances.size() / 2);
@@ -65,8 +69,9 @@ template <typename Scalar>
   return *middle;
 }
 
-/// The knee of the ascending k-distance curve: its point farthest below the chord from first to last (Ester et al. read it by
-/// eye; the chord is the usual automation, Satopaa et al. 2011). The first of equals; 0 for n < 2. Sorts `workspace.distances`.
+/// The knee of the ascending k-distance curve: its point farthest below the chord from first to last (Ester et al. read
+/// it by eye; the chord is the usual automation, Satopaa et al. 2011). The first of equals; 0 for n < 2. Sorts
+/// `workspace.distances`.
 template <typename Scalar>
 [[nodiscard]] Scalar knee_k_distance(span<const Scalar> values, std::size_t k, KDistanceWorkspace<Scalar>& workspace) {
   k_distances(values, k, workspace);
@@ -88,12 +93,12 @@ template <typename Scalar>
 }
 
 /// KANN-DBSCAN (Li, Zhang, Dong, Xu 2019): for K = 1, 2, … eps is the mean K-distance and min_pts the mean number of
-/// neighbours within it (each value itself included); the first number of clusters that stays for `stable` consecutive K
-/// is believed, and the largest K of that run is taken. At most `max_k` are tried; without a stable run the last tried stands.
-/// O(n max_k): what is cubic in general is affordable on ascending values. `fallback` for n < 2.
+/// neighbours within it (each value itself included); the first number of clusters that stays for `stable` consecutive
+/// K is believed, and the largest K of that run is taken. At most `max_k` are tried; without a stable run the last
+/// tried stands. O(n max_k): what is cubic in general is affordable on ascending values. `fallback` for n < 2.
 template <typename Scalar>
-[[nodiscard]] DbscanOptions kann_options(span<const Scalar> values, std::size_t stable, std::size_t max_k, const DbscanOptions& fallback,
-                                         KDistanceWorkspace<Scalar>& workspace) {
+[[nodiscard]] DbscanOptions kann_options(span<const Scalar> values, std::size_t stable, std::size_t max_k,
+                                         const DbscanOptions& fallback, KDistanceWorkspace<Scalar>& workspace) {
   const std::size_t n = values.size();
   if (n < 2) return fallback;
   workspace.labels.resize(n);
@@ -104,7 +109,8 @@ template <typename Scalar>
     detail::next_k_distances(values, k, workspace);
     DbscanOptions trial;
     trial.eps = 0;
-    for (const Scalar distance : workspace.distances) trial.eps += static_cast<double>(distance) / static_cast<double>(n);
+    for (const Scalar distance : workspace.distances)
+      trial.eps += static_cast<double>(distance) / static_cast<double>(n);
     if (!is_finite(trial.eps)) return fallback;
     const Scalar eps = detail::radius<Scalar>(trial.eps);
     double pairs = 0;  // ordered pairs within eps, each value with itself included

@@ -12,9 +12,9 @@ namespace cfp {
 /// Tolerances by scalar type. Dual numbers take those of double.
 template <typename Scalar>
 struct Tolerance {
-  static constexpr double small_angle = 1e-5;   ///< rad; below it SO(3) formulas use their Taylor expansion
-  static constexpr double min_depth = 1e-6;     ///< m; points nearer to the camera plane are not projected
-  static constexpr double degenerate = 1e-12;   ///< relative; below it a denominator counts as zero
+  static constexpr double small_angle = 1e-5;  ///< rad; below it SO(3) formulas use their Taylor expansion
+  static constexpr double min_depth = 1e-6;    ///< m; points nearer to the camera plane are not projected
+  static constexpr double degenerate = 1e-12;  ///< relative; below it a denominator counts as zero
 };
 template <>
 struct Tolerance<float> {
@@ -39,7 +39,8 @@ template <typename Scalar>
   return x < Scalar(1) ? x : Scalar(1);
 }
 
-/// A depth measurement that can be used: finite and positive (ORB-SLAM2 marks missing depth with -1, sensors with 0 or NaN).
+/// A depth measurement that can be used: finite and positive (ORB-SLAM2 marks missing depth with -1, sensors with 0 or
+/// NaN).
 template <typename Scalar>
 [[nodiscard]] constexpr bool is_valid_depth(const Scalar& depth_m) noexcept {
   return depth_m > Scalar(0) && depth_m <= Scalar((std::numeric_limits<Scalar>::max)());

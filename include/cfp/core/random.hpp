@@ -1,6 +1,6 @@
 /// @file random.hpp
-/// The seeded generator of every sampling algorithm in cfp. The standard distributions differ between libraries, so their
-/// results would too; this one gives the same numbers everywhere.
+/// The seeded generator of every sampling algorithm in cfp. The standard distributions differ between libraries, so
+/// their results would too; this one gives the same numbers everywhere.
 #pragma once
 
 #include <cmath>
@@ -11,8 +11,8 @@
 
 namespace cfp {
 
-/// SplitMix64 (Steele, Lea, Flood: "Fast splittable pseudorandom number generators", 2014): 64 bits of state, period 2^64.
-/// Meets the standard's UniformRandomBitGenerator, so std::shuffle and RapidCheck-like tools accept it.
+/// SplitMix64 (Steele, Lea, Flood: "Fast splittable pseudorandom number generators", 2014): 64 bits of state, period
+/// 2^64. Meets the standard's UniformRandomBitGenerator, so std::shuffle and RapidCheck-like tools accept it.
 class Random {
  public:
   using result_type = std::uint64_t;

@@ -23,18 +23,22 @@ template <typename C, typename = void>
 struct is_strided_eigen : std::false_type {};
 // An Eigen block has data() and size() too, but its coefficients need not be adjacent; only plain objects are.
 template <typename C>
-struct is_strided_eigen<C, std::void_t<typename C::PlainObject>> : std::bool_constant<!std::is_same_v<typename C::PlainObject, C>> {};
+struct is_strided_eigen<C, std::void_t<typename C::PlainObject>>
+    : std::bool_constant<!std::is_same_v<typename C::PlainObject, C>> {};
 
-// By overload, not by partial specialisation: there Clang reports data() of std::vector<bool>, which is protected, as an error.
+// By overload, not by partial specialisation: there Clang reports data() of std::vector<bool>, which is protected, as
+// an error.
 struct no_data {};
 template <typename C, typename = decltype(std::declval<C&>().size())>
 auto data_of(int) -> decltype(std::declval<C&>().data());
 template <typename C>
 no_data* data_of(...);
 template <typename C>
-using data_element = std::remove_pointer_t<std::conditional_t<std::is_pointer_v<decltype(data_of<C>(0))>, decltype(data_of<C>(0)), no_data*>>;
+using data_element = std::remove_pointer_t<
+    std::conditional_t<std::is_pointer_v<decltype(data_of<C>(0))>, decltype(data_of<C>(0)), no_data*>>;
 template <typename C, typename T>
-struct is_contiguous_of : std::bool_constant<std::is_convertible_v<data_element<C> (*)[], T (*)[]> && !is_strided_eigen<std::remove_const_t<C>>::value> {};
+struct is_contiguous_of : std::bool_constant<std::is_convertible_v<data_element<C> (*)[], T (*)[]> &&
+                                             !is_strided_eigen<std::remove_const_t<C>>::value> {};
 
 template <typename T>
 struct is_span : std::false_type {};
@@ -45,14 +49,15 @@ template <typename T>
 struct same_type {
   using type = T;
 };
-/// T, not deduced: a parameter span<non_deduced<Scalar>> takes whatever converts, the scalar being given by another one.
+/// T, not deduced: a parameter span<non_deduced<Scalar>> takes whatever converts, the scalar being given by another
+/// one.
 template <typename T>
 using non_deduced = typename same_type<T>::type;
 
 }  // namespace detail
 
-/// Pointer and length, as C++20's std::span with dynamic extent. Converts from arrays, std::vector, std::array, std::span,
-/// plain Eigen vectors: whatever has data() and size() over adjacent elements.
+/// Pointer and length, as C++20's std::span with dynamic extent. Converts from arrays, std::vector, std::array,
+/// std::span, plain Eigen vectors: whatever has data() and size() over adjacent elements.
 template <typename T>
 class span {
  public:
@@ -64,10 +69,15 @@ class span {
   constexpr span(T* data, std::size_t size) noexcept : data_(data), size_(size) {}
   template <std::size_t N>
   constexpr span(T (&array)[N]) noexcept : data_(array), size_(N) {}
-  template <typename C, std::enable_if_t<!detail::is_span<std::remove_cv_t<C>>::value && detail::is_contiguous_of<C, T>::value, int> = 0>
+  template <
+      typename C,
+      std::enable_if_t<!detail::is_span<std::remove_cv_t<C>>::value && detail::is_contiguous_of<C, T>::value, int> = 0>
   constexpr span(C& container) noexcept : data_(container.data()), size_(static_cast<std::size_t>(container.size())) {}
-  template <typename C, std::enable_if_t<std::is_const_v<T> && !detail::is_span<C>::value && detail::is_contiguous_of<const C, T>::value, int> = 0>
-  constexpr span(const C& container) noexcept : data_(container.data()), size_(static_cast<std::size_t>(container.size())) {}
+  template <typename C, std::enable_if_t<std::is_const_v<T> && !detail::is_span<C>::value &&
+                                             detail::is_contiguous_of<const C, T>::value,
+                                         int> = 0>
+  constexpr span(const C& container) noexcept
+      : data_(container.data()), size_(static_cast<std::size_t>(container.size())) {}
   template <typename U, std::enable_if_t<std::is_convertible_v<U (*)[], T (*)[]>, int> = 0>
   constexpr span(const span<U>& other) noexcept : data_(other.data()), size_(other.size()) {}
 
@@ -102,8 +112,8 @@ struct is_point<Eigen::Matrix<Scalar, Dim, 1, Options, Dim, 1>, Scalar, Dim> : s
 }  // namespace detail
 
 /// Read-only view of points that lie somewhere inside the caller's arrays: coordinate c of point i stands at
-/// `first + i * point_stride + c * coordinate_stride` (bytes). So the same view covers packed pairs (cv::Point2f), pairs
-/// inside larger records (cv::KeyPoint: stride 28), and one array per coordinate. Nothing is copied.
+/// `first + i * point_stride + c * coordinate_stride` (bytes). So the same view covers packed pairs (cv::Point2f),
+/// pairs inside larger records (cv::KeyPoint: stride 28), and one array per coordinate. Nothing is copied.
 template <typename Scalar, int Dim>
 class PointSpan {
  public:
@@ -112,12 +122,17 @@ class PointSpan {
   PointSpan() noexcept = default;
   PointSpan(const Scalar* first, std::size_t size, std::size_t point_stride_bytes = Dim * sizeof(Scalar),
             std::size_t coordinate_stride_bytes = sizeof(Scalar)) noexcept
-      : first_(reinterpret_cast<const unsigned char*>(first)), size_(size), point_stride_(point_stride_bytes), coordinate_stride_(coordinate_stride_bytes) {}
+      : first_(reinterpret_cast<const unsigned char*>(first)),
+        size_(size),
+        point_stride_(point_stride_bytes),
+        coordinate_stride_(coordinate_stride_bytes) {}
   /// From any contiguous container of std::array<Scalar, Dim> or Eigen column vectors.
-  template <typename C, typename Element = std::remove_cv_t<std::remove_pointer_t<decltype(std::declval<const C&>().data())>>,
+  template <typename C,
+            typename Element = std::remove_cv_t<std::remove_pointer_t<decltype(std::declval<const C&>().data())>>,
             std::enable_if_t<detail::is_point<Element, Scalar, Dim>::value, int> = 0>
   PointSpan(const C& points) noexcept
-      : PointSpan(reinterpret_cast<const Scalar*>(points.data()), static_cast<std::size_t>(points.size()), sizeof(Element)) {}
+      : PointSpan(reinterpret_cast<const Scalar*>(points.data()), static_cast<std::size_t>(points.size()),
+                  sizeof(Element)) {}
   /// From an Eigen matrix with one point per column.
   PointSpan(const Eigen::Matrix<Scalar, Dim, Eigen::Dynamic>& columns) noexcept
       : PointSpan(columns.data(), static_cast<std::size_t>(columns.cols())) {}
@@ -126,11 +141,14 @@ class PointSpan {
   [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
   [[nodiscard]] Scalar operator()(std::size_t i, int c) const noexcept {
     CFP_ASSERT(i < size_ && c >= 0 && c < Dim);
-    return *reinterpret_cast<const Scalar*>(first_ + i * point_stride_ + static_cast<std::size_t>(c) * coordinate_stride_);
+    return *reinterpret_cast<const Scalar*>(first_ + i * point_stride_ +
+                                            static_cast<std::size_t>(c) * coordinate_stride_);
   }
   /// The first coordinate if the points are packed, coordinate after coordinate and point after point; else nullptr.
   [[nodiscard]] const Scalar* packed() const noexcept {
-    return coordinate_stride_ == sizeof(Scalar) && point_stride_ == Dim * sizeof(Scalar) ? reinterpret_cast<const Scalar*>(first_) : nullptr;
+    return coordinate_stride_ == sizeof(Scalar) && point_stride_ == Dim * sizeof(Scalar)
+               ? reinterpret_cast<const Scalar*>(first_)
+               : nullptr;
   }
   [[nodiscard]] Point operator[](std::size_t i) const noexcept {
     Point point;

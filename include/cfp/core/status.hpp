@@ -1,5 +1,6 @@
 /// @file status.hpp
-/// How a computation ended. Bad data never throws in cfp: the result carries a documented neutral value and one of these.
+/// How a computation ended. Bad data never throws in cfp: the result carries a documented neutral value and one of
+/// these.
 #pragma once
 
 #include <cstdint>
@@ -20,10 +21,14 @@ enum class Status : std::uint8_t {
 /// The enumerator's name, for reports.
 [[nodiscard]] constexpr const char* to_string(Status status) noexcept {
   switch (status) {
-    case Status::ok: return "ok";
-    case Status::not_enough_data: return "not enough data";
-    case Status::degenerate: return "degenerate";
-    case Status::invalid_input: return "invalid input";
+    case Status::ok:
+      return "ok";
+    case Status::not_enough_data:
+      return "not enough data";
+    case Status::degenerate:
+      return "degenerate";
+    case Status::invalid_input:
+      return "invalid input";
   }
   return "unknown";
 }

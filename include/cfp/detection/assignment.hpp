@@ -1,10 +1,11 @@
 /// @file assignment.hpp
-/// Gated minimum-cost assignment between rows and columns of a rectangular cost matrix (the Hungarian step of paper IV-A).
+/// Gated minimum-cost assignment between rows and columns of a rectangular cost matrix (the Hungarian step of paper
+/// IV-A).
 ///
 /// One objective: minimise  sum of cost(i, j) over the pairs  +  max_cost * (min(rows, cols) - number of pairs).
 /// Leaving a pair out costs `max_cost`, the gate. So a pair takes part only when its cost is below max_cost, and
-/// two cheap pairs are never sacrificed for a third one that is not worth it. With a large gate (infinity is welcome) the
-/// same objective means: as many pairs as possible, and among those matchings the cheapest.
+/// two cheap pairs are never sacrificed for a third one that is not worth it. With a large gate (infinity is welcome)
+/// the same objective means: as many pairs as possible, and among those matchings the cheapest.
 #pragma once
 
 #include <cstddef>
@@ -18,8 +19,8 @@
 
 namespace cfp {
 
-/// View of rows x cols costs, row after row. A cost that is NaN, infinite or beyond +-1e200 forbids its pair; negative costs
-/// are welcome.
+/// View of rows x cols costs, row after row. A cost that is NaN, infinite or beyond +-1e200 forbids its pair; negative
+/// costs are welcome.
 template <typename Scalar>
 struct CostMatrix {
   span<const Scalar> values;
@@ -44,8 +45,8 @@ struct AssignmentResult {
   double cost = 0;  ///< sum of the costs of the pairs
 };
 
-/// Scratch memory, reused; grows to the largest problem seen. After a call `row_saving` and `column_saving` are the dual
-/// solution, with which `assignment_gap` proves the optimum.
+/// Scratch memory, reused; grows to the largest problem seen. After a call `row_saving` and `column_saving` are the
+/// dual solution, with which `assignment_gap` proves the optimum.
 struct AssignmentWorkspace {
   std::vector<double> row_saving;     ///< a_i >= 0, one per row
   std::vector<double> column_saving;  ///< b_j >= 0, one per column
@@ -59,16 +60,17 @@ struct AssignmentWorkspace {
   std::vector<Visit> visits;
 };
 
-/// Fills column_of_row (size rows) with the optimal column of each row, or `unassigned`. Exact up to the rounding of double.
+/// Fills column_of_row (size rows) with the optimal column of each row, or `unassigned`. Exact up to the rounding of
+/// double.
 ///
-/// Terminates on any input after at most min^2 * max additions (min and max of rows, cols), whatever the costs hold. Ties: equal
-/// input gives equal output; among equally cheap partners the free one, then the one of the lower index is tried first.
-/// Allocates only while the workspace grows.
+/// Terminates on any input after at most min^2 * max additions (min and max of rows, cols), whatever the costs hold.
+/// Ties: equal input gives equal output; among equally cheap partners the free one, then the one of the lower index is
+/// tried first. Allocates only while the workspace grows.
 ///
-/// Source: shortest augmenting paths with prices, started by auction-like row bids (augmenting row reduction) as in R. Jonker
-/// and A. Volgenant, "A shortest augmenting path algorithm for dense and sparse linear assignment problems", Computing 38,
-/// 1987. Departure: every row owns a dummy column of cost max_cost, which makes the problem rectangular and gated by itself.
-/// The paper says "Hungarian algorithm" and neither cost nor gate.
+/// Source: shortest augmenting paths with prices, started by auction-like row bids (augmenting row reduction) as in R.
+/// Jonker and A. Volgenant, "A shortest augmenting path algorithm for dense and sparse linear assignment problems",
+/// Computing 38, 1987. Departure: every row owns a dummy column of cost max_cost, which makes the problem rectangular
+/// and gated by itself. The paper says "Hungarian algorithm" and neither cost nor gate.
 template <typename Scalar>
 AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_cost, span<int> column_of_row,
                                   AssignmentWorkspace& workspace);

@@ -23,7 +23,8 @@ struct CostLimits {
   double low = -assignment_largest_cost;  // inclusive
   double high;                            // exclusive
 
-  explicit CostLimits(double max_cost) noexcept : high((std::min)(max_cost, std::nextafter(assignment_largest_cost, infinity))) {}
+  explicit CostLimits(double max_cost) noexcept
+      : high((std::min)(max_cost, std::nextafter(assignment_largest_cost, infinity))) {}
   /// The cost in double, or infinity for a forbidden pair.
   template <typename Scalar>
   [[nodiscard]] double operator()(Scalar cost) const noexcept {
@@ -46,8 +47,8 @@ struct CostRange {
   double least, most;
 };
 
-/// Copies a row of costs, forbidden ones as infinity, padded to `stride` with infinity. Returns the least and the largest one, which
-/// is infinite when a pair of the row is forbidden.
+/// Copies a row of costs, forbidden ones as infinity, padded to `stride` with infinity. Returns the least and the
+/// largest one, which is infinite when a pair of the row is forbidden.
 template <typename Scalar>
 CostRange copy_costs(const Scalar* source, std::size_t step, std::size_t size, CostLimits limits, double* row,
                      std::size_t stride) noexcept {
@@ -86,10 +87,12 @@ CostRange copy_costs(const Scalar* source, std::size_t step, std::size_t size, C
 }
 
 /// Whether a gate is so near the least cost that it costs no digits. (A shortcut only: it saves a look at all costs.)
-[[nodiscard]] inline bool is_moderate(double max_cost, double least) noexcept { return std::abs(max_cost) <= 1e3 * std::abs(least); }
+[[nodiscard]] inline bool is_moderate(double max_cost, double least) noexcept {
+  return std::abs(max_cost) <= 1e3 * std::abs(least);
+}
 
-/// The gate that is really used for n pairs at most. Above the bound below a gate means "as many pairs as possible" anyway, and
-/// a needlessly large one would only cost digits.
+/// The gate that is really used for n pairs at most. Above the bound below a gate means "as many pairs as possible"
+/// anyway, and a needlessly large one would only cost digits.
 [[nodiscard]] inline double effective_gate(double max_cost, double least, double most, std::size_t n) noexcept {
   if (is_moderate(max_cost, least)) return max_cost;
   // The magnitude takes part so that the bound exceeds `most` even after rounding when all costs are (nearly) equal.
@@ -100,7 +103,8 @@ CostRange copy_costs(const Scalar* source, std::size_t step, std::size_t size, C
 }  // namespace detail
 
 template <typename Scalar>
-AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_cost, span<int> column_of_row, AssignmentWorkspace& w) {
+AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_cost, span<int> column_of_row,
+                                  AssignmentWorkspace& w) {
   CFP_ASSERT(column_of_row.size() == costs.rows);
   std::fill(column_of_row.begin(), column_of_row.end(), unassigned);
   detail::refill(w.row_saving, costs.rows, 0.0);
@@ -120,8 +124,8 @@ AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_co
   double least = detail::infinity, most = -detail::infinity;
   for (std::size_t i = 0; i < n; ++i) {
     const Scalar* source = costs.values.data() + (tall ? i : i * costs.cols);
-    const detail::CostRange range =
-        detail::copy_costs(source, tall ? costs.cols : 1, m, detail::CostLimits(max_cost), w.costs.data() + i * stride, stride);
+    const detail::CostRange range = detail::copy_costs(source, tall ? costs.cols : 1, m, detail::CostLimits(max_cost),
+                                                       w.costs.data() + i * stride, stride);
     row_least[i] = range.least;
     least = (std::min)(least, range.least);
     most = (std::max)(most, range.most);

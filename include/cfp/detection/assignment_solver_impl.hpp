@@ -14,7 +14,8 @@ namespace cfp {
 namespace detail {
 
 inline constexpr double infinity = std::numeric_limits<double>::infinity();
-inline constexpr std::size_t assignment_lanes = 4;  // columns are padded to this, so that the inner loops need no remainder
+inline constexpr std::size_t assignment_lanes =
+    4;  // columns are padded to this, so that the inner loops need no remainder
 inline constexpr std::ptrdiff_t nobody = -1;
 
 [[nodiscard]] inline std::size_t padded_columns(std::size_t cols) noexcept {
@@ -23,7 +24,8 @@ inline constexpr std::ptrdiff_t nobody = -1;
 [[nodiscard]] inline double smaller(double a, double b) noexcept { return a < b ? a : b; }
 [[nodiscard]] inline double larger(double a, double b) noexcept { return a > b ? a : b; }
 
-/// The two smallest of some numbers. Four of these side by side keep the processor busy where one would wait for itself.
+/// The two smallest of some numbers. Four of these side by side keep the processor busy where one would wait for
+/// itself.
 struct TwoLeast {
   double first = infinity, second = infinity;
   void add(double x) noexcept {
@@ -36,8 +38,8 @@ struct TwoLeast {
   }
 };
 
-/// One solve over the workspace, rows <= columns. Notation: price p_j <= 0, reduced cost c_ij - p_j, gate g. A row of a pair
-/// always holds its column at its smallest reduced cost, which is at most g; a column without a row has price 0.
+/// One solve over the workspace, rows <= columns. Notation: price p_j <= 0, reduced cost c_ij - p_j, gate g. A row of a
+/// pair always holds its column at its smallest reduced cost, which is at most g; a column without a row has price 0.
 template <typename Workspace>
 class AssignmentSolver {
  public:
@@ -56,8 +58,12 @@ class AssignmentSolver {
 
  private:
   template <typename T>
-  static T& at(std::vector<T>& v, std::ptrdiff_t i) noexcept { return v[static_cast<std::size_t>(i)]; }
-  [[nodiscard]] const double* costs(std::ptrdiff_t row) const noexcept { return w_.costs.data() + static_cast<std::size_t>(row) * stride_; }
+  static T& at(std::vector<T>& v, std::ptrdiff_t i) noexcept {
+    return v[static_cast<std::size_t>(i)];
+  }
+  [[nodiscard]] const double* costs(std::ptrdiff_t row) const noexcept {
+    return w_.costs.data() + static_cast<std::size_t>(row) * stride_;
+  }
 
   struct Offer {
     double best, second;
@@ -87,13 +93,16 @@ class AssignmentSolver {
     return o;
   }
 
-  /// The first column from `j` on with the least reduced cost; there is one. (One comparison by order, not equality, which
-  /// would look for NaN, too.)
-  [[nodiscard]] static std::ptrdiff_t find(const double* c, const double* p, double reduced, std::ptrdiff_t j) noexcept {
+  /// The first column from `j` on with the least reduced cost; there is one. (One comparison by order, not equality,
+  /// which would look for NaN, too.)
+  [[nodiscard]] static std::ptrdiff_t find(const double* c, const double* p, double reduced,
+                                           std::ptrdiff_t j) noexcept {
     for (; j % 4 != 0; ++j) {
       if (c[j] - p[j] <= reduced) return j;
     }
-    while (smaller(smaller(c[j] - p[j], c[j + 1] - p[j + 1]), smaller(c[j + 2] - p[j + 2], c[j + 3] - p[j + 3])) > reduced) j += 4;
+    while (smaller(smaller(c[j] - p[j], c[j + 1] - p[j + 1]), smaller(c[j + 2] - p[j + 2], c[j + 3] - p[j + 3])) >
+           reduced)
+      j += 4;
     while (c[j] - p[j] > reduced) ++j;
     return j;
   }
@@ -105,8 +114,8 @@ class AssignmentSolver {
     return j;
   }
 
-  /// Every row takes its cheapest column while that is free. Returns how many rows are left in the queue. In a frame of boxes
-  /// that barely overlap this settles nearly all.
+  /// Every row takes its cheapest column while that is free. Returns how many rows are left in the queue. In a frame of
+  /// boxes that barely overlap this settles nearly all.
   std::size_t greet(const double* row_least) noexcept {
     std::size_t left = 0;
     for (std::size_t k = 0; k < rows_; ++k) {
@@ -124,8 +133,8 @@ class AssignmentSolver {
     return left;
   }
 
-  /// Rows bid for their best column, lowering its price by what the second best leaves. Returns how many rows are left in
-  /// the queue: those of a tie, and what the bounded number of bids did not settle.
+  /// Rows bid for their best column, lowering its price by what the second best leaves. Returns how many rows are left
+  /// in the queue: those of a tie, and what the bounded number of bids did not settle.
   std::size_t bid(std::size_t waiting) noexcept {
     std::size_t left = 0;
     std::size_t bids = 4 * rows_;
@@ -156,7 +165,8 @@ class AssignmentSolver {
     return left;
   }
 
-  /// Distances of all open columns through one more row, whose own distance is `offset` above its value. Returns the smallest.
+  /// Distances of all open columns through one more row, whose own distance is `offset` above its value. Returns the
+  /// smallest.
   [[nodiscard]] double relax(std::ptrdiff_t row, double offset) noexcept {
     const double* c = costs(row);
     const double* p = w_.open_price.data();  // -infinity where closed, so that the sum below is infinite there
@@ -216,17 +226,20 @@ class AssignmentSolver {
       ++visits;
     }
     flip(sink, sink == nobody ? alone : visits);
-    for (std::size_t k = 1; k < visits; ++k) at(w_.price, w_.visits[k].column) += (std::min)(w_.visits[k].distance - length, 0.0);
+    for (std::size_t k = 1; k < visits; ++k)
+      at(w_.price, w_.visits[k].column) += (std::min)(w_.visits[k].distance - length, 0.0);
   }
 
-  /// Swaps the pairs along the shortest path that ends in column `sink`, or in the dummy of visit `end` when there is no sink.
+  /// Swaps the pairs along the shortest path that ends in column `sink`, or in the dummy of visit `end` when there is
+  /// no sink.
   void flip(std::ptrdiff_t sink, std::size_t end) noexcept {
     std::ptrdiff_t j = sink;
     if (sink == nobody) {
       at(w_.column_of_row, w_.visits[end].row) = nobody;
       j = w_.visits[end].column;
     }
-    while (j != nobody) {  // the row before a column is the one that gave it its distance, visited before the column closed
+    while (j !=
+           nobody) {  // the row before a column is the one that gave it its distance, visited before the column closed
       std::size_t best = 0;
       double least = infinity;
       for (std::size_t k = 0; k < end; ++k) {

@@ -1,18 +1,20 @@
 /// @file box_motion.hpp
-/// How a detected box moves: centre u, v (px) and log width, log height, each with its rate per second. Log sizes keep width and
-/// height positive however long a box is predicted. The paper (IV-A) names an EKF and leaves state, noise and time open.
+/// How a detected box moves: centre u, v (px) and log width, log height, each with its rate per second. Log sizes keep
+/// width and height positive however long a box is predicted. The paper (IV-A) names an EKF and leaves state, noise and
+/// time open.
 ///
 /// Motion over dt seconds: x <- x + dt x', white noise on the acceleration of spectral density q^2:
 ///   Q = q^2 [dt^3/3, dt^2/2; dt^2/2, dt], so one step of 2 dt equals two steps of dt.
-/// Measurement: the four edges, h = (u - w/2, u + w/2, v - h/2, v + h/2) with w = exp(log width): not linear, hence an EKF. The
-/// noise of an edge is proportional to the box, s_x = edge_noise * w for the vertical edges and s_y = edge_noise * h for the
-/// horizontal ones, w and h of the prediction.
+/// Measurement: the four edges, h = (u - w/2, u + w/2, v - h/2, v + h/2) with w = exp(log width): not linear, hence an
+/// EKF. The noise of an edge is proportional to the box, s_x = edge_noise * w for the vertical edges and s_y =
+/// edge_noise * h for the horizontal ones, w and h of the prediction.
 ///
-/// The split. Centre (x1 + x2)/2 and width x2 - x1 of two edges with equal independent noise s^2 have independent noises s^2/2
-/// and 2 s^2, and the EKF's measurement matrix at the prediction becomes diagonal: 1 for the centre, w for log width. So when the
-/// prior covariance has no terms between the four pairs (value, rate), neither has the posterior, and the 8-state filter *is*
-/// four 2-state filters, with innovations centre - u and (width - w)/w (not log(width/w): it is the EKF, linearised at the
-/// prediction) of variance s^2/2 and 2 edge_noise^2. Exact but for rounding; a test holds the two forms equal.
+/// The split. Centre (x1 + x2)/2 and width x2 - x1 of two edges with equal independent noise s^2 have independent
+/// noises s^2/2 and 2 s^2, and the EKF's measurement matrix at the prediction becomes diagonal: 1 for the centre, w for
+/// log width. So when the prior covariance has no terms between the four pairs (value, rate), neither has the
+/// posterior, and the 8-state filter *is* four 2-state filters, with innovations centre - u and (width - w)/w (not
+/// log(width/w): it is the EKF, linearised at the prediction) of variance s^2/2 and 2 edge_noise^2. Exact but for
+/// rounding; a test holds the two forms equal.
 #pragma once
 
 #include <algorithm>
@@ -28,11 +30,11 @@ namespace cfp {
 
 /// Defaults from benchmarks/studies/tracker_study.cpp (TUD-Stadtmitte and simulated walkers).
 struct BoxMotionOptions {
-  double edge_noise = 0.04;           ///< standard deviation of an edge / size of the box, in (0, 1]
-  double centre_acceleration = 1.5;   ///< q of the centre / size of the box, s^-1.5, >= 0
-  double size_acceleration = 0.2;     ///< q of the log size, s^-1.5, >= 0
-  double initial_centre_rate = 1.0;   ///< standard deviation of a new box's velocity / size, per second, > 0
-  double initial_size_rate = 0.2;     ///< the same of the log size rate, per second, > 0
+  double edge_noise = 0.04;          ///< standard deviation of an edge / size of the box, in (0, 1]
+  double centre_acceleration = 1.5;  ///< q of the centre / size of the box, s^-1.5, >= 0
+  double size_acceleration = 0.2;    ///< q of the log size, s^-1.5, >= 0
+  double initial_centre_rate = 1.0;  ///< standard deviation of a new box's velocity / size, per second, > 0
+  double initial_size_rate = 0.2;    ///< the same of the log size rate, per second, > 0
 };
 
 namespace detail {
@@ -97,7 +99,8 @@ template <typename Scalar>
 [[nodiscard]] BoxFilter<Scalar> make_box_filter(const Box<Scalar>& box, const BoxMotionOptions& options) noexcept;
 
 /// Moves the filter dt seconds ahead (finite, >= 0). Sizes stay within [1, 1e5] px, where their rate becomes 0 (so they
-/// are positive after any number of predictions), and the centre within +-1e7 px: nothing overflows. Equal to the EKF up to there.
+/// are positive after any number of predictions), and the centre within +-1e7 px: nothing overflows. Equal to the EKF
+/// up to there.
 template <typename Scalar>
 void predict(BoxFilter<Scalar>& filter, Scalar dt_s, const BoxMotionOptions& options) noexcept;
 
@@ -105,17 +108,20 @@ void predict(BoxFilter<Scalar>& filter, Scalar dt_s, const BoxMotionOptions& opt
 template <typename Scalar>
 void update(BoxFilter<Scalar>& filter, const Box<Scalar>& measured, const BoxMotionOptions& options) noexcept;
 
-/// Where an image motion takes the filter: `H` (homography; affine when its last row is 0 0 1) maps pixels of the frame before to
-/// this one. With J its Jacobian at the centre: centre by H, velocity by J, and sizes to the bounding box of the mapped inscribed
-/// ellipse, w' = |(J00 w, J01 h)|, so that small rotations there and back do not inflate a box (bounding the corners does). The
-/// variances of the centre follow J; its cross terms between u and v are dropped, as the split form needs. Returns false, and
-/// leaves the filter, when H is not finite, the centre falls behind the camera, or a size leaves the limits.
+/// Where an image motion takes the filter: `H` (homography; affine when its last row is 0 0 1) maps pixels of the frame
+/// before to this one. With J its Jacobian at the centre: centre by H, velocity by J, and sizes to the bounding box of
+/// the mapped inscribed ellipse, w' = |(J00 w, J01 h)|, so that small rotations there and back do not inflate a box
+/// (bounding the corners does). The variances of the centre follow J; its cross terms between u and v are dropped, as
+/// the split form needs. Returns false, and leaves the filter, when H is not finite, the centre falls behind the
+/// camera, or a size leaves the limits.
 template <typename Scalar>
 [[nodiscard]] bool warp(BoxFilter<Scalar>& filter, const Eigen::Matrix<Scalar, 3, 3>& H) noexcept;
 
-/// The measurement of the 8-state form (u, v, log width, log height, then their rates): edges (x1, x2, y1, y2) and Jacobian.
+/// The measurement of the 8-state form (u, v, log width, log height, then their rates): edges (x1, x2, y1, y2) and
+/// Jacobian.
 template <typename Scalar>
-[[nodiscard]] Eigen::Matrix<Scalar, 4, 1> box_edges(const Eigen::Matrix<Scalar, 8, 1>& state, Eigen::Matrix<Scalar, 4, 8>& H) noexcept {
+[[nodiscard]] Eigen::Matrix<Scalar, 4, 1> box_edges(const Eigen::Matrix<Scalar, 8, 1>& state,
+                                                    Eigen::Matrix<Scalar, 4, 8>& H) noexcept {
   using std::exp;
   const Scalar w = Scalar(0.5) * exp(state[2]), h = Scalar(0.5) * exp(state[3]);
   H.setZero();

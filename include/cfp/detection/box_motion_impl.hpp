@@ -7,10 +7,11 @@
 namespace cfp {
 namespace detail {
 
-inline constexpr double box_largest_px = 1e7;        // centres and velocities are kept below, far outside any image
+inline constexpr double box_largest_px = 1e7;         // centres and velocities are kept below, far outside any image
 inline constexpr double box_largest_variance = 1e14;  // its square
 inline constexpr double box_largest_size_px = 1e5;
-inline constexpr double box_largest_log_size = 11.512925464970229;  // log of the line above; log of the smallest, 1 px, is 0
+inline constexpr double box_largest_log_size =
+    11.512925464970229;  // log of the line above; log of the smallest, 1 px, is 0
 inline constexpr double box_largest_log_rate = 1e3;
 
 /// x in [low, high]; NaN becomes low.
@@ -101,7 +102,9 @@ bool warp(BoxFilter<Scalar>& filter, const Eigen::Matrix<Scalar, 3, 3>& H) noexc
   const Scalar w = exp(filter.log_width.value), h = exp(filter.log_height.value);
   const Scalar width = sqrt(a * a * w * w + b * b * h * h), height = sqrt(c * c * w * w + d * d * h * h);
   const Scalar far = Scalar(detail::box_largest_px), low = Scalar(1), high = Scalar(detail::box_largest_size_px);
-  if (!(x >= -far && x <= far && y >= -far && y <= far && width >= low && width <= high && height >= low && height <= high)) return false;
+  if (!(x >= -far && x <= far && y >= -far && y <= far && width >= low && width <= high && height >= low &&
+        height <= high))
+    return false;
   const RateFilter<Scalar> fu = filter.u, fv = filter.v;
   const auto mix = [](Scalar p, Scalar q, const RateFilter<Scalar>& f, const RateFilter<Scalar>& g, Scalar value) {
     return RateFilter<Scalar>{value, p * f.rate + q * g.rate, p * p * f.var_value + q * q * g.var_value,

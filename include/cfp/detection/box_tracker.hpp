@@ -1,9 +1,9 @@
 /// @file box_tracker.hpp
-/// Missed-detection compensation (paper IV-A): the boxes of the last frame are predicted, associated with the detections of this
-/// one, and what finds no detection is output as a *compensated* box; every output box says whether its object had a box in
-/// frame k-1. Departures: the paper filters twice per frame (to compensate, then to associate adjacent frames). Here one track
-/// carries both answers, since a compensated box belongs to its track by construction; and how long a box may be
-/// compensated, which the paper leaves open, is an option.
+/// Missed-detection compensation (paper IV-A): the boxes of the last frame are predicted, associated with the
+/// detections of this one, and what finds no detection is output as a *compensated* box; every output box says whether
+/// its object had a box in frame k-1. Departures: the paper filters twice per frame (to compensate, then to associate
+/// adjacent frames). Here one track carries both answers, since a compensated box belongs to its track by construction;
+/// and how long a box may be compensated, which the paper leaves open, is an option.
 #pragma once
 
 #include <algorithm>
@@ -14,23 +14,25 @@
 
 #include "cfp/core/assert.hpp"
 #include "cfp/detection/box_association.hpp"
-#include "cfp/detection/box_track.hpp"
+#include "cfp/detection/box_tracker_types.hpp"
 
 namespace cfp {
 
-/// Not thread-safe; one tracker per camera. After warm-up (as many tracks and detections as before) a frame allocates nothing.
-/// Equal calls give equal bits; the order of a frame's detections changes nothing but their indices. Ties between overlaps that
-/// are equal to the last bit apart.
+/// Not thread-safe; one tracker per camera. After warm-up (as many tracks and detections as before) a frame allocates
+/// nothing. Equal calls give equal bits; the order of a frame's detections changes nothing but their indices. Ties
+/// between overlaps that are equal to the last bit apart.
 template <typename Scalar = double>
 class BoxTracker {
  public:
   /// Options outside their ranges are the caller's error: see `validate`.
-  explicit BoxTracker(const BoxTrackerOptions& options = {}) : options_(options) { CFP_ASSERT(invalid_field(options) == nullptr); }
+  explicit BoxTracker(const BoxTrackerOptions& options = {}) : options_(options) {
+    CFP_ASSERT(invalid_field(options) == nullptr);
+  }
 
-  /// The next frame, dt_s seconds after the one before (0 for the first). Every detection that counts is output, from its first
-  /// frame on; a track with at least confirm_hits detections is compensated for up to max_coast frames; one with fewer
-  /// ends with the first miss. image_motion, when given, maps pixels of the frame before to this one (see `warp`) and is applied
-  /// to the predictions: hand it over when the camera turns fast.
+  /// The next frame, dt_s seconds after the one before (0 for the first). Every detection that counts is output, from
+  /// its first frame on; a track with at least confirm_hits detections is compensated for up to max_coast frames; one
+  /// with fewer ends with the first miss. image_motion, when given, maps pixels of the frame before to this one (see
+  /// `warp`) and is applied to the predictions: hand it over when the camera turns fast.
   BoxTrackerResult<Scalar> update(span<const Detection<Scalar>> detections, Scalar dt_s,
                                   const Eigen::Matrix<Scalar, 3, 3>* image_motion = nullptr) {
     BoxTrackerResult<Scalar> result = advance(dt_s, image_motion);
@@ -43,8 +45,9 @@ class BoxTracker {
     return result;
   }
 
-  /// A frame on which the detector did not run: nothing was missed, so tracks of one detection live on, but confirmed tracks
-  /// are output as compensated and age towards max_coast all the same. For a detector that runs on every n-th frame only.
+  /// A frame on which the detector did not run: nothing was missed, so tracks of one detection live on, but confirmed
+  /// tracks are output as compensated and age towards max_coast all the same. For a detector that runs on every n-th
+  /// frame only.
   BoxTrackerResult<Scalar> skip(Scalar dt_s, const Eigen::Matrix<Scalar, 3, 3>* image_motion = nullptr) {
     BoxTrackerResult<Scalar> result = advance(dt_s, image_motion);
     for (Track& track : tracks_) track.detection = -1;
@@ -93,8 +96,8 @@ class BoxTracker {
     sources_.clear();
     for (std::size_t i = 0; i < detections.size(); ++i) {
       const Detection<Scalar>& d = detections[i];
-      const bool usable =
-          is_proper(d.box) && d.score == d.score && d.box.x1 >= -far && d.box.y1 >= -far && d.box.x2 <= far && d.box.y2 <= far;
+      const bool usable = is_proper(d.box) && d.score == d.score && d.box.x1 >= -far && d.box.y1 >= -far &&
+                          d.box.x2 <= far && d.box.y2 <= far;
       if (!usable) {
         ++result.skipped;
       } else if (!(static_cast<double>(d.score) >= options_.min_score)) {
@@ -135,8 +138,8 @@ class BoxTracker {
     std::sort(births_.begin(), births_.end(), [this](std::size_t a, std::size_t b) { return key(a) < key(b); });
     for (const std::size_t j : births_) {
       const ClassBox<Scalar>& c = candidates_[j];
-      tracks_.push_back(
-          {make_box_filter(c.box, options_.motion), c.box, next_id_++, sources_[j].score, c.class_id, 1, 0, 0, sources_[j].index, false});
+      tracks_.push_back({make_box_filter(c.box, options_.motion), c.box, next_id_++, sources_[j].score, c.class_id, 1,
+                         0, 0, sources_[j].index, false});
     }
   }
 
@@ -156,7 +159,8 @@ class BoxTracker {
         if (!clip_to_image(box)) continue;
       }
       if (seen || confirmed) {
-        output_.push_back({box, track.class_id, track.score, track.id, track.detection, track.age, track.missed, track.shown});
+        output_.push_back(
+            {box, track.class_id, track.score, track.id, track.detection, track.age, track.missed, track.shown});
         result.compensated += seen ? 0 : 1;
       }
       track.shown = seen || confirmed;

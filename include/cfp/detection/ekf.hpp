@@ -1,6 +1,6 @@
 /// @file ekf.hpp
-/// A small extended Kalman filter with fixed sizes: the reference of the box filter (paper IV-A names an EKF and neither
-/// state nor noise), and useful by itself. Nothing allocates.
+/// A small extended Kalman filter with fixed sizes: the reference of the box filter (paper IV-A names an EKF and
+/// neither state nor noise), and useful by itself. Nothing allocates.
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -11,7 +11,8 @@
 
 namespace cfp {
 
-/// Mean and covariance of n states. Stored without alignment demands, so that the layout does not depend on vector flags.
+/// Mean and covariance of n states. Stored without alignment demands, so that the layout does not depend on vector
+/// flags.
 template <typename Scalar, int n>
 struct EkfState {
   Eigen::Matrix<Scalar, n, 1, Eigen::DontAlign> mean = Eigen::Matrix<Scalar, n, 1>::Zero();
@@ -20,13 +21,15 @@ struct EkfState {
 
 struct EkfUpdate {
   Status status = Status::ok;  ///< invalid_input: something was not finite; degenerate: S was not positive definite
-  double mahalanobis_sq = 0;   ///< r' S^-1 r of the innovation r; chi-squared with m degrees of freedom when the model holds
+  double mahalanobis_sq =
+      0;  ///< r' S^-1 r of the innovation r; chi-squared with m degrees of freedom when the model holds
 };
 
-/// Prediction: mean <- f(mean), P <- F P F' + Q, symmetrised. `motion(mean, F)` returns f(mean) and writes its Jacobian F at
-/// the mean (n x n). Returns false, and leaves the state as it was, when the result is not finite.
+/// Prediction: mean <- f(mean), P <- F P F' + Q, symmetrised. `motion(mean, F)` returns f(mean) and writes its Jacobian
+/// F at the mean (n x n). Returns false, and leaves the state as it was, when the result is not finite.
 template <typename Scalar, int n, typename Motion, typename Noise>
-[[nodiscard]] bool ekf_predict(EkfState<Scalar, n>& state, Motion&& motion, const Eigen::MatrixBase<Noise>& Q) noexcept {
+[[nodiscard]] bool ekf_predict(EkfState<Scalar, n>& state, Motion&& motion,
+                               const Eigen::MatrixBase<Noise>& Q) noexcept {
   using Square = Eigen::Matrix<Scalar, n, n>;
   Square F;
   const Eigen::Matrix<Scalar, n, 1> before = state.mean;
@@ -38,9 +41,10 @@ template <typename Scalar, int n, typename Motion, typename Noise>
   return true;
 }
 
-/// Update with a measurement z of m numbers: r = z - h(mean), S = H P H' + R, K = P H' S^-1 (an LDLT solve, never an inverse),
-/// mean <- mean + K r, P <- (I - K H) P (I - K H)' + K R K' (Joseph's form, symmetrised: P stays positive semi-definite).
-/// `measure(mean, H)` returns h(mean) and writes its Jacobian H (m x n). On any status but ok the state is left as it was.
+/// Update with a measurement z of m numbers: r = z - h(mean), S = H P H' + R, K = P H' S^-1 (an LDLT solve, never an
+/// inverse), mean <- mean + K r, P <- (I - K H) P (I - K H)' + K R K' (Joseph's form, symmetrised: P stays positive
+/// semi-definite). `measure(mean, H)` returns h(mean) and writes its Jacobian H (m x n). On any status but ok the state
+/// is left as it was.
 template <typename Scalar, int n, int m, typename Measure, typename Noise>
 EkfUpdate ekf_update(EkfState<Scalar, n>& state, const Eigen::Matrix<Scalar, m, 1>& z, Measure&& measure,
                      const Eigen::MatrixBase<Noise>& R) noexcept {
@@ -54,7 +58,8 @@ EkfUpdate ekf_update(EkfState<Scalar, n>& state, const Eigen::Matrix<Scalar, m, 
   if (!r.allFinite() || !S.allFinite()) return {Status::invalid_input, 0};
   const Eigen::LDLT<Eigen::Matrix<Scalar, m, m>> solver(S);
   const auto& pivots = solver.vectorD();
-  if (solver.info() != Eigen::Success || !(pivots.minCoeff() > Scalar(Tolerance<Scalar>::degenerate) * pivots.maxCoeff()))
+  if (solver.info() != Eigen::Success ||
+      !(pivots.minCoeff() > Scalar(Tolerance<Scalar>::degenerate) * pivots.maxCoeff()))
     return {Status::degenerate, 0};
   const Eigen::Matrix<Scalar, n, m> K = solver.solve(HP).transpose();
   const Eigen::Matrix<Scalar, n, 1> mean = before + K * r;

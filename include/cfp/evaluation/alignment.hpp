@@ -28,10 +28,14 @@ enum class AlignmentMode : std::uint8_t {
 /// The enumerator's name, for reports.
 [[nodiscard]] constexpr const char* to_string(AlignmentMode mode) noexcept {
   switch (mode) {
-    case AlignmentMode::none: return "none";
-    case AlignmentMode::first_pose: return "first pose";
-    case AlignmentMode::rigid: return "SE(3)";
-    case AlignmentMode::similarity: return "Sim(3)";
+    case AlignmentMode::none:
+      return "none";
+    case AlignmentMode::first_pose:
+      return "first pose";
+    case AlignmentMode::rigid:
+      return "SE(3)";
+    case AlignmentMode::similarity:
+      return "Sim(3)";
   }
   return "unknown";
 }
@@ -42,7 +46,9 @@ struct Similarity {
   Matrix3<double> rotation = Matrix3<double>::Identity();
   Vector3<double> translation = Vector3<double>::Zero();
 
-  [[nodiscard]] Vector3<double> operator*(const Vector3<double>& point) const noexcept { return scale * (rotation * point) + translation; }
+  [[nodiscard]] Vector3<double> operator*(const Vector3<double>& point) const noexcept {
+    return scale * (rotation * point) + translation;
+  }
 };
 
 struct AlignmentResult {
@@ -52,17 +58,18 @@ struct AlignmentResult {
   Status status = Status::not_enough_data;
 };
 
-/// argmin over (s, R, t) of sum |to_i − (s R from_i + t)|², s = 1 unless with_scale. With the centred points a_i (from) and b_i
-/// (to) and the SVD sum b_i a_iᵀ = U D Vᵀ: R = U S Vᵀ, S = diag(1, 1, det(U Vᵀ)), s = tr(D S) / sum |a_i|², t = mean(to) − s R mean(from).
-/// The scale is that of Umeyama, not the symmetric one of Horn. Points are scaled by their largest coordinate first, so that no
-/// finite input overflows. Allocates nothing.
+/// argmin over (s, R, t) of sum |to_i − (s R from_i + t)|², s = 1 unless with_scale. With the centred points a_i (from)
+/// and b_i (to) and the SVD sum b_i a_iᵀ = U D Vᵀ: R = U S Vᵀ, S = diag(1, 1, det(U Vᵀ)), s = tr(D S) / sum |a_i|², t =
+/// mean(to) − s R mean(from). The scale is that of Umeyama, not the symmetric one of Horn. Points are scaled by their
+/// largest coordinate first, so that no finite input overflows. Allocates nothing.
 ///
-/// Degenerate input: no finite pair → identity and not_enough_data. Points that do not fix the rotation (fewer than three,
-/// or on one line) → one of the minimisers, a proper rotation, and degenerate; a scale that is not determined (all of `from`
-/// equal) or zero (all of `to` equal) is 1.
-/// Source: Umeyama, "Least-squares estimation of transformation parameters between two point patterns", PAMI 1991, eqs. (34)–(43).
+/// Degenerate input: no finite pair → identity and not_enough_data. Points that do not fix the rotation (fewer than
+/// three, or on one line) → one of the minimisers, a proper rotation, and degenerate; a scale that is not determined
+/// (all of `from` equal) or zero (all of `to` equal) is 1. Source: Umeyama, "Least-squares estimation of transformation
+/// parameters between two point patterns", PAMI 1991, eqs. (34)–(43).
 template <typename Scalar>
-[[nodiscard]] AlignmentResult align_points(PointSpan<Scalar, 3> from, PointSpan<Scalar, 3> to, bool with_scale = false) noexcept {
+[[nodiscard]] AlignmentResult align_points(PointSpan<Scalar, 3> from, PointSpan<Scalar, 3> to,
+                                           bool with_scale = false) noexcept {
   CFP_ASSERT(from.size() == to.size());
   const auto finite = [&](std::size_t i) {
     for (int c = 0; c < 3; ++c) {

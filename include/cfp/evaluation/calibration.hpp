@@ -1,6 +1,6 @@
 /// @file calibration.hpp
-/// Judges static probabilities against labels: does a higher probability go with "static" (AUC), and is the number itself right
-/// (Brier score, log loss, expected calibration error, reliability table). 1 = static throughout.
+/// Judges static probabilities against labels: does a higher probability go with "static" (AUC), and is the number
+/// itself right (Brier score, log loss, expected calibration error, reliability table). 1 = static throughout.
 #pragma once
 
 #include <algorithm>
@@ -26,20 +26,21 @@ struct CalibrationWorkspace {
   std::vector<RankedLabel> ranked;
 };
 
-/// Probability that a randomly chosen static sample scores higher than a moving one, ties counting one half (Mann–Whitney):
-/// sum over (static i, moving j) of w_i w_j ([s_i > s_j] + [s_i = s_j] / 2) / (W_static W_moving). Value in [0, 1].
+/// Probability that a randomly chosen static sample scores higher than a moving one, ties counting one half
+/// (Mann–Whitney): sum over (static i, moving j) of w_i w_j ([s_i > s_j] + [s_i = s_j] / 2) / (W_static W_moving).
+/// Value in [0, 1].
 struct AucResult {
-  double auc = 0.5;                         ///< 0.5 when a class is empty
-  double static_weight = 0;                 ///< W_static, a count without weights
-  double moving_weight = 0;                 ///< W_moving
-  std::size_t skipped = 0;                  ///< samples with a NaN or infinite score, or a weight that is negative or not finite
+  double auc = 0.5;          ///< 0.5 when a class is empty
+  double static_weight = 0;  ///< W_static, a count without weights
+  double moving_weight = 0;  ///< W_moving
+  std::size_t skipped = 0;   ///< samples with a NaN or infinite score, or a weight that is negative or not finite
   Status status = Status::not_enough_data;  ///< degenerate: only one of the classes has weight
 };
 
 namespace detail {
 
-/// Fills all of result but skipped from ranked, which it sorts. Works with weights relative to the largest, so that neither the
-/// sums nor their product can overflow.
+/// Fills all of result but skipped from ranked, which it sorts. Works with weights relative to the largest, so that
+/// neither the sums nor their product can overflow.
 inline void rank(std::vector<RankedLabel>& ranked, double largest_weight, AucResult& result) noexcept {
   std::sort(ranked.begin(), ranked.end(), [](const RankedLabel& a, const RankedLabel& b) { return a.score < b.score; });
   double moving_below = 0, static_sum = 0, wins = 0;
@@ -63,11 +64,11 @@ inline void rank(std::vector<RankedLabel>& ranked, double largest_weight, AucRes
 
 }  // namespace detail
 
-/// weights may be empty (all 1); equal lengths otherwise. Any finite scores, not only probabilities. O(n log n); allocates in
-/// the workspace on first use only.
+/// weights may be empty (all 1); equal lengths otherwise. Any finite scores, not only probabilities. O(n log n);
+/// allocates in the workspace on first use only.
 template <typename Scalar>
-[[nodiscard]] AucResult area_under_curve(span<const Scalar> scores, span<const char> is_static, span<const Scalar> weights,
-                                         CalibrationWorkspace& workspace) {
+[[nodiscard]] AucResult area_under_curve(span<const Scalar> scores, span<const char> is_static,
+                                         span<const Scalar> weights, CalibrationWorkspace& workspace) {
   CFP_ASSERT(scores.size() == is_static.size() && (weights.empty() || weights.size() == scores.size()));
   AucResult result;
   workspace.ranked.clear();
@@ -95,25 +96,29 @@ struct ReliabilityBin {
 
 template <std::size_t Bins>
 struct CalibrationResult {
-  double auc = 0.5;     ///< see area_under_curve
-  double brier = 0;     ///< sum w (p − y)² / sum w, y = 1 for static, in [0, 1]
-  double log_loss = 0;  ///< −sum w (y ln p + (1 − y) ln(1 − p)) / sum w, nats; p kept in [1e-15, 1 − 1e-15], so at most 34.54
-  double expected_calibration_error = 0;  ///< sum over bins of (weight / total) |static_fraction − mean_probability|, in [0, 1]
-  double largest_calibration_error = 0;   ///< the largest |static_fraction − mean_probability| of a bin that is not empty
-  double static_fraction = 0;             ///< of the total weight
+  double auc = 0.5;  ///< see area_under_curve
+  double brier = 0;  ///< sum w (p − y)² / sum w, y = 1 for static, in [0, 1]
+  double log_loss =
+      0;  ///< −sum w (y ln p + (1 − y) ln(1 − p)) / sum w, nats; p kept in [1e-15, 1 − 1e-15], so at most 34.54
+  double expected_calibration_error =
+      0;  ///< sum over bins of (weight / total) |static_fraction − mean_probability|, in [0, 1]
+  double largest_calibration_error =
+      0;                       ///< the largest |static_fraction − mean_probability| of a bin that is not empty
+  double static_fraction = 0;  ///< of the total weight
   std::array<ReliabilityBin, Bins> table{};
   std::size_t used = 0;                     ///< samples of positive weight
   std::size_t skipped = 0;                  ///< probability not in [0, 1] or NaN; weight negative or not finite
   Status status = Status::not_enough_data;  ///< degenerate: only one of the classes, auc is 0.5 and the rest valid
 };
 
-/// All of the above for probabilities in [0, 1]; weights may be empty. No usable sample → zeros, auc 0.5, not_enough_data.
-/// O(n log n); allocates in the workspace on first use only.
-/// Sources: Brier, "Verification of forecasts expressed in terms of probability", 1950; Guo et al., "On calibration of modern
-/// neural networks", ICML 2017 (ECE, equally wide bins).
+/// All of the above for probabilities in [0, 1]; weights may be empty. No usable sample → zeros, auc 0.5,
+/// not_enough_data. O(n log n); allocates in the workspace on first use only. Sources: Brier, "Verification of
+/// forecasts expressed in terms of probability", 1950; Guo et al., "On calibration of modern neural networks", ICML
+/// 2017 (ECE, equally wide bins).
 template <std::size_t Bins = 10, typename Scalar>
-[[nodiscard]] CalibrationResult<Bins> evaluate_calibration(span<const Scalar> static_probability, span<const char> is_static,
-                                                           span<const Scalar> weights, CalibrationWorkspace& workspace) {
+[[nodiscard]] CalibrationResult<Bins> evaluate_calibration(span<const Scalar> static_probability,
+                                                           span<const char> is_static, span<const Scalar> weights,
+                                                           CalibrationWorkspace& workspace) {
   static_assert(Bins > 0, "the reliability table needs a bin");
   CFP_ASSERT(static_probability.size() == is_static.size() && (weights.empty() || weights.size() == is_static.size()));
   CalibrationResult<Bins> result;

@@ -1,6 +1,6 @@
 /// @file trajectory.hpp
-/// Stamped poses and their association by time: the common ground of the trajectory errors. Trajectories may come unsorted,
-/// with duplicates and with broken poses; nothing has to be cleaned before.
+/// Stamped poses and their association by time: the common ground of the trajectory errors. Trajectories may come
+/// unsorted, with duplicates and with broken poses; nothing has to be cleaned before.
 #pragma once
 
 #include <algorithm>
@@ -21,19 +21,19 @@ struct StampedPose {
   SE3<Scalar> T_world_cam;  ///< camera to world, as in TUM trajectory files
 };
 
-/// Finite stamp, finite translation, and a rotation matrix whose determinant is about one (0.5 to 2: printed quaternions are
-/// rounded, and an all-zero one, the TUM files' "no pose", must fail).
+/// Finite stamp, finite translation, and a rotation matrix whose determinant is about one (0.5 to 2: printed
+/// quaternions are rounded, and an all-zero one, the TUM files' "no pose", must fail).
 template <typename Scalar>
 [[nodiscard]] bool is_usable(const StampedPose<Scalar>& pose) noexcept {
   const Matrix3<Scalar>& R = pose.T_world_cam.rotation;
   const Scalar determinant = R.col(0).cross(R.col(1)).dot(R.col(2));
   const Vector3<Scalar>& t = pose.T_world_cam.translation;
-  return is_finite(pose.time_s) && is_finite(t.x()) && is_finite(t.y()) && is_finite(t.z()) && determinant > Scalar(0.5) &&
-         determinant < Scalar(2) && R.squaredNorm() < Scalar(12);
+  return is_finite(pose.time_s) && is_finite(t.x()) && is_finite(t.y()) && is_finite(t.z()) &&
+         determinant > Scalar(0.5) && determinant < Scalar(2) && R.squaredNorm() < Scalar(12);
 }
 
-/// Indices of the usable poses in order of time; of several with one stamp the last in the array stays, as in the dictionaries of
-/// the TUM scripts. O(n log n). order is overwritten; it grows on first use only.
+/// Indices of the usable poses in order of time; of several with one stamp the last in the array stays, as in the
+/// dictionaries of the TUM scripts. O(n log n). order is overwritten; it grows on first use only.
 template <typename Scalar>
 void time_order(span<const StampedPose<Scalar>> poses, std::vector<std::size_t>& order) {
   order.clear();
@@ -43,13 +43,15 @@ void time_order(span<const StampedPose<Scalar>> poses, std::vector<std::size_t>&
   std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return poses[a].time_s < poses[b].time_s || (poses[a].time_s == poses[b].time_s && a > b);
   });
-  order.erase(std::unique(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return poses[a].time_s == poses[b].time_s; }),
+  order.erase(std::unique(order.begin(), order.end(),
+                          [&](std::size_t a, std::size_t b) { return poses[a].time_s == poses[b].time_s; }),
               order.end());
 }
 
 struct AssociationOptions {
-  double max_difference_s = 0.02;  ///< two stamps match when they differ by less than this, > 0 (the TUM scripts' default)
-  double offset_s = 0;             ///< added to the stamps of the second trajectory, finite
+  double max_difference_s =
+      0.02;             ///< two stamps match when they differ by less than this, > 0 (the TUM scripts' default)
+  double offset_s = 0;  ///< added to the stamps of the second trajectory, finite
 };
 
 [[nodiscard]] inline const char* invalid_field(const AssociationOptions& options) noexcept {
@@ -80,14 +82,14 @@ struct AssociationWorkspace {
   std::vector<Candidate> heap;
 };
 
-/// One-to-one association as in the TUM script associate.py: the pair of free stamps with the smallest |first − (second + offset)|
-/// is matched first, ties go to the earlier first stamp and then to the earlier second one, until no pair differs by less than
-/// max_difference_s. matches come out in order of time. The script forms all pairs; here only neighbours in the merged
-/// order are candidates (the closest free pair is always one), so it costs O(n log n) whatever the options.
-/// workspace.first_order and .second_order hold time_order of the inputs afterwards.
+/// One-to-one association as in the TUM script associate.py: the pair of free stamps with the smallest |first − (second
+/// + offset)| is matched first, ties go to the earlier first stamp and then to the earlier second one, until no pair
+/// differs by less than max_difference_s. matches come out in order of time. The script forms all pairs; here only
+/// neighbours in the merged order are candidates (the closest free pair is always one), so it costs O(n log n) whatever
+/// the options. workspace.first_order and .second_order hold time_order of the inputs afterwards.
 template <typename Scalar>
-void associate(span<const StampedPose<Scalar>> first, span<const StampedPose<Scalar>> second, const AssociationOptions& options,
-               AssociationWorkspace& workspace, std::vector<TimeMatch>& matches) {
+void associate(span<const StampedPose<Scalar>> first, span<const StampedPose<Scalar>> second,
+               const AssociationOptions& options, AssociationWorkspace& workspace, std::vector<TimeMatch>& matches) {
   matches.clear();
   time_order(first, workspace.first_order);
   time_order(second, workspace.second_order);
@@ -96,9 +98,11 @@ void associate(span<const StampedPose<Scalar>> first, span<const StampedPose<Sca
   events.clear();
   heap.clear();
   for (const std::size_t i : workspace.first_order) events.push_back({first[i].time_s, i, false, 0, 0});
-  for (const std::size_t i : workspace.second_order) events.push_back({second[i].time_s + options.offset_s, i, true, 0, 0});
+  for (const std::size_t i : workspace.second_order)
+    events.push_back({second[i].time_s + options.offset_s, i, true, 0, 0});
   std::sort(events.begin(), events.end(), [](const auto& a, const auto& b) {
-    return a.time_s < b.time_s || (a.time_s == b.time_s && std::make_pair(a.of_second, a.pose) < std::make_pair(b.of_second, b.pose));
+    return a.time_s < b.time_s ||
+           (a.time_s == b.time_s && std::make_pair(a.of_second, a.pose) < std::make_pair(b.of_second, b.pose));
   });
   const std::size_t none = events.size();
   for (std::size_t e = 0; e < none; ++e) {

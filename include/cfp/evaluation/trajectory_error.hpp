@@ -1,9 +1,9 @@
 /// @file trajectory_error.hpp
 /// Absolute trajectory error (ATE) and relative pose error (RPE), with the protocol in the result: a figure without its
-/// alignment, matched poses, coverage and gaps cannot be compared. Equal to evaluate_ate.py and evaluate_rpe.py of the TUM RGB-D
-/// benchmark (Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012); departures are named below.
-/// Both functions take unsorted trajectories with duplicates and broken poses (see time_order) and allocate nothing after the
-/// first call of a size.
+/// alignment, matched poses, coverage and gaps cannot be compared. Equal to evaluate_ate.py and evaluate_rpe.py of the
+/// TUM RGB-D benchmark (Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012); departures
+/// are named below. Both functions take unsorted trajectories with duplicates and broken poses (see time_order) and
+/// allocate nothing after the first call of a size.
 #pragma once
 
 #include <algorithm>
@@ -39,7 +39,8 @@ struct AbsoluteErrorResult {
   Similarity S_truth_estimate;    ///< the alignment
   AlignmentMode alignment = AlignmentMode::rigid;
   TrajectoryCoverage coverage;
-  Status status = Status::not_enough_data;  ///< degenerate: the matched poses do not fix the alignment's rotation; errors valid
+  Status status =
+      Status::not_enough_data;  ///< degenerate: the matched poses do not fix the alignment's rotation; errors valid
 };
 
 enum class DeltaUnit : std::uint8_t {
@@ -47,7 +48,9 @@ enum class DeltaUnit : std::uint8_t {
   frames    ///< poses of the estimate
 };
 
-[[nodiscard]] constexpr const char* to_string(DeltaUnit unit) noexcept { return unit == DeltaUnit::seconds ? "s" : "frames"; }
+[[nodiscard]] constexpr const char* to_string(DeltaUnit unit) noexcept {
+  return unit == DeltaUnit::seconds ? "s" : "frames";
+}
 
 struct RelativeErrorOptions {
   double delta = 1;                     ///< length of the interval, > 0
@@ -73,8 +76,8 @@ struct RelativeErrorResult {
   Status status = Status::not_enough_data;
 };
 
-/// Scratch of both errors, and the errors one by one, for plots over time: entry k belongs to the estimated pose with index
-/// pose[k] (for RPE: the first of the pair), in order of time.
+/// Scratch of both errors, and the errors one by one, for plots over time: entry k belongs to the estimated pose with
+/// index pose[k] (for RPE: the first of the pair), in order of time.
 struct TrajectoryErrorWorkspace {
   std::vector<std::size_t> pose;
   std::vector<double> translation_m, rotation_deg;
@@ -102,12 +105,14 @@ inline void summarise(TrajectoryErrorWorkspace& workspace, ErrorStatistics& tran
 
 }  // namespace detail
 
-/// ATE: associates by time (see associate), aligns the matched estimated positions to the true ones, and takes the distances.
-/// status is not_enough_data without a match (errors 0), invalid_input for options that invalid_field refuses.
-/// Departure: the script stops with an error below two matches, and aligns rigidly only.
+/// ATE: associates by time (see associate), aligns the matched estimated positions to the true ones, and takes the
+/// distances. status is not_enough_data without a match (errors 0), invalid_input for options that invalid_field
+/// refuses. Departure: the script stops with an error below two matches, and aligns rigidly only.
 template <typename Scalar>
-[[nodiscard]] AbsoluteErrorResult absolute_trajectory_error(span<const StampedPose<Scalar>> truth, span<const StampedPose<Scalar>> estimate,
-                                                            const AbsoluteErrorOptions& options, TrajectoryErrorWorkspace& workspace) {
+[[nodiscard]] AbsoluteErrorResult absolute_trajectory_error(span<const StampedPose<Scalar>> truth,
+                                                            span<const StampedPose<Scalar>> estimate,
+                                                            const AbsoluteErrorOptions& options,
+                                                            TrajectoryErrorWorkspace& workspace) {
   AbsoluteErrorResult result;
   result.alignment = options.alignment;
   detail::clear_errors(workspace);
@@ -123,15 +128,16 @@ template <typename Scalar>
     workspace.truth_points.push_back(truth[m.first].T_world_cam.translation.template cast<double>());
     workspace.estimate_points.push_back(estimate[m.second].T_world_cam.translation.template cast<double>());
   }
-  result.coverage = trajectory_coverage(truth, estimate, workspace.association.first_order, workspace.association.second_order, matches,
-                                        options.expected_poses, options.association.offset_s);
+  result.coverage =
+      trajectory_coverage(truth, estimate, workspace.association.first_order, workspace.association.second_order,
+                          matches, options.expected_poses, options.association.offset_s);
   if (matches.empty()) return result;
 
   result.status = Status::ok;
   Similarity& S = result.S_truth_estimate;
   if (options.alignment == AlignmentMode::first_pose) {
-    S.rotation =
-        detail::double_pose(truth[matches[0].first]).rotation * detail::double_pose(estimate[matches[0].second]).rotation.transpose();
+    S.rotation = detail::double_pose(truth[matches[0].first]).rotation *
+                 detail::double_pose(estimate[matches[0].second]).rotation.transpose();
     S.translation = workspace.truth_points[0] - S.rotation * workspace.estimate_points[0];
   } else if (options.alignment != AlignmentMode::none) {
     const AlignmentResult aligned =
@@ -142,7 +148,8 @@ template <typename Scalar>
   }
   for (std::size_t k = 0; k < matches.size(); ++k) {
     workspace.pose.push_back(matches[k].second);
-    workspace.translation_m.push_back(detail::finite_norm(workspace.truth_points[k] - S * workspace.estimate_points[k]));
+    workspace.translation_m.push_back(
+        detail::finite_norm(workspace.truth_points[k] - S * workspace.estimate_points[k]));
     const Matrix3<double> R_truth = detail::double_pose(truth[matches[k].first]).rotation;
     const Matrix3<double> R_estimate = detail::double_pose(estimate[matches[k].second]).rotation;
     workspace.rotation_deg.push_back(detail::angle_deg(R_truth.transpose() * S.rotation * R_estimate));
@@ -151,19 +158,21 @@ template <typename Scalar>
   return result;
 }
 
-/// RPE with a fixed delta (`--fixed_delta`): for every estimated pose i, j is the estimated pose whose stamp (or index) is nearest
-/// to that of i + delta. With P the estimated poses and Q the true ones nearest to them in time, the pair's error is
-/// E = (P_j⁻¹ P_i)⁻¹ (Q_j⁻¹ Q_i): its translation's length and its rotation's angle. Needs no alignment.
+/// RPE with a fixed delta (`--fixed_delta`): for every estimated pose i, j is the estimated pose whose stamp (or index)
+/// is nearest to that of i + delta. With P the estimated poses and Q the true ones nearest to them in time, the pair's
+/// error is E = (P_j⁻¹ P_i)⁻¹ (Q_j⁻¹ Q_i): its translation's length and its rotation's angle. Needs no alignment.
 ///
-/// As in the script: a pair whose j is the last pose is left out (near the end every i would get it); so is a pair with a truth
-/// farther than twice the median true interval; of two stamps equally near the script's bisection decides; a pair with
-/// i = j, which a gap of more than 2 delta makes, counts with error 0.
-/// status is not_enough_data below two pairs (errors 0; the script stops), invalid_input for options that invalid_field refuses.
-/// Departures: of more than 10000 pairs the script draws 10000 at random, here all count; the angle comes from so3_log instead of
-/// the arc cosine of the trace, which loses half the digits of small angles.
+/// As in the script: a pair whose j is the last pose is left out (near the end every i would get it); so is a pair with
+/// a truth farther than twice the median true interval; of two stamps equally near the script's bisection decides; a
+/// pair with i = j, which a gap of more than 2 delta makes, counts with error 0. status is not_enough_data below two
+/// pairs (errors 0; the script stops), invalid_input for options that invalid_field refuses. Departures: of more than
+/// 10000 pairs the script draws 10000 at random, here all count; the angle comes from so3_log instead of the arc cosine
+/// of the trace, which loses half the digits of small angles.
 template <typename Scalar>
-[[nodiscard]] RelativeErrorResult relative_pose_error(span<const StampedPose<Scalar>> truth, span<const StampedPose<Scalar>> estimate,
-                                                      const RelativeErrorOptions& options, TrajectoryErrorWorkspace& workspace) {
+[[nodiscard]] RelativeErrorResult relative_pose_error(span<const StampedPose<Scalar>> truth,
+                                                      span<const StampedPose<Scalar>> estimate,
+                                                      const RelativeErrorOptions& options,
+                                                      TrajectoryErrorWorkspace& workspace) {
   RelativeErrorResult result;
   result.delta = options.delta;
   result.unit = options.unit;
@@ -183,7 +192,8 @@ template <typename Scalar>
   const auto index = [](std::size_t i) { return static_cast<double>(i); };
   matches.clear();
   for (std::size_t i = 0; i < n; ++i) {
-    matches.push_back({truth_order[detail::closest_index(truth_order.size(), stamp(i) + options.offset_s, truth_stamp)], order[i]});
+    matches.push_back(
+        {truth_order[detail::closest_index(truth_order.size(), stamp(i) + options.offset_s, truth_stamp)], order[i]});
   }
   const double max_difference_s = 2 * detail::median_interval(truth, truth_order, workspace.scratch);
   const auto has_truth = [&](std::size_t i) {
@@ -191,11 +201,13 @@ template <typename Scalar>
   };
   workspace.used.assign(n, 0);
   for (std::size_t i = 0; i < n; ++i) {
-    const std::size_t j = options.unit == DeltaUnit::seconds ? detail::closest_index(n, stamp(i) + options.delta, stamp)
-                                                             : detail::closest_index(n, static_cast<double>(i) + options.delta, index);
+    const std::size_t j = options.unit == DeltaUnit::seconds
+                              ? detail::closest_index(n, stamp(i) + options.delta, stamp)
+                              : detail::closest_index(n, static_cast<double>(i) + options.delta, index);
     if (j + 1 == n || !has_truth(i) || !has_truth(j)) continue;
     SE3<double> P = detail::double_pose(estimate[order[j]]).inverse() * detail::double_pose(estimate[order[i]]);
-    const SE3<double> Q = detail::double_pose(truth[matches[j].first]).inverse() * detail::double_pose(truth[matches[i].first]);
+    const SE3<double> Q =
+        detail::double_pose(truth[matches[j].first]).inverse() * detail::double_pose(truth[matches[i].first]);
     P.translation *= options.scale;
     const SE3<double> E = P.inverse() * Q;
     workspace.used[i] = workspace.used[j] = 1;
@@ -208,7 +220,8 @@ template <typename Scalar>
     if (workspace.used[i] != 0) matches[kept++] = matches[i];
   }
   matches.resize(kept);
-  result.coverage = trajectory_coverage(truth, estimate, truth_order, order, matches, options.expected_poses, options.offset_s);
+  result.coverage =
+      trajectory_coverage(truth, estimate, truth_order, order, matches, options.expected_poses, options.offset_s);
   if (workspace.pose.size() < 2) return result;
   result.status = Status::ok;
   detail::summarise(workspace, result.translation_m, result.rotation_deg);

@@ -13,8 +13,9 @@
 
 namespace cfp::detail {
 
-/// find_closest_index of evaluate_rpe.py over the ascending values value(0), …, value(n − 1), n > 0: a bisection that remembers
-/// the nearest value it met. Of two equally near it returns the one it met first, which no simpler search would.
+/// find_closest_index of evaluate_rpe.py over the ascending values value(0), …, value(n − 1), n > 0: a bisection that
+/// remembers the nearest value it met. Of two equally near it returns the one it met first, which no simpler search
+/// would.
 template <typename Value>
 std::size_t closest_index(std::size_t n, double target, const Value& value) noexcept {
   std::size_t begin = 0, end = n, best = 0;
@@ -37,10 +38,12 @@ std::size_t closest_index(std::size_t n, double target, const Value& value) noex
 
 /// Median time between neighbours (numpy.median); 0 below two poses.
 template <typename Scalar>
-double median_interval(span<const StampedPose<Scalar>> poses, const std::vector<std::size_t>& order, std::vector<double>& scratch) {
+double median_interval(span<const StampedPose<Scalar>> poses, const std::vector<std::size_t>& order,
+                       std::vector<double>& scratch) {
   scratch.clear();
   for (std::size_t i = 1; i < order.size(); ++i) {
-    scratch.push_back((std::min)(poses[order[i]].time_s - poses[order[i - 1]].time_s, (std::numeric_limits<double>::max)()));
+    scratch.push_back(
+        (std::min)(poses[order[i]].time_s - poses[order[i - 1]].time_s, (std::numeric_limits<double>::max)()));
   }
   return error_statistics(scratch).median;
 }

@@ -8,7 +8,8 @@
 
 namespace cfp {
 
-/// [x1, x2] x [y1, y2]. Proper when finite and x1 < x2, y1 < y2; every function below gives 0 or false for an improper one.
+/// [x1, x2] x [y1, y2]. Proper when finite and x1 < x2, y1 < y2; every function below gives 0 or false for an improper
+/// one.
 template <typename Scalar>
 struct Box {
   Scalar x1{}, y1{}, x2{}, y2{};
@@ -19,7 +20,8 @@ struct Box {
 
 template <typename Scalar>
 [[nodiscard]] constexpr bool is_proper(const Box<Scalar>& box) noexcept {
-  return is_finite(box.x1) && is_finite(box.y1) && is_finite(box.x2) && is_finite(box.y2) && box.x1 < box.x2 && box.y1 < box.y2;
+  return is_finite(box.x1) && is_finite(box.y1) && is_finite(box.x2) && is_finite(box.y2) && box.x1 < box.x2 &&
+         box.y1 < box.y2;
 }
 
 /// Area in px^2; 0 for an improper box, infinite when the product overflows.
@@ -41,7 +43,8 @@ template <typename Scalar>
   return {(std::max)(a.x1, b.x1), (std::max)(a.y1, b.y1), (std::min)(a.x2, b.x2), (std::min)(a.y2, b.y2)};
 }
 
-/// Intersection over union in [0, 1]; 0 when either box is improper or the areas overflow. Symmetric; 1 for equal boxes.
+/// Intersection over union in [0, 1]; 0 when either box is improper or the areas overflow. Symmetric; 1 for equal
+/// boxes.
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar iou(const Box<Scalar>& a, const Box<Scalar>& b) noexcept {
   const Scalar common = area(intersection(a, b));
@@ -49,8 +52,8 @@ template <typename Scalar>
   return common > Scalar(0) && is_finite(united) ? clamp_probability(common / united) : Scalar(0);
 }
 
-/// The part of the box inside the image [0, image_width] x [0, image_height]; improper when it lies outside or the image
-/// has no size.
+/// The part of the box inside the image [0, image_width] x [0, image_height]; improper when it lies outside or the
+/// image has no size.
 template <typename Scalar>
 [[nodiscard]] constexpr Box<Scalar> clip(const Box<Scalar>& box, Scalar image_width, Scalar image_height) noexcept {
   return intersection(box, Box<Scalar>{Scalar(0), Scalar(0), image_width, image_height});

@@ -6,12 +6,9 @@
 #include <Eigen/Core>
 
 #include "cfp/core/numeric.hpp"
-#include "cfp/math/so3.hpp"
+#include "cfp/core/types.hpp"
 
 namespace cfp {
-
-template <typename Scalar>
-using Matrix23 = Eigen::Matrix<Scalar, 2, 3>;
 
 /// u = fx x/z + cx, v = fy y/z + cy.
 template <typename Scalar>
@@ -22,9 +19,10 @@ struct PinholeCamera {
   Scalar cx = Scalar(0);  ///< principal point in pixels
   Scalar cy = Scalar(0);
 
-  /// Projects a point of the camera frame. Returns whether the projection is valid: z > Tolerance::min_depth and a finite
-  /// pixel; otherwise pixel and jacobian are left as they were. jacobian, when asked for: d pixel / d point.
-  bool project(const Vector3<Scalar>& point, Vector2<Scalar>& pixel, Matrix23<Scalar>* jacobian = nullptr) const noexcept {
+  /// Projects a point of the camera frame. Returns whether the projection is valid: z > Tolerance::min_depth and a
+  /// finite pixel; otherwise pixel and jacobian are left as they were. jacobian, when asked for: d pixel / d point.
+  bool project(const Vector3<Scalar>& point, Vector2<Scalar>& pixel,
+               Matrix23<Scalar>* jacobian = nullptr) const noexcept {
     if (!(point.z() > Scalar(Tolerance<Scalar>::min_depth))) return false;
     const Scalar inv_z = Scalar(1) / point.z();
     const Scalar x = point.x() * inv_z;
@@ -45,8 +43,8 @@ struct PinholeCamera {
     return true;
   }
 
-  /// The ray through a pixel, scaled to z = 1: a point at depth d is d * ray. False, and ray untouched, for a pixel or an
-  /// intrinsic that is not finite.
+  /// The ray through a pixel, scaled to z = 1: a point at depth d is d * ray. False, and ray untouched, for a pixel or
+  /// an intrinsic that is not finite.
   bool unproject(const Vector2<Scalar>& pixel, Vector3<Scalar>& ray) const noexcept {
     const Scalar x = (pixel.x() - cx) / fx;
     const Scalar y = (pixel.y() - cy) / fy;

@@ -8,10 +8,10 @@
 #include <cstdint>
 #include <limits>
 
-#include "cfp/core/chunk.hpp"
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/math/so3.hpp"
+#include "cfp/simd/chunk.hpp"
 
 namespace cfp {
 
@@ -26,8 +26,8 @@ template <typename Scalar>
   return d >= Scalar(0) && d <= Scalar((std::numeric_limits<Scalar>::max)());
 }
 
-/// Copies those of `from` that are distances, in their order; `to` needs room for all of them and may be the same memory.
-/// Returns how many there are. Without a branch per element: which distances are missing is hard to foresee.
+/// Copies those of `from` that are distances, in their order; `to` needs room for all of them and may be the same
+/// memory. Returns how many there are. Without a branch per element: which distances are missing is hard to foresee.
 template <typename Scalar>
 std::size_t copy_distances(span<const Scalar> from, span<Scalar> to) noexcept {
   CFP_ASSERT(to.size() >= from.size());
@@ -41,7 +41,8 @@ std::size_t copy_distances(span<const Scalar> from, span<Scalar> to) noexcept {
                                           static_cast<int>(d.data()[i] <= (std::numeric_limits<Scalar>::max)()));
     std::size_t kept_here = 0;
     for (std::size_t i = 0; i < detail::chunk_size; ++i) kept_here += keep[i];
-    if (kept_here == detail::chunk_size && count == detail::chunk_size) {  // mostly none is missing, or there are gaps in every chunk
+    if (kept_here == detail::chunk_size &&
+        count == detail::chunk_size) {  // mostly none is missing, or there are gaps in every chunk
       std::copy_n(d.data(), detail::chunk_size, to.data() + kept);
       kept += detail::chunk_size;
       return;

@@ -3,8 +3,8 @@
 /// sections IV-B and IV-D). Convention: x_cur^T F x_prev = 0, with pixels of an undistorted image.
 ///
 /// A distance is >= 0 and finite, or `no_distance` (-1) where there is none: the line is undefined (A = B = 0 up to
-/// rounding: the point is at the epipole, F is zero or not finite), or a coordinate is not finite. No distance depends on
-/// the scale of F.
+/// rounding: the point is at the epipole, F is zero or not finite), or a coordinate is not finite. No distance depends
+/// on the scale of F.
 #pragma once
 
 #include <cmath>
@@ -14,12 +14,12 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 
-#include "cfp/core/chunk.hpp"
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/distance.hpp"
 #include "cfp/math/se3.hpp"
+#include "cfp/simd/chunk.hpp"
 
 namespace cfp {
 
@@ -29,19 +29,22 @@ template <typename Scalar>
   return hat(T_cur_prev.translation) * T_cur_prev.rotation;
 }
 
-/// F = K_cur^-T [t]x R K_prev^-1. The scale is that of t in metres; zero when t is zero, which every distance then reports.
+/// F = K_cur^-T [t]x R K_prev^-1. The scale is that of t in metres; zero when t is zero, which every distance then
+/// reports.
 template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> fundamental_from_pose(const Matrix3<Scalar>& K_prev, const Matrix3<Scalar>& K_cur,
                                                     const SE3<Scalar>& T_cur_prev) noexcept {
   return K_cur.inverse().transpose() * essential_from_pose(T_cur_prev) * K_prev.inverse();
 }
 template <typename Scalar>
-[[nodiscard]] Matrix3<Scalar> fundamental_from_pose(const PinholeCamera<Scalar>& camera_prev, const PinholeCamera<Scalar>& camera_cur,
+[[nodiscard]] Matrix3<Scalar> fundamental_from_pose(const PinholeCamera<Scalar>& camera_prev,
+                                                    const PinholeCamera<Scalar>& camera_cur,
                                                     const SE3<Scalar>& T_cur_prev) noexcept {
   return fundamental_from_pose(camera_prev.matrix(), camera_cur.matrix(), T_cur_prev);
 }
 template <typename Scalar>
-[[nodiscard]] Matrix3<Scalar> fundamental_from_pose(const PinholeCamera<Scalar>& camera, const SE3<Scalar>& T_cur_prev) noexcept {
+[[nodiscard]] Matrix3<Scalar> fundamental_from_pose(const PinholeCamera<Scalar>& camera,
+                                                    const SE3<Scalar>& T_cur_prev) noexcept {
   return fundamental_from_pose(camera, camera, T_cur_prev);
 }
 
@@ -58,15 +61,17 @@ template <typename Scalar>
   return detail::ratio_distance(numerator, line.x() * line.x() + line.y() * line.y(), Scalar(0));
 }
 
-/// The paper's d = |x_cur^T F x_prev| / sqrt(A^2 + B^2), (A, B, C) = F x_prev: distance in pixels of the current point to
-/// the line of the previous one. no_distance where sqrt(A^2 + B^2) is below Tolerance::degenerate times the size of the
-/// terms it is summed from: such a line is rounding noise.
+/// The paper's d = |x_cur^T F x_prev| / sqrt(A^2 + B^2), (A, B, C) = F x_prev: distance in pixels of the current point
+/// to the line of the previous one. no_distance where sqrt(A^2 + B^2) is below Tolerance::degenerate times the size of
+/// the terms it is summed from: such a line is rounding noise.
 template <typename Scalar>
-[[nodiscard]] Scalar epipolar_distance(const Matrix3<Scalar>& F, const Vector2<Scalar>& x_prev, const Vector2<Scalar>& x_cur) noexcept {
+[[nodiscard]] Scalar epipolar_distance(const Matrix3<Scalar>& F, const Vector2<Scalar>& x_prev,
+                                       const Vector2<Scalar>& x_cur) noexcept {
   const Matrix3<Scalar> G = detail::unit_scale(F);
   const Vector3<Scalar> line = epipolar_line(G, x_prev);
   const Scalar noise = detail::line_noise(G) * (x_prev.squaredNorm() + Scalar(1));
-  return detail::ratio_distance(line.x() * x_cur.x() + line.y() * x_cur.y() + line.z(), line.x() * line.x() + line.y() * line.y(), noise);
+  return detail::ratio_distance(line.x() * x_cur.x() + line.y() * x_cur.y() + line.z(),
+                                line.x() * line.x() + line.y() * line.y(), noise);
 }
 
 /// Mean of the distances in both images, in pixels: invariant when the two views change roles (F becomes F^T).
@@ -76,20 +81,23 @@ template <typename Scalar>
                                                  const Vector2<Scalar>& x_cur) noexcept {
   const Scalar in_cur = epipolar_distance(F, x_prev, x_cur);
   const Scalar in_prev = epipolar_distance(Matrix3<Scalar>(F.transpose()), x_cur, x_prev);
-  return has_distance(in_cur) && has_distance(in_prev) ? Scalar(0.5) * in_cur + Scalar(0.5) * in_prev : Scalar(no_distance<double>);
+  return has_distance(in_cur) && has_distance(in_prev) ? Scalar(0.5) * in_cur + Scalar(0.5) * in_prev
+                                                       : Scalar(no_distance<double>);
 }
 
-/// |x_cur^T F x_prev| / sqrt(A^2 + B^2 + A'^2 + B'^2), (A', B', C') = F^T x_cur: to first order the distance in pixels of
-/// the pair to the nearest pair that fulfils the constraint (Sampson). Hartley, Zisserman, 2nd ed., eq. (11.9).
+/// |x_cur^T F x_prev| / sqrt(A^2 + B^2 + A'^2 + B'^2), (A', B', C') = F^T x_cur: to first order the distance in pixels
+/// of the pair to the nearest pair that fulfils the constraint (Sampson). Hartley, Zisserman, 2nd ed., eq. (11.9).
 template <typename Scalar>
-[[nodiscard]] Scalar sampson_distance(const Matrix3<Scalar>& F, const Vector2<Scalar>& x_prev, const Vector2<Scalar>& x_cur) noexcept {
+[[nodiscard]] Scalar sampson_distance(const Matrix3<Scalar>& F, const Vector2<Scalar>& x_prev,
+                                      const Vector2<Scalar>& x_cur) noexcept {
   const Matrix3<Scalar> G = detail::unit_scale(F);
   const Matrix3<Scalar> G_transposed = G.transpose();
   const Vector3<Scalar> line = epipolar_line(G, x_prev);
   const Vector3<Scalar> line_prev = epipolar_line(G_transposed, x_cur);
-  const Scalar norm_sq = line.x() * line.x() + line.y() * line.y() + line_prev.x() * line_prev.x() + line_prev.y() * line_prev.y();
-  const Scalar noise =
-      detail::line_noise(G) * (x_prev.squaredNorm() + Scalar(1)) + detail::line_noise(G_transposed) * (x_cur.squaredNorm() + Scalar(1));
+  const Scalar norm_sq =
+      line.x() * line.x() + line.y() * line.y() + line_prev.x() * line_prev.x() + line_prev.y() * line_prev.y();
+  const Scalar noise = detail::line_noise(G) * (x_prev.squaredNorm() + Scalar(1)) +
+                       detail::line_noise(G_transposed) * (x_cur.squaredNorm() + Scalar(1));
   return detail::ratio_distance(line.x() * x_cur.x() + line.y() * x_cur.y() + line.z(), norm_sq, noise);
 }
 
@@ -97,7 +105,8 @@ template <typename Scalar>
 /// nothing; the result of a pair does not depend on its place in the arrays.
 template <typename Scalar>
 void epipolar_distances(const Matrix3<Scalar>& F, const PointSpan<detail::non_deduced<Scalar>, 2>& prev,
-                        const PointSpan<detail::non_deduced<Scalar>, 2>& cur, span<detail::non_deduced<Scalar>> out) noexcept {
+                        const PointSpan<detail::non_deduced<Scalar>, 2>& cur,
+                        span<detail::non_deduced<Scalar>> out) noexcept {
   CFP_ASSERT(prev.size() == cur.size() && prev.size() == out.size());
   const Matrix3<Scalar> G = detail::unit_scale(F);
   const Scalar noise = detail::line_noise(G);

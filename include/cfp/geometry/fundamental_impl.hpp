@@ -1,5 +1,6 @@
 /// @file fundamental_impl.hpp
-/// Inner parts of fundamental.hpp and fundamental_ransac.hpp: scaling of pixels, the seven-point core. Not an interface.
+/// Inner parts of fundamental.hpp and fundamental_ransac.hpp: scaling of pixels, the seven-point core. Not an
+/// interface.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +20,8 @@ namespace cfp::detail {
 inline constexpr double max_pixel = 1e5;  // beyond it a coordinate is taken for a broken one; no image is that large
 
 template <typename Scalar>
-[[nodiscard]] bool usable_pair(const PointSpan<Scalar, 2>& prev, const PointSpan<Scalar, 2>& cur, std::size_t i) noexcept {
+[[nodiscard]] bool usable_pair(const PointSpan<Scalar, 2>& prev, const PointSpan<Scalar, 2>& cur,
+                               std::size_t i) noexcept {
   using std::abs;
   const Scalar limit = Scalar(max_pixel);
   return abs(prev(i, 0)) < limit && abs(prev(i, 1)) < limit && abs(cur(i, 0)) < limit && abs(cur(i, 1)) < limit;
@@ -27,8 +29,8 @@ template <typename Scalar>
 
 // The weight of a pair; 0 for one that counts as absent.
 template <typename Scalar>
-[[nodiscard]] double pair_weight(const PointSpan<Scalar, 2>& prev, const PointSpan<Scalar, 2>& cur, const span<const Scalar>& weights,
-                                 std::size_t i) noexcept {
+[[nodiscard]] double pair_weight(const PointSpan<Scalar, 2>& prev, const PointSpan<Scalar, 2>& cur,
+                                 const span<const Scalar>& weights, std::size_t i) noexcept {
   const double w = weights.empty() ? 1.0 : static_cast<double>(weights[i]);
   return w > 0 && is_finite(w) && usable_pair(prev, cur, i) ? w : 0.0;
 }
@@ -52,10 +54,12 @@ struct PixelScaling {
   }
 };
 
-// Weighted centroid to the origin, weighted mean distance to sqrt 2, in each image. Returns the number of pairs present.
+// Weighted centroid to the origin, weighted mean distance to sqrt 2, in each image. Returns the number of pairs
+// present.
 template <typename Scalar>
-std::size_t scale_pixels(const PointSpan<Scalar, 2>& prev, const PointSpan<Scalar, 2>& cur, const span<const Scalar>& weights,
-                         PixelScaling& scale_prev, PixelScaling& scale_cur) noexcept {
+std::size_t scale_pixels(const PointSpan<Scalar, 2>& prev, const PointSpan<Scalar, 2>& cur,
+                         const span<const Scalar>& weights, PixelScaling& scale_prev,
+                         PixelScaling& scale_cur) noexcept {
   std::size_t used = 0;
   double largest = 0;
   for (std::size_t i = 0; i < prev.size(); ++i) {
@@ -80,7 +84,8 @@ std::size_t scale_pixels(const PointSpan<Scalar, 2>& prev, const PointSpan<Scala
     if (!(w > 0)) continue;
     for (int k = 0; k < 2; ++k) {
       const PointSpan<Scalar, 2>& points = k == 0 ? prev : cur;
-      const double dx = static_cast<double>(points(i, 0)) - scale[k].x, dy = static_cast<double>(points(i, 1)) - scale[k].y;
+      const double dx = static_cast<double>(points(i, 0)) - scale[k].x,
+                   dy = static_cast<double>(points(i, 1)) - scale[k].y;
       spread[k] += w * std::sqrt(dx * dx + dy * dy);
     }
   }
@@ -96,8 +101,8 @@ std::size_t scale_pixels(const PointSpan<Scalar, 2>& prev, const PointSpan<Scala
   return (scale_cur.matrix().transpose() * F * scale_prev.matrix()).normalized();
 }
 
-// Null space of the seven epipolar equations by elimination with complete pivoting (rows and columns), which stays exact when any
-// of the nine coefficients vanishes (pure translations do that). False when the rank is below seven.
+// Null space of the seven epipolar equations by elimination with complete pivoting (rows and columns), which stays
+// exact when any of the nine coefficients vanishes (pure translations do that). False when the rank is below seven.
 [[nodiscard]] inline bool seven_point_null_space(double (&A)[7][9], Matrix3<double>& F1, Matrix3<double>& F2) noexcept {
   int column[9] = {0, 1, 2, 3, 4, 5, 6, 7, 8};
   double first_pivot = 0;
@@ -140,7 +145,8 @@ std::size_t scale_pixels(const PointSpan<Scalar, 2>& prev, const PointSpan<Scala
 }
 
 // Seven-point solver on scaled pixels: the matrices of the pencil through the null space whose determinant vanishes.
-[[nodiscard]] inline int solve_seven_point(const double (&p)[7][2], const double (&q)[7][2], Matrix3<double> (&F)[3]) noexcept {
+[[nodiscard]] inline int solve_seven_point(const double (&p)[7][2], const double (&q)[7][2],
+                                           Matrix3<double> (&F)[3]) noexcept {
   double A[7][9];
   for (int i = 0; i < 7; ++i) {
     const double row[9] = {q[i][0] * p[i][0], q[i][0] * p[i][1], q[i][0], q[i][1] * p[i][0], q[i][1] * p[i][1], q[i][1],
@@ -149,8 +155,8 @@ std::size_t scale_pixels(const PointSpan<Scalar, 2>& prev, const PointSpan<Scala
   }
   Matrix3<double> a, b;
   if (!seven_point_null_space(A, a, b)) return 0;
-  // det(a + x b) has at most three roots, so among four members of the pencil one has a determinant well away from zero: that
-  // one as b makes the cubic's leading coefficient safe and leaves no root at infinity.
+  // det(a + x b) has at most three roots, so among four members of the pencil one has a determinant well away from
+  // zero: that one as b makes the cubic's leading coefficient safe and leaves no root at infinity.
   const Matrix3<double> candidates[4] = {b, a, (a + b).normalized(), (a - b).normalized()};
   int best = 0;
   double det_b = candidates[0].determinant();
@@ -168,8 +174,8 @@ std::size_t scale_pixels(const PointSpan<Scalar, 2>& prev, const PointSpan<Scala
     cofactor_b.col(i) = b.col((i + 1) % 3).cross(b.col((i + 2) % 3));
   }
   double roots[3];
-  const int count =
-      real_cubic_roots(cofactor_b.cwiseProduct(a).sum() / det_b, cofactor_a.cwiseProduct(b).sum() / det_b, a.determinant() / det_b, roots);
+  const int count = real_cubic_roots(cofactor_b.cwiseProduct(a).sum() / det_b, cofactor_a.cwiseProduct(b).sum() / det_b,
+                                     a.determinant() / det_b, roots);
   for (int k = 0; k < count; ++k) F[k] = (a + roots[k] * b).normalized();
   return count;
 }

@@ -1,22 +1,23 @@
 /// @file homography.hpp
-/// Transfer distance of correspondences under a homography: what is left of two-view geometry when the camera only turns
-/// or stands still, where no fundamental matrix exists.
+/// Transfer distance of correspondences under a homography: what is left of two-view geometry when the camera only
+/// turns or stands still, where no fundamental matrix exists.
 #pragma once
 
 #include <cmath>
 
-#include "cfp/core/chunk.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/geometry/distance.hpp"
 #include "cfp/math/so3.hpp"
+#include "cfp/simd/chunk.hpp"
 
 namespace cfp {
 
-/// || x_cur - H x_prev || in pixels of the current image, H x_prev divided by its last component. `no_distance` (-1) where
-/// that component is not positive (the point maps behind the camera or to infinity; H is taken with det > 0) or the
-/// distance is not finite. Does not depend on the scale of H.
+/// || x_cur - H x_prev || in pixels of the current image, H x_prev divided by its last component. `no_distance` (-1)
+/// where that component is not positive (the point maps behind the camera or to infinity; H is taken with det > 0) or
+/// the distance is not finite. Does not depend on the scale of H.
 template <typename Scalar>
-[[nodiscard]] Scalar transfer_distance(const Matrix3<Scalar>& H, const Vector2<Scalar>& x_prev, const Vector2<Scalar>& x_cur) noexcept {
+[[nodiscard]] Scalar transfer_distance(const Matrix3<Scalar>& H, const Vector2<Scalar>& x_prev,
+                                       const Vector2<Scalar>& x_cur) noexcept {
   using std::sqrt;
   const Vector3<Scalar> mapped = H * x_prev.homogeneous();
   if (!(mapped.z() > Scalar(0))) return Scalar(no_distance<double>);
@@ -27,7 +28,8 @@ template <typename Scalar>
 /// transfer_distance of every correspondence. Allocates nothing.
 template <typename Scalar>
 void transfer_distances(const Matrix3<Scalar>& H, const PointSpan<detail::non_deduced<Scalar>, 2>& prev,
-                        const PointSpan<detail::non_deduced<Scalar>, 2>& cur, span<detail::non_deduced<Scalar>> out) noexcept {
+                        const PointSpan<detail::non_deduced<Scalar>, 2>& cur,
+                        span<detail::non_deduced<Scalar>> out) noexcept {
   CFP_ASSERT(prev.size() == out.size() && cur.size() == out.size());
   for (std::size_t i = 0; i < out.size(); ++i) out[i] = transfer_distance<Scalar>(H, prev[i], cur[i]);
 }

@@ -1,6 +1,7 @@
 /// @file p3p.hpp
 /// Camera pose from three points: the minimal absolute pose problem, all real solutions.
-/// Source: Persson and Nordberg: "Lambda Twist: an accurate fast robust perspective three point (P3P) solver", ECCV 2018.
+/// Source: Persson and Nordberg: "Lambda Twist: an accurate fast robust perspective three point (P3P) solver", ECCV
+/// 2018.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +24,8 @@ template <typename Scalar>
 struct P3PSolutions {
   std::array<SE3<Scalar>, 4> T_cam_world;  ///< the first `count` are set
   int count = 0;
-  Status status = Status::degenerate;  ///< ok, degenerate (collinear or coincident points or rays) or invalid_input (not finite)
+  Status status =
+      Status::degenerate;  ///< ok, degenerate (collinear or coincident points or rays) or invalid_input (not finite)
 };
 
 }  // namespace cfp
@@ -32,11 +34,11 @@ struct P3PSolutions {
 
 namespace cfp {
 
-/// Every pose with rotation * world[i] + translation on ray[i], in front of the camera, i = 0, 1, 2. Rays of any length > 0, in
-/// the camera frame (PinholeCamera::unproject), points in metres or any other unit. Depths solve three quadrics; their pencil
-/// holds a pair of planes, which leaves two quadratic equations; the depths are then polished by Newton steps. Solutions of the
-/// same pose (a double root) may be listed twice. Status::ok with count 0: the three rays fit no such triangle. Works in
-/// double; allocates nothing; one to three microseconds.
+/// Every pose with rotation * world[i] + translation on ray[i], in front of the camera, i = 0, 1, 2. Rays of any length
+/// > 0, in the camera frame (PinholeCamera::unproject), points in metres or any other unit. Depths solve three
+/// quadrics; their pencil holds a pair of planes, which leaves two quadratic equations; the depths are then polished by
+/// Newton steps. Solutions of the same pose (a double root) may be listed twice. Status::ok with count 0: the three
+/// rays fit no such triangle. Works in double; allocates nothing; one to three microseconds.
 template <typename Scalar>
 [[nodiscard]] P3PSolutions<Scalar> p3p(span<const Vector3<Scalar>> rays, span<const Vector3<Scalar>> world) noexcept {
   CFP_ASSERT(rays.size() == 3 && world.size() == 3);
@@ -58,7 +60,8 @@ template <typename Scalar>
   const Vector3<double> origin = x[0];
   // Relative coordinates of unit size: squares neither overflow nor vanish, and the thresholds have no unit.
   for (Vector3<double>& point : x) point = (point - origin) / size;
-  if (!(size > 0) || !(x[1].cross(x[2]).norm() > 1e-10) || !(std::abs(y[0].dot(y[1].cross(y[2]))) > 1e-12)) return result;
+  if (!(size > 0) || !(x[1].cross(x[2]).norm() > 1e-10) || !(std::abs(y[0].dot(y[1].cross(y[2]))) > 1e-12))
+    return result;
 
   result.status = Status::ok;
   double depths[4][3];
@@ -66,7 +69,8 @@ template <typename Scalar>
   const Matrix3<double> inverse_frame = detail::triangle_frame(x[1], x[2]).inverse();
   for (int k = 0; k < count; ++k) {
     const Vector3<double> first = depths[k][0] * y[0];
-    const Matrix3<double> R = detail::triangle_frame(depths[k][1] * y[1] - first, depths[k][2] * y[2] - first) * inverse_frame;
+    const Matrix3<double> R =
+        detail::triangle_frame(depths[k][1] * y[1] - first, depths[k][2] * y[2] - first) * inverse_frame;
     const Vector3<double> t = size * first - R * origin;
     if (!R.allFinite() || !t.template cast<Scalar>().allFinite()) continue;
     SE3<Scalar>& T = result.T_cam_world[static_cast<std::size_t>(result.count++)];

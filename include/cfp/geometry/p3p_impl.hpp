@@ -28,8 +28,8 @@ namespace cfp::detail {
 [[nodiscard]] inline bool plane_pair(const Matrix3<double>& D, Vector3<double> (&normals)[2]) noexcept {
   // Eigenvalues 0 and the roots of s^2 - tr s + m, m the sum of the principal minors.
   const double trace = D.trace();
-  const double minors =
-      D(0, 0) * D(1, 1) - D(0, 1) * D(0, 1) + D(0, 0) * D(2, 2) - D(0, 2) * D(0, 2) + D(1, 1) * D(2, 2) - D(1, 2) * D(1, 2);
+  const double minors = D(0, 0) * D(1, 1) - D(0, 1) * D(0, 1) + D(0, 0) * D(2, 2) - D(0, 2) * D(0, 2) +
+                        D(1, 1) * D(2, 2) - D(1, 2) * D(1, 2);
   if (!(minors <= 0)) return false;
   const double root = std::sqrt(0.25 * trace * trace - minors);
   const double large = trace > 0 ? 0.5 * trace + root : 0.5 * trace - root;
@@ -58,8 +58,10 @@ namespace cfp::detail {
   return normals[0].allFinite() && normals[1].allFinite();
 }
 
-// Gauss-Newton on the three squared edge lengths |d_i y_i - d_j y_j|^2. Returns the final error, relative to the longest edge.
-[[nodiscard]] inline double polish_depths(const double (&cosine)[3], const double (&length_sq)[3], double (&d)[3]) noexcept {
+// Gauss-Newton on the three squared edge lengths |d_i y_i - d_j y_j|^2. Returns the final error, relative to the
+// longest edge.
+[[nodiscard]] inline double polish_depths(const double (&cosine)[3], const double (&length_sq)[3],
+                                          double (&d)[3]) noexcept {
   double error = std::numeric_limits<double>::infinity();
   for (int step = 0; step < 10; ++step) {
     Vector3<double> r;
@@ -82,8 +84,10 @@ namespace cfp::detail {
   return error;
 }
 
-// All positive depths of three points x on unit rays y; x within a unit cube of size one. Edges: 0 = (0,1), 1 = (0,2), 2 = (1,2).
-[[nodiscard]] inline int p3p_depths(const Vector3<double> (&y)[3], const Vector3<double> (&x)[3], double (&depths)[4][3]) noexcept {
+// All positive depths of three points x on unit rays y; x within a unit cube of size one. Edges: 0 = (0,1), 1 = (0,2),
+// 2 = (1,2).
+[[nodiscard]] inline int p3p_depths(const Vector3<double> (&y)[3], const Vector3<double> (&x)[3],
+                                    double (&depths)[4][3]) noexcept {
   const double cosine[3] = {y[0].dot(y[1]), y[0].dot(y[2]), y[1].dot(y[2])};
   const double length_sq[3] = {(x[0] - x[1]).squaredNorm(), (x[0] - x[2]).squaredNorm(), (x[1] - x[2]).squaredNorm()};
   const auto edge = [&](int k) {
@@ -101,19 +105,22 @@ namespace cfp::detail {
     cofactor1.col(i) = D1.col((i + 1) % 3).cross(D1.col((i + 2) % 3));
     cofactor2.col(i) = D2.col((i + 1) % 3).cross(D2.col((i + 2) % 3));
   }
-  const double c3 = D2.determinant(), c2 = cofactor2.cwiseProduct(D1).sum(), c1 = cofactor1.cwiseProduct(D2).sum(), c0 = D1.determinant();
+  const double c3 = D2.determinant(), c2 = cofactor2.cwiseProduct(D1).sum(), c1 = cofactor1.cwiseProduct(D2).sum(),
+               c0 = D1.determinant();
   // The leading coefficient must be safe; the pencil may as well be taken from its other end.
   const bool swap = std::abs(c0) > std::abs(c3);
   double roots[3];
-  const int root_count = swap ? real_cubic_roots(c1 / c0, c2 / c0, c3 / c0, roots) : real_cubic_roots(c2 / c3, c1 / c3, c0 / c3, roots);
+  const int root_count =
+      swap ? real_cubic_roots(c1 / c0, c2 / c0, c3 / c0, roots) : real_cubic_roots(c2 / c3, c1 / c3, c0 / c3, roots);
 
-  // Any root whose quadric is a pair of real planes gives every solution; the one with the most pronounced pair gives them best.
+  // Any root whose quadric is a pair of real planes gives every solution; the one with the most pronounced pair gives
+  // them best.
   Vector3<double> normals[2];
   double best = 0;
   for (int k = 0; k < root_count; ++k) {
     const Matrix3<double> D = swap ? Matrix3<double>(D2 + roots[k] * D1) : Matrix3<double>(D1 + roots[k] * D2);
-    const double minors =
-        D(0, 0) * D(1, 1) - D(0, 1) * D(0, 1) + D(0, 0) * D(2, 2) - D(0, 2) * D(0, 2) + D(1, 1) * D(2, 2) - D(1, 2) * D(1, 2);
+    const double minors = D(0, 0) * D(1, 1) - D(0, 1) * D(0, 1) + D(0, 0) * D(2, 2) - D(0, 2) * D(0, 2) +
+                          D(1, 1) * D(2, 2) - D(1, 2) * D(1, 2);
     const double quality = -minors / D.squaredNorm();
     Vector3<double> candidate[2];
     if (!(quality > best) || !plane_pair(D, candidate)) continue;

@@ -27,7 +27,8 @@ template <typename Scalar>
   // Else the minimum may lie inside, where the derivative a + 2 b s + 3 c s^2 vanishes.
   const Scalar discriminant = b * b - Scalar(3) * a * c;
   if (!(discriminant >= zero)) return true;
-  const Scalar q = b < zero ? Scalar(sqrt(discriminant) - b) : Scalar(-b - sqrt(discriminant));  // the sum without cancellation
+  const Scalar q =
+      b < zero ? Scalar(sqrt(discriminant) - b) : Scalar(-b - sqrt(discriminant));  // the sum without cancellation
   const auto fails_at = [&](const Scalar& s) { return s > zero && s < end && !(value(s) > zero); };
   return !fails_at(q / (Scalar(3) * c)) && !fails_at(a / q);
 }
@@ -39,9 +40,9 @@ template <typename Scalar>
 ///   y' = y (1 + k1 s + k2 s^2 + k3 s^3) + p1 (s + 2 y^2) + 2 p2 x y
 ///   u = fx x' + cx, v = fy y' + cy.
 ///
-/// The polynomial is a model of the lens only up to its fold, where a larger angle begins to give a smaller radius: beyond
-/// it several rays share a pixel. Points beyond the fold (the radial derivative 1 + 3 k1 s + 5 k2 s^2 + 7 k3 s^3 has met
-/// zero between the axis and s, or the full Jacobian has no positive determinant) are not projected.
+/// The polynomial is a model of the lens only up to its fold, where a larger angle begins to give a smaller radius:
+/// beyond it several rays share a pixel. Points beyond the fold (the radial derivative 1 + 3 k1 s + 5 k2 s^2 + 7 k3 s^3
+/// has met zero between the axis and s, or the full Jacobian has no positive determinant) are not projected.
 template <typename Scalar>
 struct RadialTangentialCamera {
   using ScalarType = Scalar;
@@ -55,12 +56,14 @@ struct RadialTangentialCamera {
   Scalar p2 = Scalar(0);
   Scalar k3 = Scalar(0);  ///< radial, sixth order; last, as in OpenCV
 
-  /// The same camera without its distortion: where the pixels of an undistorted image belong, as epipolar lines need them.
+  /// The same camera without its distortion: where the pixels of an undistorted image belong, as epipolar lines need
+  /// them.
   [[nodiscard]] PinholeCamera<Scalar> pinhole() const noexcept { return {fx, fy, cx, cy}; }
 
-  /// Projects a point of the camera frame. Returns whether the projection is valid: z > Tolerance::min_depth, before the
-  /// fold, a finite pixel; otherwise pixel and jacobian are left as they were. jacobian: d pixel / d point.
-  bool project(const Vector3<Scalar>& point, Vector2<Scalar>& pixel, Matrix23<Scalar>* jacobian = nullptr) const noexcept {
+  /// Projects a point of the camera frame. Returns whether the projection is valid: z > Tolerance::min_depth, before
+  /// the fold, a finite pixel; otherwise pixel and jacobian are left as they were. jacobian: d pixel / d point.
+  bool project(const Vector3<Scalar>& point, Vector2<Scalar>& pixel,
+               Matrix23<Scalar>* jacobian = nullptr) const noexcept {
     if (!(point.z() > Scalar(Tolerance<Scalar>::min_depth))) return false;
     const Scalar inv_z = Scalar(1) / point.z();
     const Scalar x = point.x() * inv_z;
@@ -86,8 +89,9 @@ struct RadialTangentialCamera {
     return true;
   }
 
-  /// The ray through a pixel, scaled to z = 1, by Newton's method from the axis with step halving. False, and ray untouched,
-  /// when no ray before the fold gives the pixel, or anything is not finite. At most 40 evaluations of the model.
+  /// The ray through a pixel, scaled to z = 1, by Newton's method from the axis with step halving. False, and ray
+  /// untouched, when no ray before the fold gives the pixel, or anything is not finite. At most 40 evaluations of the
+  /// model.
   bool unproject(const Vector2<Scalar>& pixel, Vector3<Scalar>& ray) const noexcept {
     const Scalar target_x = (pixel.x() - cx) / fx;
     const Scalar target_y = (pixel.y() - cy) / fy;
@@ -130,7 +134,8 @@ struct RadialTangentialCamera {
   bool distort(const Scalar& x, const Scalar& y, Distorted& d) const noexcept {
     const Scalar s = x * x + y * y;
     const Scalar radial = Scalar(1) + s * (k1 + s * (k2 + s * k3));
-    const Scalar twice_slope = Scalar(2) * (k1 + s * (Scalar(2) * k2 + s * Scalar(3) * k3));  // of `radial` along x is x times this
+    const Scalar twice_slope =
+        Scalar(2) * (k1 + s * (Scalar(2) * k2 + s * Scalar(3) * k3));  // of `radial` along x is x times this
     d.x = x * radial + Scalar(2) * p1 * x * y + p2 * (s + Scalar(2) * x * x);
     d.y = y * radial + p1 * (s + Scalar(2) * y * y) + Scalar(2) * p2 * x * y;
     d.xx = radial + x * x * twice_slope + Scalar(2) * p1 * y + Scalar(6) * p2 * x;

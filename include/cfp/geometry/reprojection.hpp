@@ -2,8 +2,8 @@
 /// Reprojection distance, the projection constraint of paper section IV-D: a keypoint of the previous frame is
 /// back-projected with its depth, moved by T_cur_prev, projected, and compared with its match in the current frame.
 ///
-/// The distance is in pixels, >= 0 and finite, or `no_distance` (-1): no valid depth (or one beyond 1e-6 of the largest number),
-/// behind the camera (or outside what the camera model can project), or a pixel that is not finite.
+/// The distance is in pixels, >= 0 and finite, or `no_distance` (-1): no valid depth (or one beyond 1e-6 of the largest
+/// number), behind the camera (or outside what the camera model can project), or a pixel that is not finite.
 #pragma once
 
 #include <cmath>
@@ -12,17 +12,18 @@
 
 #include <Eigen/Core>
 
-#include "cfp/core/chunk.hpp"
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/distance.hpp"
 #include "cfp/math/se3.hpp"
+#include "cfp/simd/chunk.hpp"
 
 namespace cfp {
 
 namespace detail {
-/// Largest depth that is back-projected: beyond it a moved point may overflow, which would project to a wrong but finite pixel.
+/// Largest depth that is back-projected: beyond it a moved point may overflow, which would project to a wrong but
+/// finite pixel.
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar max_reprojected_depth() noexcept {
   return Scalar(1e-6) * (std::numeric_limits<Scalar>::max)();
@@ -31,12 +32,15 @@ template <typename Scalar>
 
 /// d_T = || pixel_cur - project(T_cur_prev * depth_prev * ray(pixel_prev)) ||, depth along z in metres.
 template <typename Camera, typename Scalar>
-[[nodiscard]] Scalar reprojection_distance(const Camera& camera, const SE3<Scalar>& T_cur_prev, const Vector2<Scalar>& pixel_prev,
-                                           const detail::non_deduced<Scalar>& depth_prev, const Vector2<Scalar>& pixel_cur) noexcept {
+[[nodiscard]] Scalar reprojection_distance(const Camera& camera, const SE3<Scalar>& T_cur_prev,
+                                           const Vector2<Scalar>& pixel_prev,
+                                           const detail::non_deduced<Scalar>& depth_prev,
+                                           const Vector2<Scalar>& pixel_cur) noexcept {
   using std::sqrt;
   Vector3<Scalar> ray = Vector3<Scalar>::Zero();
   Vector2<Scalar> projected = Vector2<Scalar>::Zero();
-  if (!(depth_prev > Scalar(0) && depth_prev <= Scalar(detail::max_reprojected_depth<Scalar>()))) return Scalar(no_distance<double>);
+  if (!(depth_prev > Scalar(0) && depth_prev <= Scalar(detail::max_reprojected_depth<Scalar>())))
+    return Scalar(no_distance<double>);
   if (!camera.unproject(pixel_prev, ray)) return Scalar(no_distance<double>);
   const Vector3<Scalar> point = ray * depth_prev;
   if (!camera.project(T_cur_prev * point, projected)) return Scalar(no_distance<double>);
@@ -48,18 +52,23 @@ template <typename Camera, typename Scalar>
 /// reprojection_distance of every correspondence, for any camera. Allocates nothing.
 template <typename Camera>
 void reprojection_distances(const Camera& camera, const SE3<typename Camera::ScalarType>& T_cur_prev,
-                            const PointSpan<typename Camera::ScalarType, 2>& prev, span<const typename Camera::ScalarType> depth_prev,
-                            const PointSpan<typename Camera::ScalarType, 2>& cur, span<typename Camera::ScalarType> out) noexcept {
+                            const PointSpan<typename Camera::ScalarType, 2>& prev,
+                            span<const typename Camera::ScalarType> depth_prev,
+                            const PointSpan<typename Camera::ScalarType, 2>& cur,
+                            span<typename Camera::ScalarType> out) noexcept {
   CFP_ASSERT(prev.size() == out.size() && depth_prev.size() == out.size() && cur.size() == out.size());
-  for (std::size_t i = 0; i < out.size(); ++i) out[i] = reprojection_distance(camera, T_cur_prev, prev[i], depth_prev[i], cur[i]);
+  for (std::size_t i = 0; i < out.size(); ++i)
+    out[i] = reprojection_distance(camera, T_cur_prev, prev[i], depth_prev[i], cur[i]);
 }
 
-/// The same for the pinhole camera, vectorised. Equal to the scalar function up to rounding; the result of a keypoint does not
-/// depend on its place in the arrays.
+/// The same for the pinhole camera, vectorised. Equal to the scalar function up to rounding; the result of a keypoint
+/// does not depend on its place in the arrays.
 template <typename Scalar>
 void reprojection_distances(const PinholeCamera<Scalar>& camera, const SE3<detail::non_deduced<Scalar>>& T_cur_prev,
-                            const PointSpan<detail::non_deduced<Scalar>, 2>& prev, span<const detail::non_deduced<Scalar>> depth_prev,
-                            const PointSpan<detail::non_deduced<Scalar>, 2>& cur, span<detail::non_deduced<Scalar>> out) noexcept {
+                            const PointSpan<detail::non_deduced<Scalar>, 2>& prev,
+                            span<const detail::non_deduced<Scalar>> depth_prev,
+                            const PointSpan<detail::non_deduced<Scalar>, 2>& cur,
+                            span<detail::non_deduced<Scalar>> out) noexcept {
   CFP_ASSERT(prev.size() == out.size() && depth_prev.size() == out.size() && cur.size() == out.size());
   const Matrix3<Scalar> R = T_cur_prev.rotation;
   const Vector3<Scalar> t = T_cur_prev.translation;

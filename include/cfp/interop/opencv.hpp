@@ -1,8 +1,8 @@
 /// @file opencv.hpp
-/// OpenCV's types as cfp's views and values. The only header that sees OpenCV; it needs opencv2/core's headers and none of
-/// its libraries (no OpenCV object is made here, elements are read through their addresses), so including it forces
-/// nothing on a program. Names follow ORB-SLAM2-like systems: keypoints in std::vector<cv::KeyPoint>, depth as CV_16U or
-/// CV_32F, poses as 4x4 CV_32F.
+/// OpenCV's types as cfp's views and values. The only header that sees OpenCV; it needs opencv2/core's headers and none
+/// of its libraries (no OpenCV object is made here, elements are read through their addresses), so including it forces
+/// nothing on a program. Names follow ORB-SLAM2-like systems: keypoints in std::vector<cv::KeyPoint>, depth as CV_16U
+/// or CV_32F, poses as 4x4 CV_32F.
 #pragma once
 
 #include <cstddef>
@@ -27,15 +27,18 @@ namespace cfp {
 /// Views of OpenCV's point vectors; valid while the vector is neither destroyed nor resized. Nothing is copied.
 template <typename Scalar>
 [[nodiscard]] PointSpan<Scalar, 2> view(const std::vector<cv::Point_<Scalar>>& points) noexcept {
-  return points.empty() ? PointSpan<Scalar, 2>() : PointSpan<Scalar, 2>(&points.front().x, points.size(), sizeof(cv::Point_<Scalar>));
+  return points.empty() ? PointSpan<Scalar, 2>()
+                        : PointSpan<Scalar, 2>(&points.front().x, points.size(), sizeof(cv::Point_<Scalar>));
 }
 template <typename Scalar>
 [[nodiscard]] PointSpan<Scalar, 3> view(const std::vector<cv::Point3_<Scalar>>& points) noexcept {
-  return points.empty() ? PointSpan<Scalar, 3>() : PointSpan<Scalar, 3>(&points.front().x, points.size(), sizeof(cv::Point3_<Scalar>));
+  return points.empty() ? PointSpan<Scalar, 3>()
+                        : PointSpan<Scalar, 3>(&points.front().x, points.size(), sizeof(cv::Point3_<Scalar>));
 }
 /// The positions `pt` of keypoints, in pixels, where they lie among the other fields.
 [[nodiscard]] inline PointSpan<float, 2> view(const std::vector<cv::KeyPoint>& keypoints) noexcept {
-  return keypoints.empty() ? PointSpan<float, 2>() : PointSpan<float, 2>(&keypoints.front().pt.x, keypoints.size(), sizeof(cv::KeyPoint));
+  return keypoints.empty() ? PointSpan<float, 2>()
+                           : PointSpan<float, 2>(&keypoints.front().pt.x, keypoints.size(), sizeof(cv::KeyPoint));
 }
 template <typename Element>
 void view(const std::vector<Element>&& temporary) = delete;
@@ -54,7 +57,10 @@ namespace detail {
 template <typename T>
 [[nodiscard]] T matrix_element(const cv::Mat& matrix, int row, int column) noexcept {
   T value;
-  std::memcpy(&value, matrix.data + matrix.step.p[0] * static_cast<std::size_t>(row) + sizeof(T) * static_cast<std::size_t>(column), sizeof(T));
+  std::memcpy(
+      &value,
+      matrix.data + matrix.step.p[0] * static_cast<std::size_t>(row) + sizeof(T) * static_cast<std::size_t>(column),
+      sizeof(T));
   return value;
 }
 
@@ -63,14 +69,16 @@ template <typename T>
 }
 
 template <typename T>
-bool sample_depth_of(const cv::Mat& depth, const PointSpan<float, 2>& pixels, double metres_per_unit, span<float> depth_m) noexcept {
+bool sample_depth_of(const cv::Mat& depth, const PointSpan<float, 2>& pixels, double metres_per_unit,
+                     span<float> depth_m) noexcept {
   bool any = false;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     depth_m[i] = -1.0F;
     // Compared before the conversion to int: NaN and values beyond int take the failing branch.
     const double column = static_cast<double>(pixels(i, 0)) + 0.5, row = static_cast<double>(pixels(i, 1)) + 0.5;
     if (!(column >= 0 && column < depth.cols && row >= 0 && row < depth.rows)) continue;
-    const double metres = metres_per_unit * static_cast<double>(matrix_element<T>(depth, static_cast<int>(row), static_cast<int>(column)));
+    const double metres = metres_per_unit * static_cast<double>(matrix_element<T>(depth, static_cast<int>(row),
+                                                                                  static_cast<int>(column)));
     if (!(metres > 0 && metres <= static_cast<double>((std::numeric_limits<float>::max)()))) continue;
     depth_m[i] = static_cast<float>(metres);
     any = any || depth_m[i] > 0;
@@ -81,19 +89,26 @@ bool sample_depth_of(const cv::Mat& depth, const PointSpan<float, 2>& pixels, do
 }  // namespace detail
 
 /// Depth in metres at each pixel, from a single-channel CV_16U, CV_32F or CV_64F image whose values times
-/// `metres_per_unit` are metres (TUM RGB-D: 1.0 / 5000; millimetres: 0.001; metres: 1). The nearest pixel is read, pixel
-/// centres at integer coordinates; ORB-SLAM2 cuts the fraction off instead. -1, ORB-SLAM2's mark for "none", for a pixel
-/// outside the image and for depth that is zero, negative or not finite. depth_m.size() == pixels.size().
+/// `metres_per_unit` are metres (TUM RGB-D: 1.0 / 5000; millimetres: 0.001; metres: 1). The nearest pixel is read,
+/// pixel centres at integer coordinates; ORB-SLAM2 cuts the fraction off instead. -1, ORB-SLAM2's mark for "none", for
+/// a pixel outside the image and for depth that is zero, negative or not finite. depth_m.size() == pixels.size().
 /// invalid_input, and -1 everywhere: no image, another type, or metres_per_unit not positive and finite.
 /// not_enough_data: no pixel has depth. Allocates nothing.
-inline Status sample_depth(const cv::Mat& depth, const PointSpan<float, 2>& pixels, double metres_per_unit, span<float> depth_m) noexcept {
+inline Status sample_depth(const cv::Mat& depth, const PointSpan<float, 2>& pixels, double metres_per_unit,
+                           span<float> depth_m) noexcept {
   CFP_ASSERT(depth_m.size() == pixels.size());
   const int type = detail::is_matrix(depth) && metres_per_unit > 0 && is_finite(metres_per_unit) ? depth.type() : -1;
   bool any = false;
   switch (type) {
-    case CV_16UC1: any = detail::sample_depth_of<unsigned short>(depth, pixels, metres_per_unit, depth_m); break;
-    case CV_32FC1: any = detail::sample_depth_of<float>(depth, pixels, metres_per_unit, depth_m); break;
-    case CV_64FC1: any = detail::sample_depth_of<double>(depth, pixels, metres_per_unit, depth_m); break;
+    case CV_16UC1:
+      any = detail::sample_depth_of<unsigned short>(depth, pixels, metres_per_unit, depth_m);
+      break;
+    case CV_32FC1:
+      any = detail::sample_depth_of<float>(depth, pixels, metres_per_unit, depth_m);
+      break;
+    case CV_64FC1:
+      any = detail::sample_depth_of<double>(depth, pixels, metres_per_unit, depth_m);
+      break;
     default:
       for (float& metres : depth_m) metres = -1.0F;
       return Status::invalid_input;
@@ -101,18 +116,20 @@ inline Status sample_depth(const cv::Mat& depth, const PointSpan<float, 2>& pixe
   return any ? Status::ok : Status::not_enough_data;
 }
 
-/// A pose from the upper 3x4 part of a 4x4 or 3x4 matrix, CV_32F or CV_64F (ORB-SLAM2's Tcw is T_cam_world). The rotation
-/// is normalised, as products of float matrices drift. invalid_input, and pose untouched: another size or type, an element
-/// that is not finite, a reflection, or a rotation part R with an element of R R^T - I beyond 0.01.
+/// A pose from the upper 3x4 part of a 4x4 or 3x4 matrix, CV_32F or CV_64F (ORB-SLAM2's Tcw is T_cam_world). The
+/// rotation is normalised, as products of float matrices drift. invalid_input, and pose untouched: another size or
+/// type, an element that is not finite, a reflection, or a rotation part R with an element of R R^T - I beyond 0.01.
 template <typename Scalar>
 Status to_se3(const cv::Mat& matrix, SE3<Scalar>& pose) noexcept {
-  if (!detail::is_matrix(matrix) || matrix.cols != 4 || (matrix.rows != 4 && matrix.rows != 3)) return Status::invalid_input;
+  if (!detail::is_matrix(matrix) || matrix.cols != 4 || (matrix.rows != 4 && matrix.rows != 3))
+    return Status::invalid_input;
   if (matrix.type() != CV_32FC1 && matrix.type() != CV_64FC1) return Status::invalid_input;
   SE3<double> read;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 4; ++column) {
-      const double value = matrix.type() == CV_32FC1 ? static_cast<double>(detail::matrix_element<float>(matrix, row, column))
-                                                     : detail::matrix_element<double>(matrix, row, column);
+      const double value = matrix.type() == CV_32FC1
+                               ? static_cast<double>(detail::matrix_element<float>(matrix, row, column))
+                               : detail::matrix_element<double>(matrix, row, column);
       if (!is_finite(static_cast<Scalar>(value))) return Status::invalid_input;
       (column < 3 ? read.rotation(row, column) : read.translation[row]) = value;
     }
@@ -124,17 +141,19 @@ Status to_se3(const cv::Mat& matrix, SE3<Scalar>& pose) noexcept {
   return Status::ok;
 }
 
-/// Writes the pose into the upper 3x4 part of the caller's 4x4 or 3x4 matrix, CV_32F or CV_64F, and (0, 0, 0, 1) into the
-/// fourth row if there is one. invalid_input, and the matrix untouched, for another size or type. The matrix shares its
-/// elements with its shallow copies, as always in OpenCV.
+/// Writes the pose into the upper 3x4 part of the caller's 4x4 or 3x4 matrix, CV_32F or CV_64F, and (0, 0, 0, 1) into
+/// the fourth row if there is one. invalid_input, and the matrix untouched, for another size or type. The matrix shares
+/// its elements with its shallow copies, as always in OpenCV.
 template <typename Scalar>
 Status write_pose(const SE3<Scalar>& pose, cv::Mat& matrix) noexcept {
-  if (!detail::is_matrix(matrix) || matrix.cols != 4 || (matrix.rows != 4 && matrix.rows != 3)) return Status::invalid_input;
+  if (!detail::is_matrix(matrix) || matrix.cols != 4 || (matrix.rows != 4 && matrix.rows != 3))
+    return Status::invalid_input;
   const bool is_float = matrix.type() == CV_32FC1;
   if (!is_float && matrix.type() != CV_64FC1) return Status::invalid_input;
   for (int row = 0; row < matrix.rows; ++row) {
     for (int column = 0; column < 4; ++column) {
-      const Scalar value = row == 3 ? Scalar(column == 3 ? 1 : 0) : (column < 3 ? pose.rotation(row, column) : pose.translation[row]);
+      const Scalar value =
+          row == 3 ? Scalar(column == 3 ? 1 : 0) : (column < 3 ? pose.rotation(row, column) : pose.translation[row]);
       unsigned char* const row_start = matrix.data + matrix.step.p[0] * static_cast<std::size_t>(row);
       const auto as_float = static_cast<float>(value);
       const auto as_double = static_cast<double>(value);

@@ -8,10 +8,10 @@
 #include <cstddef>
 #include <type_traits>
 
-#include "cfp/core/chunk.hpp"
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/math/exponential.hpp"
+#include "cfp/simd/chunk.hpp"
 
 namespace cfp::detail {
 
@@ -62,9 +62,10 @@ template <typename T>
 [[nodiscard]] inline double gamma_1p_minus_1(double a) noexcept {
   if (a >= 0.1) return std::tgamma(1 + a) - 1;
   // log Γ(1+a) = -γ a + ζ(2) a^2/2 - ζ(3) a^3/3 + ...; std::lgamma writes a global variable, so it is no choice here.
-  constexpr double c[] = {-0.57721566490153286061, 0.82246703342411321824, -0.40068563438653142847, 0.27058080842778454788,
-                          -0.20738555102867398527, 0.16955717699740818995, -0.14404989676884611812, 0.12550966952474304242,
-                          -0.11133426586956469049, 0.10009945751278180853, -0.09095401714582904223, 0.08335384054610900402,
+  constexpr double c[] = {-0.57721566490153286061, 0.82246703342411321824,  -0.40068563438653142847,
+                          0.27058080842778454788,  -0.20738555102867398527, 0.16955717699740818995,
+                          -0.14404989676884611812, 0.12550966952474304242,  -0.11133426586956469049,
+                          0.10009945751278180853,  -0.09095401714582904223, 0.08335384054610900402,
                           -0.07693251641135219148, 0.07143294629536133607};
   double sum = 0;
   for (int i = 13; i >= 0; --i) sum = (sum + c[i]) * a;
@@ -127,9 +128,12 @@ void half_exponential(span<const Scalar> x, Scalar factor, Scalar below, span<Sc
     using std::abs;
     Chunk<Scalar> values, result;
     load_chunk(x, first, count, values);
-    map_chunk(result, [](const P& v) { return P(Scalar(-0.5)) * abs(v); }, values);
+    map_chunk(
+        result, [](const P& v) { return P(Scalar(-0.5)) * abs(v); }, values);
     const Chunk<Scalar> tail = exponential_of_nonpositive(result);
-    map_chunk(result, [&](const P& v, const P& t) { return select(v < P(Scalar(0)), P(below), P(factor) * t); }, values, tail);
+    map_chunk(
+        result, [&](const P& v, const P& t) { return select(v < P(Scalar(0)), P(below), P(factor) * t); }, values,
+        tail);
     store_chunk(result, first, count, out);
   });
 }

@@ -9,9 +9,10 @@
 
 namespace cfp {
 
-/// Real roots of x^3 + a x^2 + b x + c, in roots[0 .. count); returns the count, 1 or 3 (a double root counts twice), or 0
-/// when a coefficient is not finite or the roots overflow. Closed form (Cardano for one real root, Viete for three), then
-/// Newton steps on the polynomial itself; a root separated from the others by d is exact to rounding / d. Allocates nothing.
+/// Real roots of x^3 + a x^2 + b x + c, in roots[0 .. count); returns the count, 1 or 3 (a double root counts twice),
+/// or 0 when a coefficient is not finite or the roots overflow. Closed form (Cardano for one real root, Viete for
+/// three), then Newton steps on the polynomial itself; a root separated from the others by d is exact to rounding / d.
+/// Allocates nothing.
 template <typename Scalar>
 [[nodiscard]] int real_cubic_roots(Scalar a, Scalar b, Scalar c, Scalar (&roots)[3]) noexcept {
   using std::abs;
@@ -24,7 +25,8 @@ template <typename Scalar>
   // The margin keeps a double root that rounding would otherwise turn into a pair of complex ones.
   if (r * r <= q3 * (Scalar(1) + Scalar(16) * std::numeric_limits<Scalar>::epsilon())) {
     const Scalar angle =
-        std::acos((std::max)(Scalar(-1), (std::min)(Scalar(1), q3 > Scalar(0) ? r / std::sqrt(q3) : Scalar(0)))) / Scalar(3);
+        std::acos((std::max)(Scalar(-1), (std::min)(Scalar(1), q3 > Scalar(0) ? r / std::sqrt(q3) : Scalar(0)))) /
+        Scalar(3);
     const Scalar radius = Scalar(-2) * std::sqrt((std::max)(q, Scalar(0)));
     const Scalar step = Scalar(2) / Scalar(3) * pi<Scalar>;
     for (int i = 0; i < 3; ++i) roots[i] = radius * std::cos(angle + Scalar(i - 1) * step) - third;

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <cstddef>
 
-#include "cfp/core/chunk.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/math/exponential.hpp"
+#include "cfp/simd/chunk.hpp"
 
 namespace cfp {
 
@@ -31,7 +31,8 @@ template <typename Scalar>
   using P = Packet<Scalar>;
   using std::abs;
   Chunk<Scalar> result;
-  map_chunk(result, [](const P& v) { return -abs(v); }, x);
+  map_chunk(
+      result, [](const P& v) { return -abs(v); }, x);
   const Chunk<Scalar> e = exponential_of_nonpositive(result);
   map_chunk(
       result,

@@ -1,6 +1,6 @@
 /// @file normal_equations.hpp
-/// One damped Gauss-Newton step for a handful of unknowns. What Eigen's LDLT does at these sizes, but unrolled for the size, aware of
-/// the scale of each unknown, and compiled in a tenth of the time.
+/// One damped Gauss-Newton step for a handful of unknowns. What Eigen's LDLT does at these sizes, but unrolled for the
+/// size, aware of the scale of each unknown, and compiled in a tenth of the time.
 #pragma once
 
 #include <cmath>
@@ -12,12 +12,14 @@
 
 namespace cfp {
 
-/// Solves (H + damping diag H) step = -g by Cholesky (L D L^T) of the matrix scaled to a unit diagonal; H symmetric, its upper triangle
-/// is read. False, and step meaningless, for an H that is not positive definite, whose smallest pivot, 1 - (multiple correlation)^2
-/// of an unknown with those before it, is at or below `tolerance`, or when the step is not finite. Allocates nothing.
+/// Solves (H + damping diag H) step = -g by Cholesky (L D L^T) of the matrix scaled to a unit diagonal; H symmetric,
+/// its upper triangle is read. False, and step meaningless, for an H that is not positive definite, whose smallest
+/// pivot, 1 - (multiple correlation)^2 of an unknown with those before it, is at or below `tolerance`, or when the step
+/// is not finite. Allocates nothing.
 template <int N>
-[[nodiscard]] bool solve_normal_equations(const Eigen::Matrix<double, N, N>& H, const Eigen::Matrix<double, N, 1>& g, double damping,
-                                          double tolerance, Eigen::Matrix<double, N, 1>& step) noexcept {
+[[nodiscard]] bool solve_normal_equations(const Eigen::Matrix<double, N, N>& H, const Eigen::Matrix<double, N, 1>& g,
+                                          double damping, double tolerance,
+                                          Eigen::Matrix<double, N, 1>& step) noexcept {
   constexpr std::size_t n = static_cast<std::size_t>(N);
   double scale[n], L[n][n], pivot[n], inverse[n];
   for (int i = 0; i < N; ++i) {

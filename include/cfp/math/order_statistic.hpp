@@ -1,6 +1,6 @@
 /// @file order_statistic.hpp
-/// Order statistics in linear time: the quantiles at 0.1, 0.2, 0.3 of the object probability (paper section IV-B) and the
-/// adaptive threshold of the constraints (section IV-D). Exact: the result is one of the given values.
+/// Order statistics in linear time: the quantiles at 0.1, 0.2, 0.3 of the object probability (paper section IV-B) and
+/// the adaptive threshold of the constraints (section IV-D). Exact: the result is one of the given values.
 ///
 /// The values must not contain NaN: callers filter (a NaN here does not crash, but takes part as a very large or very
 /// small number). Infinite and negative values are fine.
@@ -43,9 +43,10 @@ template <typename Scalar>
 /// The value at 0-based position rank0 of the ascending order (0: the smallest). Overwrites `scratch`: afterwards its
 /// content is unspecified. 0 for an empty span; a rank beyond the end counts as the last.
 ///
-/// A histogram over the bit patterns, ordered as the numbers are, narrows the candidates to those of one of 256 buckets,
-/// again and again until few are left, which are compared with each other: linear for any distribution (at most 5 rounds for
-/// float, 10 for double), without the branch misses that make up most of std::nth_element's time. Allocates nothing.
+/// A histogram over the bit patterns, ordered as the numbers are, narrows the candidates to those of one of 256
+/// buckets, again and again until few are left, which are compared with each other: linear for any distribution (at
+/// most 5 rounds for float, 10 for double), without the branch misses that make up most of std::nth_element's time.
+/// Allocates nothing.
 template <typename Scalar>
 [[nodiscard]] Scalar order_statistic(span<Scalar> scratch, std::size_t rank0) noexcept {
   CFP_ASSERT(rank0 < scratch.size());
@@ -54,10 +55,11 @@ template <typename Scalar>
   return detail::select_one(scratch.data(), n, (std::min)(rank0, n - 1), detail::value_range(scratch.data(), n));
 }
 
-/// The values at the quantile ranks of `quantiles` (ascending), as {0.1, 0.2, 0.3}, with one pass over the data for all.
-/// Overwrites `scratch`. All 0 for an empty span.
+/// The values at the quantile ranks of `quantiles` (ascending), as {0.1, 0.2, 0.3}, with one pass over the data for
+/// all. Overwrites `scratch`. All 0 for an empty span.
 template <typename Scalar, std::size_t Count>
-[[nodiscard]] std::array<Scalar, Count> select_quantiles(span<Scalar> scratch, const std::array<double, Count>& quantiles) noexcept {
+[[nodiscard]] std::array<Scalar, Count> select_quantiles(span<Scalar> scratch,
+                                                         const std::array<double, Count>& quantiles) noexcept {
   static_assert(Count > 0, "at least one quantile");
   std::array<Scalar, Count> values{};
   if (scratch.empty()) return values;

@@ -13,7 +13,7 @@
 #include <Eigen/Core>
 
 #include "cfp/core/assert.hpp"
-#include "cfp/core/chunk.hpp"
+#include "cfp/simd/chunk.hpp"
 #include "cfp/version.hpp"
 
 namespace cfp::detail {
@@ -44,8 +44,8 @@ template <typename Scalar>
   return {array.minCoeff(), array.maxCoeff()};
 }
 
-/// The value at 0-based position rank < n of at most `few` values: the largest one that has no more than `rank` below it. All are
-/// compared with all, without a branch to mispredict.
+/// The value at 0-based position rank < n of at most `few` values: the largest one that has no more than `rank` below
+/// it. All are compared with all, without a branch to mispredict.
 template <typename Scalar>
 inline constexpr std::size_t few = sizeof(Scalar) == 4 ? 32 : 16;
 
@@ -71,14 +71,15 @@ template <typename Scalar>
   return values[best];
 }
 
-/// How often the keys of n values fall into each of 256 buckets: steps of 2^shift from the smallest on. A key out of the range,
-/// which only a NaN has, falls into some bucket, the same each time.
+/// How often the keys of n values fall into each of 256 buckets: steps of 2^shift from the smallest on. A key out of
+/// the range, which only a NaN has, falls into some bucket, the same each time.
 template <typename Scalar>
 class BucketCounts {
  public:
   static constexpr std::size_t buckets = 256;
 
-  BucketCounts(const Scalar* values, std::size_t n, const ValueRange<Scalar>& range) noexcept : lowest_(sort_key(range.smallest)) {
+  BucketCounts(const Scalar* values, std::size_t n, const ValueRange<Scalar>& range) noexcept
+      : lowest_(sort_key(range.smallest)) {
     const SortKey<Scalar> width = sort_key(range.largest) - lowest_;
     while ((width >> shift_) >= buckets) ++shift_;
     for_each_block(values, n, [this](std::size_t, std::size_t size, const std::uint8_t* bucket) {
@@ -94,7 +95,9 @@ class BucketCounts {
     });
   }
 
-  [[nodiscard]] std::size_t operator[](std::size_t bucket) const noexcept { return std::size_t(counts_[0][bucket]) + counts_[1][bucket]; }
+  [[nodiscard]] std::size_t operator[](std::size_t bucket) const noexcept {
+    return std::size_t(counts_[0][bucket]) + counts_[1][bucket];
+  }
   /// The bucket of a rank, which becomes the rank within that bucket.
   [[nodiscard]] std::size_t find(std::size_t& rank) const noexcept {
     std::size_t bucket = 0;
@@ -102,7 +105,8 @@ class BucketCounts {
     return bucket;
   }
   /// Copies the values of those buckets that are marked, in their order; `to` may be `values`. Returns how many.
-  std::size_t copy_marked(const Scalar* values, std::size_t n, const std::uint8_t (&marked)[buckets], Scalar* to) const noexcept {
+  std::size_t copy_marked(const Scalar* values, std::size_t n, const std::uint8_t (&marked)[buckets],
+                          Scalar* to) const noexcept {
     std::size_t kept = 0;
     for_each_block(values, n, [&](std::size_t first, std::size_t size, const std::uint8_t* bucket) {
       for (std::size_t i = 0; i < size; ++i) {
@@ -114,8 +118,8 @@ class BucketCounts {
   }
 
  private:
-  /// Calls work(first, size, bucket) for consecutive blocks, bucket[i] being that of values[first + i]. The keys of a whole block
-  /// come first, in a loop of known length for the vectoriser.
+  /// Calls work(first, size, bucket) for consecutive blocks, bucket[i] being that of values[first + i]. The keys of a
+  /// whole block come first, in a loop of known length for the vectoriser.
   template <typename Work>
   void for_each_block(const Scalar* values, std::size_t n, Work&& work) const noexcept {
     const SortKey<Scalar> lowest = lowest_;
@@ -129,7 +133,8 @@ class BucketCounts {
         std::fill_n(padded, chunk_size, values[first]);
         std::copy_n(values + first, size, padded);
       }
-      for (std::size_t i = 0; i < chunk_size; ++i) bucket[i] = static_cast<std::uint8_t>((sort_key(padded[i]) - lowest) >> shift);
+      for (std::size_t i = 0; i < chunk_size; ++i)
+        bucket[i] = static_cast<std::uint8_t>((sort_key(padded[i]) - lowest) >> shift);
       work(first, size, bucket);
     });
   }
@@ -158,7 +163,8 @@ template <typename Scalar>
 
 /// Sets results[i] to the value at 0-based position ranks[i], both ascending. n > 0. Destroys `values`.
 template <typename Scalar, std::size_t Count>
-void select_many(Scalar* values, std::size_t n, std::array<std::size_t, Count> ranks, std::array<Scalar, Count>& results) noexcept {
+void select_many(Scalar* values, std::size_t n, std::array<std::size_t, Count> ranks,
+                 std::array<Scalar, Count>& results) noexcept {
   using Counts = BucketCounts<Scalar>;
   std::size_t kept = n;
   if (n > few<Scalar>) {
@@ -179,8 +185,8 @@ void select_many(Scalar* values, std::size_t n, std::array<std::size_t, Count> r
         only[bucket[i]] = 1;
         const std::size_t size = counts.copy_marked(values, kept, only, values + kept);
         Scalar* const room = values + kept;
-        results[i] =
-            size <= few<Scalar> ? select_from_few(room, size, within[i]) : select_one(room, size, within[i], value_range(room, size));
+        results[i] = size <= few<Scalar> ? select_from_few(room, size, within[i])
+                                         : select_one(room, size, within[i], value_range(room, size));
       }
       return;
     }
@@ -191,7 +197,8 @@ void select_many(Scalar* values, std::size_t n, std::array<std::size_t, Count> r
   }
   for (std::size_t i = Count, end = kept; i-- > 0;) {
     if (ranks[i] < end) {
-      std::nth_element(values, values + ranks[i], values + end, [](Scalar a, Scalar b) { return sort_key(a) < sort_key(b); });
+      std::nth_element(values, values + ranks[i], values + end,
+                       [](Scalar a, Scalar b) { return sort_key(a) < sort_key(b); });
       end = ranks[i];
     }
     results[i] = values[ranks[i]];

@@ -16,7 +16,9 @@ struct SE3 {
   Matrix3<Scalar> rotation = Matrix3<Scalar>::Identity();
   Vector3<Scalar> translation = Vector3<Scalar>::Zero();
 
-  [[nodiscard]] Vector3<Scalar> operator*(const Vector3<Scalar>& point) const noexcept { return rotation * point + translation; }
+  [[nodiscard]] Vector3<Scalar> operator*(const Vector3<Scalar>& point) const noexcept {
+    return rotation * point + translation;
+  }
   [[nodiscard]] SE3 operator*(const SE3& other) const noexcept {
     return {rotation * other.rotation, rotation * other.translation + translation};
   }

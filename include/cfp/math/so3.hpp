@@ -1,6 +1,6 @@
 /// @file so3.hpp
-/// Rotations: hat, exponential, logarithm, left Jacobian. A rotation is a plain 3x3 matrix (no alignment demands, see
-/// DESIGN: public structs have one layout under all vector flags); rotation vectors are in radians.
+/// Rotations: hat, exponential, logarithm, left Jacobian. A rotation is a plain 3x3 matrix (no alignment demands: public structs have
+/// one layout under all vector flags); rotation vectors are in radians.
 /// Source: Sola, Deray, Atchuthan: "A micro Lie theory for state estimation in robotics", 2018, eqs. (69), (132)-(145).
 #pragma once
 
@@ -10,21 +10,9 @@
 #include <Eigen/Geometry>
 
 #include "cfp/core/numeric.hpp"
+#include "cfp/core/types.hpp"
 
 namespace cfp {
-
-template <typename Scalar>
-using Vector2 = Eigen::Matrix<Scalar, 2, 1>;
-template <typename Scalar>
-using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
-template <typename Scalar>
-using Vector6 = Eigen::Matrix<Scalar, 6, 1>;
-template <typename Scalar>
-using Matrix2 = Eigen::Matrix<Scalar, 2, 2>;
-template <typename Scalar>
-using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
-template <typename Scalar>
-using Matrix6 = Eigen::Matrix<Scalar, 6, 6>;
 
 /// The skew-symmetric matrix with hat(a) b = a x b.
 template <typename Scalar>
@@ -64,8 +52,9 @@ template <typename Scalar>
   return R;
 }
 
-/// log: rotation matrix to rotation vector with angle in [0, pi] (at pi one of the two axes). Goes through the quaternion,
-/// so it is exact near 0 and near pi; a matrix that is not quite a rotation gives the vector of a nearby one.
+/// log: rotation matrix to rotation vector with angle in [0, pi] (at pi one of the two axes). Goes through the
+/// quaternion, so it is exact near 0 and near pi; a matrix that is not quite a rotation gives the vector of a nearby
+/// one.
 template <typename Scalar>
 [[nodiscard]] Vector3<Scalar> so3_log(const Matrix3<Scalar>& R) noexcept {
   using std::atan2;
@@ -91,7 +80,8 @@ template <typename Scalar>
   const Scalar t2 = w.squaredNorm();
   const Matrix3<Scalar> W = hat(w);
   Scalar b, c;
-  // The difference t - sin t cancels well above small_angle. Below 0.1 rad the four-term series is exact for both scalars.
+  // The difference t - sin t cancels well above small_angle. Below 0.1 rad the four-term series is exact for both
+  // scalars.
   if (t2 > Scalar(1e-2)) {
     const Scalar t = sqrt(t2);
     const Scalar half = sin(t * Scalar(0.5));
@@ -128,8 +118,8 @@ template <typename Scalar>
   return J;
 }
 
-/// The rotation of R's normalised quaternion: to first order the nearest one to an R that is nearly a rotation. Removes the
-/// drift that products of many rotations collect.
+/// The rotation of R's normalised quaternion: to first order the nearest one to an R that is nearly a rotation. Removes
+/// the drift that products of many rotations collect.
 template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> normalized_rotation(const Matrix3<Scalar>& R) noexcept {
   return Eigen::Quaternion<Scalar>(R).normalized().toRotationMatrix();

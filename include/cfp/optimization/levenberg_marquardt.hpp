@@ -1,7 +1,7 @@
 /// @file levenberg_marquardt.hpp
-/// What every Levenberg-Marquardt loop of cfp shares: when it stops, why it stopped, and how the damping follows the gain
-/// ratio. The loop itself (linearise, solve, try) belongs to the problem.
-/// Source: Nielsen: "Damping parameter in Marquardt's method", 1999; Madsen, Nielsen, Tingleff 2004, section 3.2.
+/// What every Levenberg-Marquardt loop of cfp shares: when it stops, why it stopped, and how the damping follows the
+/// gain ratio. The loop itself (linearise, solve, try) belongs to the problem. Source: Nielsen: "Damping parameter in
+/// Marquardt's method", 1999; Madsen, Nielsen, Tingleff 2004, section 3.2.
 #pragma once
 
 #include <algorithm>
@@ -27,8 +27,10 @@ struct LevenbergMarquardtOptions {
   if (!(options.initial_damping > 0) || !is_finite(options.initial_damping)) return "initial_damping";
   if (!(options.min_damping > 0) || !is_finite(options.min_damping)) return "min_damping";
   if (!(options.max_damping >= options.min_damping) || !is_finite(options.max_damping)) return "max_damping";
-  if (!(options.min_relative_decrease >= 0) || !is_finite(options.min_relative_decrease)) return "min_relative_decrease";
-  if (!(options.min_absolute_decrease >= 0) || !is_finite(options.min_absolute_decrease)) return "min_absolute_decrease";
+  if (!(options.min_relative_decrease >= 0) || !is_finite(options.min_relative_decrease))
+    return "min_relative_decrease";
+  if (!(options.min_absolute_decrease >= 0) || !is_finite(options.min_absolute_decrease))
+    return "min_absolute_decrease";
   return nullptr;
 }
 
@@ -44,11 +46,16 @@ enum class StopReason : std::uint8_t {
 /// The enumerator's name, for reports.
 [[nodiscard]] constexpr const char* to_string(StopReason reason) noexcept {
   switch (reason) {
-    case StopReason::converged: return "converged";
-    case StopReason::no_progress: return "no progress";
-    case StopReason::max_iterations: return "max iterations";
-    case StopReason::not_enough_data: return "not enough data";
-    case StopReason::not_finite: return "not finite";
+    case StopReason::converged:
+      return "converged";
+    case StopReason::no_progress:
+      return "no progress";
+    case StopReason::max_iterations:
+      return "max iterations";
+    case StopReason::not_enough_data:
+      return "not enough data";
+    case StopReason::not_finite:
+      return "not finite";
   }
   return "unknown";
 }
@@ -65,8 +72,9 @@ class Damping {
   /// True once the damping was at its limit and the step was refused there, too.
   [[nodiscard]] bool exhausted() const noexcept { return exhausted_; }
 
-  /// Judges a step by gain = (cost before - cost after) / (predicted decrease); NaN is refused. Accepted (gain above 1e-3):
-  /// lambda shrinks by max(1/3, 1 - (2 gain - 1)^3), and does not grow for gain >= 1/2. Refused: lambda grows 2, 4, 8, … times.
+  /// Judges a step by gain = (cost before - cost after) / (predicted decrease); NaN is refused. Accepted (gain above
+  /// 1e-3): lambda shrinks by max(1/3, 1 - (2 gain - 1)^3), and does not grow for gain >= 1/2. Refused: lambda grows 2,
+  /// 4, 8, … times.
   bool accept(double gain) noexcept {
     if (!(gain > 1e-3)) {
       reject();

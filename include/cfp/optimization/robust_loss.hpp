@@ -1,12 +1,12 @@
 /// @file robust_loss.hpp
-/// Robust losses rho(s) of the squared normalised residual s = |r|^2 / sigma^2 >= 0, with rho(0) = 0 and rho'(0) = 1, so
-/// that every loss is least squares near the truth. All are non-decreasing, concave and finite for finite s; rho' lies in
-/// [0, 1]. `delta` > 0 is the scale in units of |r| / sigma, for example sqrt(5.991), the 95 % bound of a pixel's noise.
-/// A weight belongs outside: cost = sum of w rho(s), gradient weight w rho'(s).
-/// Scalar is float, double, a dual number such as ceres::Jet, or a Packet (core/packet.hpp: many residuals at once).
-/// s = +inf gives the limit (rho' = 0); a negative or NaN s is the caller's to exclude. Nothing allocates.
-/// Sources: Huber 1964; Cauchy/Lorentzian and Geman, McClure 1985 as in Zhang: "Parameter estimation techniques", 1997,
-/// table 1, rescaled to rho'(0) = 1; truncated least squares as in Yang, Antonante, Tzoumas, Carlone 2020.
+/// Robust losses rho(s) of the squared normalised residual s = |r|^2 / sigma^2 >= 0, with rho(0) = 0 and rho'(0) = 1,
+/// so that every loss is least squares near the truth. All are non-decreasing, concave and finite for finite s; rho'
+/// lies in [0, 1]. `delta` > 0 is the scale in units of |r| / sigma, for example sqrt(5.991), the 95 % bound of a
+/// pixel's noise. A weight belongs outside: cost = sum of w rho(s), gradient weight w rho'(s). Scalar is float, double,
+/// a dual number such as ceres::Jet, or a Packet (simd/packet.hpp: many residuals at once). s = +inf gives the limit
+/// (rho' = 0); a negative or NaN s is the caller's to exclude. Nothing allocates. Sources: Huber 1964;
+/// Cauchy/Lorentzian and Geman, McClure 1985 as in Zhang: "Parameter estimation techniques", 1997, table 1, rescaled to
+/// rho'(0) = 1; truncated least squares as in Yang, Antonante, Tzoumas, Carlone 2020.
 #pragma once
 
 #include <cmath>
@@ -14,7 +14,7 @@
 #include <limits>
 
 #include "cfp/core/numeric.hpp"
-#include "cfp/core/packet.hpp"
+#include "cfp/simd/packet.hpp"
 
 namespace cfp {
 
@@ -38,7 +38,9 @@ struct Huber {
     const Scalar root = s * (reciprocal_sqrt(s) + Scalar((std::numeric_limits<scalar_of<Scalar>>::min)()));
     return select(s <= delta * delta, s, Scalar(2) * delta * root - delta * delta);
   }
-  [[nodiscard]] Scalar first(const Scalar& s) const noexcept { return select(s <= delta * delta, Scalar(1), delta * reciprocal_sqrt(s)); }
+  [[nodiscard]] Scalar first(const Scalar& s) const noexcept {
+    return select(s <= delta * delta, Scalar(1), delta * reciprocal_sqrt(s));
+  }
   [[nodiscard]] Scalar second(const Scalar& s) const noexcept {
     return select(s <= delta * delta, Scalar(0), Scalar(-0.5) * first(s) / s);
   }
@@ -80,8 +82,12 @@ template <typename Scalar>
 struct Truncated {
   Scalar delta = Scalar(1);
 
-  [[nodiscard]] Scalar value(const Scalar& s) const noexcept { return select(s <= delta * delta, s, Scalar(delta * delta)); }
-  [[nodiscard]] Scalar first(const Scalar& s) const noexcept { return select(s <= delta * delta, Scalar(1), Scalar(0)); }
+  [[nodiscard]] Scalar value(const Scalar& s) const noexcept {
+    return select(s <= delta * delta, s, Scalar(delta * delta));
+  }
+  [[nodiscard]] Scalar first(const Scalar& s) const noexcept {
+    return select(s <= delta * delta, Scalar(1), Scalar(0));
+  }
   [[nodiscard]] Scalar second(const Scalar&) const noexcept { return Scalar(0); }
 };
 
@@ -89,15 +95,21 @@ struct Truncated {
 enum class LossType : std::uint8_t { trivial, huber, cauchy, geman_mcclure, truncated };
 
 /// Calls `work` with the loss of that name and scale, so that a loop over residuals is compiled once per loss and never
-/// asks inside: `with_loss<double>(type, delta, [&](const auto& loss) { … loss.first(s) … });`. Returns what work returns.
+/// asks inside: `with_loss<double>(type, delta, [&](const auto& loss) { … loss.first(s) … });`. Returns what work
+/// returns.
 template <typename Scalar, typename Work>
 auto with_loss(LossType type, const Scalar& delta, Work&& work) {
   switch (type) {
-    case LossType::huber: return work(Huber<Scalar>{delta});
-    case LossType::cauchy: return work(Cauchy<Scalar>{delta});
-    case LossType::geman_mcclure: return work(GemanMcClure<Scalar>{delta});
-    case LossType::truncated: return work(Truncated<Scalar>{delta});
-    case LossType::trivial: break;
+    case LossType::huber:
+      return work(Huber<Scalar>{delta});
+    case LossType::cauchy:
+      return work(Cauchy<Scalar>{delta});
+    case LossType::geman_mcclure:
+      return work(GemanMcClure<Scalar>{delta});
+    case LossType::truncated:
+      return work(Truncated<Scalar>{delta});
+    case LossType::trivial:
+      break;
   }
   return work(Trivial<Scalar>{delta});
 }

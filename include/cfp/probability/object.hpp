@@ -18,9 +18,9 @@
 
 namespace cfp {
 
-/// Which function of the chi-squared distribution scores one pair. As printed (the density) a score cannot exceed 0.5 at
-/// two degrees of freedom, so the paper's threshold of 0.9 could never be passed and its low-dynamic branch would be dead;
-/// the related open code uses twice the density, which for two degrees of freedom is the survival function.
+/// Which function of the chi-squared distribution scores one pair. As printed (the density) a score cannot exceed 0.5
+/// at two degrees of freedom, so the paper's threshold of 0.9 could never be passed and its low-dynamic branch would be
+/// dead; the related open code uses twice the density, which for two degrees of freedom is the survival function.
 enum class ObjectScore : std::uint8_t {
   survival,           ///< Q(x; k), the upper tail: the default
   density,            ///< the density, as printed in the paper, clamped to [0, 1]
@@ -31,8 +31,8 @@ struct ObjectProbabilityOptions {
   ObjectScore score = ObjectScore::survival;
   /// k, > 0. The paper's 2; a distance from a line has statistically one degree of freedom.
   double degrees_of_freedom = 2;
-  /// Noise of an epipolar distance in pixels, > 0. With 1 (the paper) the score reaches 0.9 at 0.46 px and a static object
-  /// with unit noise scores 0.43: O is a score on a pixel scale, and sigma sets the scale.
+  /// Noise of an epipolar distance in pixels, > 0. With 1 (the paper) the score reaches 0.9 at 0.46 px and a static
+  /// object with unit noise scores 0.43: O is a score on a pixel scale, and sigma sets the scale.
   double sigma_px = 1;
   /// Positions of the ascending order statistics whose mean is O: shares of the number of pairs in (0, 1], ascending.
   std::array<double, 3> positions = {0.1, 0.2, 0.3};
@@ -46,7 +46,9 @@ struct ObjectProbabilityOptions {
   if (!(o.degrees_of_freedom > 0) || !is_finite(o.degrees_of_freedom)) return "degrees_of_freedom";
   if (o.score == ObjectScore::normalized_density && o.degrees_of_freedom < 2) return "degrees_of_freedom";
   if (!(o.sigma_px > 0) || !is_finite(o.sigma_px)) return "sigma_px";
-  if (!(o.positions[0] > 0 && o.positions[0] <= o.positions[1] && o.positions[1] <= o.positions[2] && o.positions[2] <= 1)) return "positions";
+  if (!(o.positions[0] > 0 && o.positions[0] <= o.positions[1] && o.positions[1] <= o.positions[2] &&
+        o.positions[2] <= 1))
+    return "positions";
   if (o.min_pairs < 1) return "min_pairs";
   if (!(o.unknown_object_probability >= 0 && o.unknown_object_probability <= 1)) return "unknown_object_probability";
   return nullptr;
@@ -54,23 +56,26 @@ struct ObjectProbabilityOptions {
 
 /// The static probability of one object and where it comes from.
 struct ObjectProbability {
-  double static_probability = 0;             ///< O in [0, 1]; unknown_object_probability when the status is not ok
-  std::size_t pairs = 0;                     ///< usable pairs: finite, non-negative distances
-  Status status = Status::not_enough_data;   ///< not_enough_data: O is unknown
+  double static_probability = 0;            ///< O in [0, 1]; unknown_object_probability when the status is not ok
+  std::size_t pairs = 0;                    ///< usable pairs: finite, non-negative distances
+  Status status = Status::not_enough_data;  ///< not_enough_data: O is unknown
 };
 
-/// Score of one pair: f((d / sigma)^2; k) with f as `options.score` says (paper eqs. chsq and (O)_m). Non-increasing in |d|,
-/// except for densities with k > 2. In [0, 1]; NaN or an infinite distance scores 0. Allocates nothing.
+/// Score of one pair: f((d / sigma)^2; k) with f as `options.score` says (paper eqs. chsq and (O)_m). Non-increasing in
+/// |d|, except for densities with k > 2. In [0, 1]; NaN or an infinite distance scores 0. Allocates nothing.
 template <typename Scalar>
 [[nodiscard]] Scalar object_score(Scalar epipolar_distance_px, const ObjectProbabilityOptions& options) noexcept {
   if (!is_finite(epipolar_distance_px)) return Scalar(0);
   const Scalar r = epipolar_distance_px / Scalar(options.sigma_px);
   const double k = options.degrees_of_freedom;
   switch (options.score) {
-    case ObjectScore::survival: return clamp_probability(chi_squared_survival(r * r, k));
-    case ObjectScore::density: return clamp_probability(chi_squared_density(r * r, k));
+    case ObjectScore::survival:
+      return clamp_probability(chi_squared_survival(r * r, k));
+    case ObjectScore::density:
+      return clamp_probability(chi_squared_density(r * r, k));
     case ObjectScore::normalized_density: {
-      // At k = 2 the mode is at 0, where the printed density is 0 by definition: a distance of 0 is the limit from above.
+      // At k = 2 the mode is at 0, where the printed density is 0 by definition: a distance of 0 is the limit from
+      // above.
       const Scalar x = (std::max)(r * r, (std::numeric_limits<Scalar>::min)());
       return clamp_probability(chi_squared_density(x, k) / Scalar(chi_squared_mode_density(k)));
     }
@@ -78,9 +83,10 @@ template <typename Scalar>
   return Scalar(0);
 }
 
-/// O = mean of the ascending scores at the 1-based positions ceil(q M), q in `options.positions`, at least 1 (paper IV-B).
-/// Distances that are negative ("no distance") or not finite are left out; `scratch` needs room for all distances and is
-/// overwritten. Fewer than min_pairs usable distances: unknown, see ObjectProbability. O(M), allocates nothing.
+/// O = mean of the ascending scores at the 1-based positions ceil(q M), q in `options.positions`, at least 1 (paper
+/// IV-B). Distances that are negative ("no distance") or not finite are left out; `scratch` needs room for all
+/// distances and is overwritten. Fewer than min_pairs usable distances: unknown, see ObjectProbability. O(M), allocates
+/// nothing.
 template <typename Scalar>
 [[nodiscard]] ObjectProbability object_probability(span<const Scalar> epipolar_distances_px, span<Scalar> scratch,
                                                    const ObjectProbabilityOptions& options) noexcept {
@@ -91,8 +97,8 @@ template <typename Scalar>
   result.pairs = n;
   if (n < (std::max)(options.min_pairs, std::size_t(1))) return result;
 
-  // Where the score falls with the distance, the ascending order of the negated distances is that of the scores, and only
-  // the three selected need one.
+  // Where the score falls with the distance, the ascending order of the negated distances is that of the scores, and
+  // only the three selected need one.
   const bool monotone = options.score == ObjectScore::survival || options.degrees_of_freedom <= 2;
   const span<Scalar> values = scratch.subspan(0, n);
   if (monotone) {

@@ -1,0 +1,87 @@
+/// @file health.hpp
+/// Whether the weights of a frame can carry a pose, and what to do when they cannot: with the probabilities on, a scene
+/// that needs none of them must not get worse (MODEL.md section 6).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "cfp/core/numeric.hpp"
+#include "cfp/core/span.hpp"
+#include "cfp/frame/object_box.hpp"
+
+namespace cfp {
+
+struct HealthOptions {
+  bool use_fallback = true;  ///< false: the figures are reported and the weights left alone
+  double min_effective_points =
+      10;  ///< fewer effective observations than this are no base for a pose (ORB-SLAM2's 10), >= 0
+};
+
+[[nodiscard]] inline const char* invalid_field(const HealthOptions& o) noexcept {
+  return o.min_effective_points >= 0 && is_finite(o.min_effective_points) ? nullptr : "health.min_effective_points";
+}
+
+enum class WeightFallback : std::uint8_t {
+  none,        ///< the weights are the model's
+  background,  ///< background keypoints inside boxes count as static
+  all          ///< even so too few: every keypoint counts as static, as without this library
+};
+
+struct FrameHealth {
+  std::size_t observations = 0;  ///< keypoints with a map point
+  double weight = 0;             ///< sum of their weights
+  double effective_points = 0;   ///< (sum w)^2 / sum w^2: the number of equal weights that carry as much
+  double box_share = 0;          ///< share of the weight that lies inside boxes, in [0, 1]
+  WeightFallback fallback = WeightFallback::none;
+};
+
+/// The figures of one frame. Observations are the keypoints with M >= 0 (a map point); weights outside [0, 1] are
+/// clamped.
+template <typename Scalar>
+[[nodiscard]] FrameHealth frame_health(span<const KeypointLabel> label, span<const Scalar> map_point_probability,
+                                       span<const Scalar> weight) noexcept {
+  CFP_ASSERT(label.size() == weight.size() && map_point_probability.size() == weight.size());
+  FrameHealth health;
+  double squares = 0, in_boxes = 0;
+  for (std::size_t i = 0; i < weight.size(); ++i) {
+    if (!(map_point_probability[i] >= Scalar(0))) continue;
+    const double w = static_cast<double>(clamp_probability(weight[i]));
+    ++health.observations;
+    health.weight += w;
+    squares += w * w;
+    in_boxes += label[i] == KeypointLabel::outside ? 0.0 : w;
+  }
+  // Weights whose squares underflow carry nothing.
+  if (squares > 0) {
+    health.effective_points = health.weight * health.weight / squares;
+    health.box_share = clamp_probability(in_boxes / health.weight);
+  }
+  return health;
+}
+
+/// frame_health, and the fallback: while the effective observations are fewer than min_effective_points, the weights of
+/// the background keypoints are raised to 1, then those of all keypoints with a map point. The figures are those of the
+/// model's own weights; `fallback` says what was done. Allocates nothing.
+template <typename Scalar>
+FrameHealth apply_fallback(span<const KeypointLabel> label, span<const Scalar> map_point_probability,
+                           span<Scalar> weight, const HealthOptions& options) noexcept {
+  FrameHealth health = frame_health(label, map_point_probability, span<const Scalar>(weight));
+  if (!options.use_fallback || health.effective_points >= options.min_effective_points) return health;
+  const auto raise = [&](auto&& applies) {
+    for (std::size_t i = 0; i < weight.size(); ++i) {
+      if (map_point_probability[i] >= Scalar(0) && label[i] != KeypointLabel::invalid && applies(label[i]))
+        weight[i] = Scalar(1);
+    }
+  };
+  raise([](KeypointLabel l) { return l == KeypointLabel::background; });
+  health.fallback = WeightFallback::background;
+  if (frame_health(label, map_point_probability, span<const Scalar>(weight)).effective_points >=
+      options.min_effective_points)
+    return health;
+  raise([](KeypointLabel) { return true; });
+  health.fallback = WeightFallback::all;
+  return health;
+}
+
+}  // namespace cfp

@@ -1,0 +1,35 @@
+/// @file object_box.hpp
+/// What the two stages share about a frame: the boxes of potentially moving objects and how keypoints stand to them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "cfp/geometry/box.hpp"
+
+namespace cfp {
+
+/// The box of a potentially moving object in one frame, after missed-detection compensation.
+template <typename Scalar>
+struct ObjectBox {
+  Box<Scalar> box;  ///< pixels; an improper box holds no keypoint
+  bool non_rigid =
+      true;  ///< people: the depth clustering separates them from the background; rigid: all inside is foreground
+  bool associated =
+      true;  ///< continues a box of frame k-1 (paper IV-D: the foreground of one that does not is not trusted)
+};
+
+/// How a keypoint stands to the boxes.
+enum class KeypointLabel : std::uint8_t {
+  outside,     ///< in no box: K = 1, never changed
+  foreground,  ///< on the object of its ruling box
+  background,  ///< inside the ruling box, behind its object
+  invalid      ///< its pixel is not finite: K = 0
+};
+
+/// ruling_box of a keypoint in no box.
+inline constexpr std::int32_t no_box = -1;
+/// match of a keypoint without one.
+inline constexpr std::int32_t no_match = -1;
+
+}  // namespace cfp

@@ -1,0 +1,98 @@
+/// @file bundle_problem.hpp
+/// Input, options and result of the weighted bundle adjustment (bundle_adjustment.hpp). Frames: poses are T_cam_world;
+/// points are in the world, metres; pixels.
+#pragma once
+
+#include <cstddef>
+#include <cstring>
+
+#include "cfp/core/options.hpp"
+#include "cfp/core/span.hpp"
+#include "cfp/geometry/camera.hpp"
+#include "cfp/math/se3.hpp"
+#include "cfp/optimization/levenberg_marquardt.hpp"
+#include "cfp/optimization/robust_loss.hpp"
+
+namespace cfp {
+
+/// Parallel arrays in any order, float or double (the arithmetic is double). An observation is *invalid*, hence not
+/// used, when an index is out of range, its pixel, weight, sigma, pose or point is not finite, its weight is negative,
+/// its sigma is not positive, or its cost overflows. Weight 0 is the same as absent. The same pose may observe a point
+/// several times.
+template <typename Scalar>
+struct BundleObservations {
+  span<const int> pose;         ///< index into BundleProblem::poses
+  span<const int> point;        ///< index into BundleProblem::points
+  PointSpan<Scalar, 2> pixels;  ///< (u, v)
+  span<const Scalar> u_right =
+      {};  ///< px, u - fx b / z of a stereo or RGB-D observation; not > 0 or NaN: a pixel only. Empty: all mono
+  span<const Scalar> sigmas = {};   ///< px, ORB-SLAM2: the scale factor of the octave. Empty: all 1
+  span<const Scalar> weights = {};  ///< w >= 0, for example the static probability. Empty: all 1
+};
+
+/// What to adjust. Views only: the arrays must live during the call; poses and points are read and written.
+template <typename Camera = PinholeCamera<double>, typename Scalar = double>
+struct BundleProblem {
+  span<SE3<double>> poses;       ///< T_cam_world
+  span<Vector3<double>> points;  ///< world, m
+  span<const Camera> cameras;    ///< one for all poses, or one per pose; any type like PinholeCamera
+  BundleObservations<Scalar> observations;
+  span<const char> fixed_poses = {};  ///< per pose: not 0 = held. Empty: all free
+  double baseline_fx =
+      0;  ///< fx times stereo baseline, px m (ORB-SLAM2: Camera.bf); not > 0: all observations are mono
+};
+
+struct BundleOptions {
+  LevenbergMarquardtOptions levenberg_marquardt;
+  LossType loss = LossType::huber;
+  double chi2_mono = 5.991;    ///< delta^2 of the loss for two residuals, > 0: 95 % of chi^2 with 2 degrees of freedom
+  double chi2_stereo = 7.815;  ///< delta^2 of the loss for three residuals, > 0: 3 degrees of freedom
+};
+
+/// The first field outside its range, or nullptr.
+[[nodiscard]] inline const char* invalid_field(const BundleOptions& options) noexcept {
+  constexpr const char* nested[] = {
+      "levenberg_marquardt.max_iterations",        "levenberg_marquardt.initial_damping",
+      "levenberg_marquardt.min_damping",           "levenberg_marquardt.max_damping",
+      "levenberg_marquardt.min_relative_decrease", "levenberg_marquardt.min_absolute_decrease"};
+  if (const char* field = invalid_field(options.levenberg_marquardt)) {
+    for (const char* name : nested) {
+      if (std::strcmp(std::strchr(name, '.') + 1, field) == 0) return name;
+    }
+    return "levenberg_marquardt";
+  }
+  if (invalid_field(RobustLoss<double>{options.loss, 1.0}) != nullptr) return "loss";
+  if (!(options.chi2_mono > 0) || !is_finite(options.chi2_mono)) return "chi2_mono";
+  if (!(options.chi2_stereo > 0) || !is_finite(options.chi2_stereo)) return "chi2_stereo";
+  return nullptr;
+}
+
+/// Every observation is counted once: used + zero_weight + invalid + behind = all.
+struct BundleResult {
+  StopReason reason = StopReason::not_enough_data;
+  double initial_cost = 0;      ///< sum of w rho(|r|^2 / sigma^2) over the used observations
+  double final_cost = 0;        ///< <= initial_cost
+  int iterations = 0;           ///< steps tried
+  int accepted = 0;             ///< steps taken
+  std::size_t used = 0;         ///< observations in the cost
+  std::size_t zero_weight = 0;  ///< left out: w = 0
+  std::size_t invalid = 0;      ///< left out: see BundleObservations
+  std::size_t behind = 0;  ///< left out: at the start the camera did not see the point (behind it or beyond its model)
+  std::size_t free_poses = 0;       ///< poses that were adjusted
+  std::size_t adjusted_points = 0;  ///< points that were adjusted: those with a used observation
+  std::size_t reduced_blocks =
+      0;  ///< 6x6 blocks of the reduced camera system, lower triangle; 0 when the poses were eliminated
+  std::size_t factor_blocks = 0;  ///< 6x6 blocks of its Cholesky factor
+};
+
+/// An executor that does everything on the calling thread. Any type with `executor(count, task)`, which calls task(0),
+/// …, task(count - 1) in any order and on any thread and returns when all are done, is an executor; two_threads.hpp has
+/// one.
+struct SingleThread {
+  template <typename Task>
+  void operator()(int count, const Task& task) const {
+    for (int i = 0; i < count; ++i) task(i);
+  }
+};
+
+}  // namespace cfp

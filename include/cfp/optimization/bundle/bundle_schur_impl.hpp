@@ -1,0 +1,224 @@
+/// @file bundle_schur_impl.hpp
+/// Inside bundle_adjustment.hpp: eliminates the points from the damped normal equations and recovers their steps.
+///
+/// Per point, with V = sum of its N, g = sum of its n: V' = V + lambda D_x, and every pair of observations a, b of it
+/// takes W_a V'^-1 W_b^T from block (a, b) of the reduced camera system, W = G N. D is isotropic per point, and per
+/// pose for translation and rotation (mean of the diagonal), so that the iterates do not depend on the direction of the
+/// world's axes.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "cfp/optimization/bundle/bundle_linearization_impl.hpp"
+
+namespace cfp::detail {
+
+/// The reduced camera system and what the points need afterwards.
+struct BundleSchur {
+  static constexpr std::size_t point_doubles = 10;  // V'^-1 (00 01 02 11 12 22), g, D
+  std::vector<double> blocks[ba_parts];             // 36 per block, column-major
+  std::vector<double> right_side[ba_parts];         // 6 per free rank
+  std::vector<double> scratch[ba_parts];            // ba_slot_scratch per free slot of one point
+  std::vector<double> points;
+};
+
+/// The scale of the damping for a block of three: the mean of its diagonal, never quite zero.
+[[nodiscard]] inline double damping_scale(double trace) noexcept { return (std::max)(trace / 3, 1e-30); }
+
+/// Inverse of the symmetric V (00 01 02 11 12 22) through V = L D L^T; false when it is not positive definite.
+[[nodiscard]] inline bool invert_symmetric(const double (&V)[6], double* inverse) noexcept {
+  const double i0 = 1 / V[0];
+  const double l1 = V[1] * i0, l2 = V[2] * i0;
+  const double d1 = V[3] - l1 * V[1];
+  const double i1 = 1 / d1;
+  const double t = V[4] - l2 * V[1];
+  const double l3 = t * i1;
+  const double d2 = V[5] - l2 * V[2] - l3 * t;
+  if (!(V[0] > 0 && d1 > 0 && d2 > 0)) return false;
+  const double i2 = 1 / d2;
+  const double m2 = l1 * l3 - l2;  // L^-1 = [1, -l1 1, m2 -l3 1]
+  inverse[5] = i2;
+  inverse[4] = -l3 * i2;
+  inverse[3] = i1 + l3 * l3 * i2;
+  inverse[2] = m2 * i2;
+  inverse[1] = -l1 * i1 - l3 * m2 * i2;
+  inverse[0] = i0 + l1 * l1 * i1 + m2 * m2 * i2;
+  return true;
+}
+
+inline void multiply_symmetric(const double* S, const double (&x)[3], double (&y)[3]) noexcept {
+  y[0] = S[0] * x[0] + S[1] * x[1] + S[2] * x[2];
+  y[1] = S[1] * x[0] + S[3] * x[1] + S[4] * x[2];
+  y[2] = S[2] * x[0] + S[4] * x[1] + S[5] * x[2];
+}
+
+/// What the pairs of one slot need: W = G N = [N; hat(d) N] (6x3), V'^-1 N (3x3), both column-major, and d = x - c.
+inline constexpr int ba_slot_scratch = 30;
+
+inline void fill_scratch(const double* N, const double (&d)[3], const double* V_inverse, double* scratch) noexcept {
+  const double n[3][3] = {{N[0], N[1], N[2]}, {N[1], N[3], N[4]}, {N[2], N[4], N[5]}};
+  for (int c = 0; c < 3; ++c) {
+    double column[3];
+    multiply_symmetric(V_inverse, n[c], column);
+    double* const W = scratch + 6 * c;
+    W[0] = n[0][c], W[1] = n[1][c], W[2] = n[2][c];
+    W[3] = d[1] * n[2][c] - d[2] * n[1][c];
+    W[4] = d[2] * n[0][c] - d[0] * n[2][c];
+    W[5] = d[0] * n[1][c] - d[1] * n[0][c];
+    for (int r = 0; r < 3; ++r) scratch[18 + 3 * c + r] = column[r];
+    scratch[27 + c] = d[c];
+  }
+}
+
+/// Takes W_b V'^-1 W_a^T from the blocks (b, a) of all pairs a <= b < count of the slots of one point. Half of each
+/// block follows from the other: with T = W_b V'^-1 N_a it is [T, T hat(d_a)^T].
+inline void subtract_pairs(const double* scratch, int count, const int* pair, double* blocks) noexcept {
+  using Column = Eigen::Map<Vector6<double>>;
+  using ConstColumn = Eigen::Map<const Vector6<double>>;
+  for (int a = 0; a < count; ++a) {
+    const double* const p = scratch + ba_slot_scratch * a + 18;
+    const double x = p[9], y = p[10], z = p[11];
+    for (int b = a; b < count; ++b, ++pair) {
+      const ConstColumn w0(scratch + ba_slot_scratch * b), w1(scratch + ba_slot_scratch * b + 6),
+          w2(scratch + ba_slot_scratch * b + 12);
+      double* const block = blocks + 36 * to_index(*pair);
+      const Vector6<double> t0 = w0 * p[0] + w1 * p[1] + w2 * p[2];
+      const Vector6<double> t1 = w0 * p[3] + w1 * p[4] + w2 * p[5];
+      const Vector6<double> t2 = w0 * p[6] + w1 * p[7] + w2 * p[8];
+      Column(block) -= t0;
+      Column(block + 6) -= t1;
+      Column(block + 12) -= t2;
+      Column(block + 18) -= t2 * y - t1 * z;
+      Column(block + 24) -= t0 * z - t2 * x;
+      Column(block + 30) -= t1 * x - t0 * y;
+    }
+  }
+}
+
+/// V' of point j, and in schur.points what its step needs; false when V' is not positive definite, which only rounding
+/// or overflow can cause.
+[[nodiscard]] inline bool damp_point(const BundleIndex& index, const BundleLinearization& linear, double lambda,
+                                     std::size_t j, double (&V)[6], BundleSchur& schur) noexcept {
+  double sum[9] = {};
+  for (std::size_t s = index.slot_begin[j]; s < index.slot_begin[j + 1]; ++s) {
+    for (std::size_t e = 0; e < 9; ++e) sum[e] += linear.slots[BundleLinearization::slot_doubles * s + e];
+  }
+  const double scale = damping_scale(sum[0] + sum[3] + sum[5]);
+  std::copy(sum, sum + 6, V);
+  for (const int diagonal : {0, 3, 5}) V[diagonal] += lambda * scale;
+  double* const point = schur.points.data() + BundleSchur::point_doubles * j;
+  std::copy(sum + 6, sum + 9, point + 6), point[9] = scale;
+  return invert_symmetric(V, point);
+}
+
+/// H' = H + lambda D of a pose.
+[[nodiscard]] inline Matrix6<double> damped_pose(const double* pose, double lambda) noexcept {
+  Matrix6<double> H = Eigen::Map<const Matrix6<double>>(pose);
+  const double t = lambda * damping_scale(pose[0] + pose[7] + pose[14]),
+               r = lambda * damping_scale(pose[21] + pose[28] + pose[35]);
+  for (int e = 0; e < 3; ++e) H(e, e) += t, H(e + 3, e + 3) += r;
+  return H;
+}
+
+/// The share of one part of the points in the reduced system; part 0 starts from the poses' own blocks. False as
+/// damp_point.
+[[nodiscard]] inline bool eliminate_points(const BundleIndex& index, const BundleState& state,
+                                           const BundleLinearization& linear, double lambda, int part,
+                                           BundleSchur& schur) noexcept {
+  double* const blocks = schur.blocks[part].data();
+  double* const right_side = schur.right_side[part].data();
+  double* const scratch = schur.scratch[part].data();
+  std::fill(schur.blocks[part].begin(), schur.blocks[part].end(), 0.0);
+  std::fill(schur.right_side[part].begin(), schur.right_side[part].end(), 0.0);
+  if (part == 0) {
+    for (std::size_t k = 0; k < to_index(index.free_poses); ++k) {
+      const double* pose = linear.poses.data() + k * BundleLinearization::pose_doubles;
+      Eigen::Map<Matrix6<double>>(blocks + 36 * to_index(index.diagonal_block[k])) = damped_pose(pose, lambda);
+      for (std::size_t e = 0; e < 6; ++e) right_side[6 * k + e] = -pose[36 + e];
+    }
+  }
+  for (std::size_t j = to_index(index.point_part[to_index(part)]); j < to_index(index.point_part[to_index(part) + 1]);
+       ++j) {
+    const double* slot = linear.slots.data() + BundleLinearization::slot_doubles * index.slot_begin[j];
+    double V[6];
+    if (!damp_point(index, linear, lambda, j, V, schur)) return false;
+    const double* const point = schur.points.data() + BundleSchur::point_doubles * j;
+    const double gradient[3] = {point[6], point[7], point[8]};
+    double Vg[3];
+    multiply_symmetric(point, gradient, Vg);
+
+    const double* x = state.points.data() + 3 * j;
+    const int* rank = index.slot_rank.data() + index.slot_begin[j];
+    for (int a = 0; a < index.free_slots[j]; ++a, slot += BundleLinearization::slot_doubles) {
+      const double* c = state.poses[to_index(rank[a])].center;
+      const double d[3] = {x[0] - c[0], x[1] - c[1], x[2] - c[2]};
+      fill_scratch(slot, d, point, scratch + ba_slot_scratch * a);
+      double n[3];
+      multiply_symmetric(slot, Vg, n);
+      double* const g = right_side + 6 * rank[a];
+      g[0] += n[0], g[1] += n[1], g[2] += n[2];
+      g[3] += d[1] * n[2] - d[2] * n[1], g[4] += d[2] * n[0] - d[0] * n[2], g[5] += d[0] * n[1] - d[1] * n[0];
+    }
+    subtract_pairs(scratch, index.free_slots[j], index.pair_block.data() + index.pair_begin[j], blocks);
+  }
+  return true;
+}
+
+/// The points' steps from the poses' steps (6 per free rank): x_next = x + h. Returns the part's share of h^T (lambda D
+/// h - g).
+[[nodiscard]] inline double move_points(const BundleIndex& index, const BundleState& state,
+                                        const BundleLinearization& linear, const BundleSchur& schur, double lambda,
+                                        const double* pose_steps, int part, BundleState& next) noexcept {
+  double promised = 0;
+  for (std::size_t j = to_index(index.point_part[to_index(part)]); j < to_index(index.point_part[to_index(part) + 1]);
+       ++j) {
+    const double* point = schur.points.data() + BundleSchur::point_doubles * j;
+    const double* x = state.points.data() + 3 * j;
+    const double* slot = linear.slots.data() + BundleLinearization::slot_doubles * index.slot_begin[j];
+    const int* rank = index.slot_rank.data() + index.slot_begin[j];
+    double sum[3] = {point[6], point[7], point[8]};
+    for (int a = 0; a < index.free_slots[j]; ++a, slot += BundleLinearization::slot_doubles) {
+      const double* c = state.poses[to_index(rank[a])].center;
+      const double* xi = pose_steps + 6 * rank[a];
+      const double d0 = x[0] - c[0], d1 = x[1] - c[1], d2 = x[2] - c[2];
+      const double moved[3] = {xi[0] + xi[4] * d2 - xi[5] * d1, xi[1] + xi[5] * d0 - xi[3] * d2,
+                               xi[2] + xi[3] * d1 - xi[4] * d0};
+      double y[3];
+      multiply_symmetric(slot, moved, y);
+      for (int e = 0; e < 3; ++e) sum[e] += y[e];
+    }
+    double h[3];
+    multiply_symmetric(point, sum, h);
+    for (std::size_t e = 0; e < 3; ++e) {
+      next.points[3 * j + e] = x[e] - h[e];
+      promised += h[e] * (lambda * point[9] * h[e] + point[6 + e]);
+    }
+  }
+  return promised;
+}
+
+/// The poses' steps applied; fixed ranks are copied. Returns their share of h^T (lambda D h - g).
+[[nodiscard]] inline double move_poses(const BundleIndex& index, const BundleState& state,
+                                       const BundleLinearization& linear, double lambda, const double* pose_steps,
+                                       BundleState& next) noexcept {
+  double promised = 0;
+  for (std::size_t k = 0; k < state.poses.size(); ++k) {
+    next.poses[k] = state.poses[k];
+    if (k >= to_index(index.free_poses)) continue;
+    const double* xi = pose_steps + 6 * k;
+    const double* H = linear.poses.data() + k * BundleLinearization::pose_doubles;
+    const double t = lambda * damping_scale(H[0] + H[7] + H[14]), r = lambda * damping_scale(H[21] + H[28] + H[35]);
+    for (std::size_t e = 0; e < 6; ++e) promised += xi[e] * ((e < 3 ? t : r) * xi[e] - H[36 + e]);
+    using Rotation = Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>;
+    Rotation rotation(next.poses[k].rotation);
+    rotation = Matrix3<double>(rotation) * so3_exp(Vector3<double>(xi[3], xi[4], xi[5]));
+    for (std::size_t e = 0; e < 3; ++e) next.poses[k].center[e] -= xi[e];
+  }
+  return promised;
+}
+
+}  // namespace cfp::detail

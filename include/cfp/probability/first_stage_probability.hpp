@@ -1,0 +1,41 @@
+/// @file first_stage_probability.hpp
+/// Static probability K of a keypoint inside the box of a potentially moving object, first (coarse) stage
+/// (paper section IV-C). Keypoints outside all boxes have K = 1 and are never changed.
+#pragma once
+
+#include "cfp/core/numeric.hpp"
+
+namespace cfp {
+
+/// Whether an object counts as high dynamic: O <= O_Th (paper IV-B; O_Th = 0.9). NaN counts as high dynamic.
+template <typename Scalar>
+[[nodiscard]] constexpr bool is_high_dynamic(Scalar object_probability, Scalar object_threshold) noexcept {
+  return !(object_probability > object_threshold);
+}
+
+/// K_D, the factor for a background keypoint (paper eq. K^D): (1 - O_Th) / O_Th^4 * K^3 + 1 for O <= O_Th, else 1 / K.
+/// With K = O, K K_D is in [O, 1], non-decreasing in O, and continuous at O_Th, where it is 1. K = 0 in the second
+/// branch (no object with O > O_Th > 0 starts there) gives 1, so that the factor is always finite. O_Th in (0, 1).
+template <typename Scalar>
+[[nodiscard]] constexpr Scalar background_factor(Scalar keypoint_probability, Scalar object_probability,
+                                                 Scalar object_threshold) noexcept {
+  const Scalar k = clamp_probability(keypoint_probability);
+  if (!is_high_dynamic(object_probability, object_threshold)) return k > Scalar(0) ? Scalar(1) / k : Scalar(1);
+  const Scalar t2 = object_threshold * object_threshold;
+  return (Scalar(1) - object_threshold) / (t2 * t2) * k * k * k + Scalar(1);
+}
+
+/// K after the first stage, for a keypoint that starts at the O of its object:
+/// foreground: 0 for a high-dynamic object, O for a low-dynamic one; background: O K_D(O) (paper eq. K <- K K_D).
+/// In [0, 1], non-decreasing in O, background never below foreground. NaN counts as O = 0.
+template <typename Scalar>
+[[nodiscard]] constexpr Scalar first_stage_probability(Scalar object_probability, bool foreground,
+                                                       Scalar object_threshold) noexcept {
+  const Scalar o = clamp_probability(object_probability);
+  if (foreground) return is_high_dynamic(o, object_threshold) ? Scalar(0) : o;
+  // 1/K may overflow for a denormal K, but only where O_Th is as small; K K_D is 1 there by definition.
+  if (!is_high_dynamic(o, object_threshold)) return Scalar(1);
+  return clamp_probability(o * background_factor(o, o, object_threshold));
+}
+
+}  // namespace cfp

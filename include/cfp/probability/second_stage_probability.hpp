@@ -1,0 +1,74 @@
+/// @file second_stage_probability.hpp
+/// Static probability K of a keypoint, second (fine) stage: what the projection and the epipolar constraint say
+/// together, and the special rules around them (paper section IV-D).
+#pragma once
+
+#include <cstdint>
+#include <limits>
+
+#include "cfp/core/numeric.hpp"
+#include "cfp/probability/first_stage_probability.hpp"
+
+namespace cfp {
+
+/// What one constraint says of one keypoint.
+template <typename Scalar>
+struct Evidence {
+  Scalar static_probability = Scalar(0);  ///< K^T or K^F
+  Scalar confidence = Scalar(0);          ///< C_s C_c of the frame, in [0, 1]
+  bool available = false;  ///< false: no depth, behind the camera, translation below t_Th, constraint not fitted
+};
+
+/// For O <= O_Th: K^T K^F, a point must satisfy both; with one constraint, that one's K (paper eq. for high-dynamic
+/// objects; K^F is unavailable for |t| <= t_Th). Neither: 0, nothing speaks for the point.
+template <typename Scalar>
+[[nodiscard]] constexpr Scalar fuse_high_dynamic(const Evidence<Scalar>& projection,
+                                                 const Evidence<Scalar>& epipolar) noexcept {
+  if (!projection.available && !epipolar.available) return Scalar(0);
+  return clamp_probability((projection.available ? projection.static_probability : Scalar(1)) *
+                           (epipolar.available ? epipolar.static_probability : Scalar(1)));
+}
+
+/// For O > O_Th: (K^T C^T + K^F C^F) / (C^T + C^F) with C = C_s C_c (paper eq. for low-dynamic objects). An unavailable
+/// constraint has no weight; where both confidences are 0 the paper has 0/0 and this gives K^T, the limit of a weak
+/// epipolar constraint, or K^F if only that is available. Neither: 0.
+template <typename Scalar>
+[[nodiscard]] constexpr Scalar fuse_low_dynamic(const Evidence<Scalar>& projection,
+                                                const Evidence<Scalar>& epipolar) noexcept {
+  if (!epipolar.available) return projection.available ? clamp_probability(projection.static_probability) : Scalar(0);
+  if (!projection.available) return clamp_probability(epipolar.static_probability);
+  const Scalar ct = clamp_probability(projection.confidence), sum = ct + clamp_probability(epipolar.confidence);
+  // Confidences near the smallest normal number lose their digits; below it they are no confidences.
+  if (!(sum > (std::numeric_limits<Scalar>::min)())) return clamp_probability(projection.static_probability);
+  const Scalar share = ct / sum;
+  return clamp_probability(projection.static_probability * share + epipolar.static_probability * (Scalar(1) - share));
+}
+
+/// All that the second stage needs to know of one keypoint inside a box.
+template <typename Scalar>
+struct SecondStageKeypoint {
+  Evidence<Scalar> projection;               ///< K^T
+  Evidence<Scalar> epipolar;                 ///< K^F
+  Scalar object_probability = Scalar(0);     ///< O of the box that rules this keypoint
+  Scalar map_point_probability = Scalar(1);  ///< M of its map point; 1 where there is none
+  bool foreground = true;                    ///< from the depth clustering
+  bool matched = false;                      ///< has a match in frame k-1
+  bool box_associated = true;                ///< its box continues a box of frame k-1
+};
+
+/// K after the second stage. In the paper's order:
+/// box not associated with one of frame k-1: foreground 0 (its matches are false), background by the rules below;
+/// no match in k-1: foreground 0, background M; match: fuse_high_dynamic or fuse_low_dynamic by O against O_Th.
+/// A match without any available constraint (no depth and too little translation) counts as no match. In [0, 1].
+template <typename Scalar>
+[[nodiscard]] constexpr Scalar second_stage_probability(const SecondStageKeypoint<Scalar>& keypoint,
+                                                        Scalar object_threshold) noexcept {
+  if (keypoint.foreground && !keypoint.box_associated) return Scalar(0);
+  const bool usable = keypoint.matched && (keypoint.projection.available || keypoint.epipolar.available);
+  if (!usable) return keypoint.foreground ? Scalar(0) : clamp_probability(keypoint.map_point_probability);
+  return is_high_dynamic(keypoint.object_probability, object_threshold)
+             ? fuse_high_dynamic(keypoint.projection, keypoint.epipolar)
+             : fuse_low_dynamic(keypoint.projection, keypoint.epipolar);
+}
+
+}  // namespace cfp

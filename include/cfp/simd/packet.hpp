@@ -1,0 +1,233 @@
+/// @file packet.hpp
+/// Several numbers of one type in one vector register, for loops over points stored one array per coordinate. The same
+/// template, instantiated with the plain scalar, is the scalar version: every function below exists for float and
+/// double.
+///
+///   template <typename P> void square(const scalar_of<P>* x, scalar_of<P>* y) { store(y, load<P>(x) * load<P>(x)); }
+///   square<Packet<float>>(x, y);  square<float>(x, y);
+///
+/// Built on Eigen's packet operations (internal, but the same from Eigen 3.4 to 5 and from SSE2 to AVX-512 and NEON);
+/// this is the only header that touches them. The width follows the flags of the including project and is part of the
+/// type's name, so that units built with different flags do not share code by mistake. Nothing asks for flags and
+/// nothing allocates.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+
+#include <Eigen/Core>
+
+#include "cfp/core/assert.hpp"
+
+// GCC 12 takes the deliberately undefined registers of its own AVX-512 intrinsics for a mistake of whoever inlines
+// them.
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wuninitialized"
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+#endif
+
+namespace cfp {
+
+/// Numbers per register: 4 floats for SSE2 and NEON, 16 for AVX-512; 1 where there is no vector unit for T.
+template <typename T>
+inline constexpr int native_lanes = static_cast<int>(Eigen::internal::packet_traits<T>::size);
+
+/// Result of a comparison of packets: a choice per lane.
+template <typename T, int Lanes>
+struct PacketMask {
+  typename Eigen::internal::packet_traits<T>::type bits;
+
+  friend PacketMask operator&(const PacketMask& a, const PacketMask& b) noexcept {
+    return {Eigen::internal::pand(a.bits, b.bits)};
+  }
+  friend PacketMask operator|(const PacketMask& a, const PacketMask& b) noexcept {
+    return {Eigen::internal::por(a.bits, b.bits)};
+  }
+};
+
+/// `Lanes` numbers of type T. For registers and local arrays only: its alignment depends on flags, so no struct may
+/// hold one.
+template <typename T, int Lanes>
+struct BasicPacket {
+  using Register = typename Eigen::internal::packet_traits<T>::type;
+  using Mask = PacketMask<T, Lanes>;
+  Register bits;
+
+  BasicPacket() = default;
+  BasicPacket(const T& x) noexcept : bits(Eigen::internal::pset1<Register>(x)) {}
+  static BasicPacket wrap(const Register& r) noexcept {
+    BasicPacket p;
+    p.bits = r;
+    return p;
+  }
+
+  friend BasicPacket operator+(const BasicPacket& a, const BasicPacket& b) noexcept {
+    return wrap(Eigen::internal::padd(a.bits, b.bits));
+  }
+  friend BasicPacket operator-(const BasicPacket& a, const BasicPacket& b) noexcept {
+    return wrap(Eigen::internal::psub(a.bits, b.bits));
+  }
+  friend BasicPacket operator*(const BasicPacket& a, const BasicPacket& b) noexcept {
+    return wrap(Eigen::internal::pmul(a.bits, b.bits));
+  }
+  friend BasicPacket operator/(const BasicPacket& a, const BasicPacket& b) noexcept {
+    return wrap(Eigen::internal::pdiv(a.bits, b.bits));
+  }
+  friend BasicPacket operator-(const BasicPacket& a) noexcept { return wrap(Eigen::internal::pnegate(a.bits)); }
+  BasicPacket& operator+=(const BasicPacket& b) noexcept { return *this = *this + b; }
+
+  // A comparison with NaN is false.
+  friend Mask operator<(const BasicPacket& a, const BasicPacket& b) noexcept {
+    return {Eigen::internal::pcmp_lt(a.bits, b.bits)};
+  }
+  friend Mask operator<=(const BasicPacket& a, const BasicPacket& b) noexcept {
+    return {Eigen::internal::pcmp_le(a.bits, b.bits)};
+  }
+  friend Mask operator>(const BasicPacket& a, const BasicPacket& b) noexcept { return b < a; }
+  friend Mask operator>=(const BasicPacket& a, const BasicPacket& b) noexcept { return b <= a; }
+};
+
+namespace detail {
+
+template <typename T, int Lanes>
+struct PacketOf {
+  using type = BasicPacket<T, Lanes>;
+};
+template <typename T>
+struct PacketOf<T, 1> {
+  using type = T;
+};
+
+template <typename P>
+struct PacketTraits {
+  using Scalar = P;
+  static constexpr int lanes = 1;
+};
+template <typename T, int Lanes>
+struct PacketTraits<BasicPacket<T, Lanes>> {
+  using Scalar = T;
+  static constexpr int lanes = Lanes;
+};
+
+}  // namespace detail
+
+/// The widest packet the flags of this unit allow; T itself without a vector unit.
+template <typename T>
+using Packet = typename detail::PacketOf<T, native_lanes<T>>::type;
+
+template <typename P>
+using scalar_of = typename detail::PacketTraits<P>::Scalar;
+template <typename P>
+inline constexpr int lanes_of = detail::PacketTraits<P>::lanes;
+
+/// Lanes adjacent numbers, no alignment asked.
+template <typename P>
+[[nodiscard]] P load(const scalar_of<P>* from) noexcept {
+  if constexpr (lanes_of<P> == 1) {
+    return *from;
+  } else {
+    return P::wrap(Eigen::internal::ploadu<typename P::Register>(from));
+  }
+}
+/// The first n numbers, n in [0, lanes]; the remaining lanes hold `rest`. Reads nothing beyond from[n - 1].
+template <typename P>
+[[nodiscard]] P load_partial(const scalar_of<P>* from, std::size_t n, scalar_of<P> rest = {}) noexcept {
+  CFP_ASSERT(n <= static_cast<std::size_t>(lanes_of<P>));
+  scalar_of<P> lanes[lanes_of<P>];
+  for (std::size_t i = 0; i < static_cast<std::size_t>(lanes_of<P>); ++i) lanes[i] = i < n ? from[i] : rest;
+  return load<P>(lanes);
+}
+
+template <typename T>
+void store(T* to, const T& x) noexcept {
+  *to = x;
+}
+template <typename T, int Lanes>
+void store(T* to, const BasicPacket<T, Lanes>& p) noexcept {
+  Eigen::internal::pstoreu(to, p.bits);
+}
+
+/// a b + c, fused (one rounding) where the flags allow.
+template <typename T>
+[[nodiscard]] T multiply_add(const T& a, const T& b, const T& c) noexcept {
+  return a * b + c;
+}
+template <typename T, int Lanes>
+[[nodiscard]] BasicPacket<T, Lanes> multiply_add(const BasicPacket<T, Lanes>& a, const BasicPacket<T, Lanes>& b,
+                                                 const BasicPacket<T, Lanes>& c) noexcept {
+  return BasicPacket<T, Lanes>::wrap(Eigen::internal::pmadd(a.bits, b.bits, c.bits));
+}
+
+/// Conjunction of two conditions, of packets or of scalars.
+template <typename T, int Lanes>
+[[nodiscard]] PacketMask<T, Lanes> both(const PacketMask<T, Lanes>& a, const PacketMask<T, Lanes>& b) noexcept {
+  return a & b;
+}
+[[nodiscard]] constexpr bool both(bool a, bool b) noexcept { return a && b; }
+
+/// Per lane: a where the condition holds, else b. Both are evaluated; the one not taken may hold NaN or infinity.
+template <typename T>
+[[nodiscard]] constexpr T select(bool condition, const T& a, const T& b) noexcept {
+  return condition ? a : b;
+}
+template <typename T, int Lanes>
+[[nodiscard]] BasicPacket<T, Lanes> select(const PacketMask<T, Lanes>& condition, const BasicPacket<T, Lanes>& a,
+                                           const BasicPacket<T, Lanes>& b) noexcept {
+  return BasicPacket<T, Lanes>::wrap(Eigen::internal::pselect(condition.bits, a.bits, b.bits));
+}
+
+// Found by argument-dependent lookup, as for dual numbers: `using std::sqrt; sqrt(x)` in a formula covers scalar and
+// packet.
+
+/// Within 2 units in the last place: Eigen refines the hardware estimate where that is faster; exact at 0.
+template <typename T, int Lanes>
+[[nodiscard]] BasicPacket<T, Lanes> sqrt(const BasicPacket<T, Lanes>& a) noexcept {
+  return BasicPacket<T, Lanes>::wrap(Eigen::internal::psqrt(a.bits));
+}
+template <typename T, int Lanes>
+[[nodiscard]] BasicPacket<T, Lanes> abs(const BasicPacket<T, Lanes>& a) noexcept {
+  return BasicPacket<T, Lanes>::wrap(Eigen::internal::pabs(a.bits));
+}
+/// log(1 + x) for x > -1, lane by lane.
+template <typename T, int Lanes>
+[[nodiscard]] BasicPacket<T, Lanes> log1p(const BasicPacket<T, Lanes>& a) noexcept {
+  T lanes[static_cast<std::size_t>(Lanes)];
+  store(lanes, a);
+  for (T& x : lanes) x = std::log1p(x);
+  return load<BasicPacket<T, Lanes>>(lanes);
+}
+
+/// 1 / sqrt(x) within 3 units in the last place; infinite at 0 (for packets also at denormals), 0 at infinity. One root
+/// and no division where the hardware has an estimate to refine.
+template <typename T>
+[[nodiscard]] T reciprocal_sqrt(const T& x) noexcept {
+  using std::sqrt;
+  return T(1) / sqrt(x);
+}
+template <typename T, int Lanes>
+[[nodiscard]] BasicPacket<T, Lanes> reciprocal_sqrt(const BasicPacket<T, Lanes>& x) noexcept {
+  return BasicPacket<T, Lanes>::wrap(Eigen::internal::prsqrt(x.bits));
+}
+
+/// 1 / x, correctly rounded (a division, not the hardware's estimate, whose bits differ between makers).
+template <typename P>
+[[nodiscard]] P reciprocal(const P& x) noexcept {
+  return P(scalar_of<P>(1)) / x;
+}
+
+/// The sum of the lanes.
+template <typename T>
+[[nodiscard]] T reduce_add(const T& x) noexcept {
+  return x;
+}
+template <typename T, int Lanes>
+[[nodiscard]] T reduce_add(const BasicPacket<T, Lanes>& p) noexcept {
+  return Eigen::internal::predux(p.bits);
+}
+
+}  // namespace cfp
+
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic pop
+#endif

@@ -1,0 +1,268 @@
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "cfp/optimization/bundle/bundle_adjustment.hpp"
+#include "cfp/optimization/bundle/two_threads.hpp"
+#include "support/allocation_counter.hpp"
+#include "support/ba_scene.hpp"
+#include "support/catch.hpp"
+
+namespace {
+
+struct BackwardExecutor {
+  template <typename Task>
+  void operator()(int count, const Task& task) const {
+    for (int i = count - 1; i >= 0; --i) task(i);
+  }
+};
+
+bool same_bits(const cfp_test::BaScene& a, const cfp_test::BaScene& b) {
+  return std::memcmp(a.poses.data(), b.poses.data(), a.poses.size() * sizeof(a.poses[0])) == 0 &&
+         std::memcmp(a.points.data(), b.points.data(), a.points.size() * sizeof(a.points[0])) == 0;
+}
+
+bool all_finite(const cfp_test::BaScene& scene) {
+  double sum = 0;
+  for (const auto& pose : scene.poses) sum += pose.rotation.sum() + pose.translation.sum();
+  for (const auto& point : scene.points) sum += point.sum();
+  return cfp::is_finite(sum);
+}
+
+cfp::BundleResult adjust(cfp_test::BaScene& scene, const cfp::BundleOptions& options = {}) {
+  cfp::BundleWorkspace workspace;
+  return cfp::adjust_bundle(scene.problem(), options, workspace);
+}
+
+}  // namespace
+
+TEST_CASE("One thread, two threads and any order of the tasks give the same bits", "[optimization][bundle_adjustment]") {
+  cfp::TwoThreads two_threads;
+  cfp::BundleWorkspace workspace;
+  for (const int poses : {2, 10, 80}) {
+    cfp_test::BaSceneOptions options;
+    options.poses = poses;
+    options.points = 30 * poses;
+    options.stereo_share = 0.3;
+    const cfp_test::BaScene start = cfp_test::make_ba_scene(options, 1);
+    cfp_test::BaScene one = start, two = start, backward = start, again = start;
+    adjust_bundle(one.problem(), cfp::BundleOptions{}, workspace);
+    adjust_bundle(two.problem(), cfp::BundleOptions{}, workspace, two_threads);
+    adjust_bundle(backward.problem(), cfp::BundleOptions{}, workspace, BackwardExecutor{});
+    adjust_bundle(again.problem(), cfp::BundleOptions{}, workspace);
+    CHECK(same_bits(one, two));
+    CHECK(same_bits(one, backward));
+    CHECK(same_bits(one, again));
+  }
+}
+
+TEST_CASE("A second call of the same size allocates nothing; a large one nothing per iteration",
+          "[optimization][bundle_adjustment]") {
+  for (const int poses : {10, 100}) {
+    cfp_test::BaSceneOptions options;
+    options.poses = poses;
+    options.points = 20 * poses;
+    options.stereo_share = 0.3;
+    const cfp_test::BaScene start = cfp_test::make_ba_scene(options, 2);
+    cfp::BundleWorkspace workspace;
+    const auto allocations = [&](int iterations) {
+      cfp_test::BaScene scene = start;
+      cfp::BundleOptions ba;
+      ba.levenberg_marquardt.max_iterations = iterations;
+      cfp::BundleResult result;
+      const std::size_t count =
+          cfp_test::allocations_in([&] { result = adjust_bundle(scene.problem(), ba, workspace); });
+      CHECK(result.iterations == iterations);
+      return count;
+    };
+    allocations(1);
+    const std::size_t one = allocations(1), six = allocations(6);
+    CHECK(one == six);
+    if (poses == 10) CHECK(six == 0);
+  }
+}
+
+TEST_CASE("Nothing to do is reported and changes nothing", "[optimization][bundle_adjustment]") {
+  cfp::BundleWorkspace workspace;
+  CHECK(adjust_bundle(cfp::BundleProblem<>{}, cfp::BundleOptions{}, workspace).reason ==
+        cfp::StopReason::not_enough_data);
+  cfp_test::BaSceneOptions options;
+  options.points = 20;
+  const cfp_test::BaScene start = cfp_test::make_ba_scene(options, 3);
+  cfp_test::BaScene scene = start;
+  std::fill(scene.weights.begin(), scene.weights.end(), 0.0);
+  cfp::BundleResult result = adjust(scene);
+  CHECK(result.reason == cfp::StopReason::not_enough_data);
+  CHECK(result.zero_weight == scene.pose.size());
+  CHECK(same_bits(scene, start));
+  scene = start;
+  cfp::BundleOptions none;
+  none.levenberg_marquardt.max_iterations = 0;
+  result = adjust(scene, none);
+  CHECK(result.reason == cfp::StopReason::max_iterations);
+  CHECK(result.final_cost == result.initial_cost);
+  CHECK(same_bits(scene, start));
+}
+
+TEST_CASE("With all poses fixed the points alone are adjusted; fixed and untouched things keep their bits",
+          "[optimization][bundle_adjustment]") {
+  cfp_test::BaSceneOptions options;
+  options.points = 50;
+  cfp_test::BaScene scene = cfp_test::make_ba_scene(options, 4);
+  std::fill(scene.fixed.begin(), scene.fixed.end(), 1);
+  scene.points.emplace_back(1, 2, 3);
+  const cfp_test::BaScene start = scene;
+  const cfp::BundleResult result = adjust(scene);
+  CHECK(result.free_poses == 0);
+  CHECK(result.adjusted_points == 50);
+  CHECK(result.final_cost < 0.7 * result.initial_cost);
+  CHECK(std::memcmp(scene.poses.data(), start.poses.data(), scene.poses.size() * sizeof(scene.poses[0])) == 0);
+  CHECK(scene.points.back() == start.points.back());
+  CHECK(scene.points.front() != start.points.front());
+}
+
+TEST_CASE("Points behind a camera are left out and counted, and no step puts a used one there",
+          "[optimization][bundle_adjustment]") {
+  cfp_test::BaSceneOptions options;
+  options.points = 200;
+  options.start_point_m = 0.4;  // with depths from 0.8 m a Gauss-Newton step overshoots the cameras
+  options.start_angle_deg = 3;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    cfp_test::BaScene scene = cfp_test::make_ba_scene(options, seed);
+    for (std::size_t j = 0; j < 10; ++j) scene.points[j].z() = -2;
+    const cfp_test::BaScene start = scene;
+    cfp::BundleOptions ba;
+    ba.levenberg_marquardt.max_iterations = 100;
+    const cfp::BundleResult result = adjust(scene, ba);
+    CHECK(result.behind >= 20);
+    CHECK(result.used + result.behind == scene.pose.size());
+    CHECK(result.final_cost < 0.1 * result.initial_cost);
+    CHECK(all_finite(scene));
+    for (std::size_t i = 0; i < scene.pose.size(); ++i) {
+      const auto k = static_cast<std::size_t>(scene.pose[i]), j = static_cast<std::size_t>(scene.point[i]);
+      if ((start.poses[k] * start.points[j]).z() > 1e-6) CHECK((scene.poses[k] * scene.points[j]).z() > 0);
+    }
+    for (std::size_t j = 0; j < 10; ++j) CHECK(scene.points[j] == start.points[j]);
+  }
+}
+
+TEST_CASE("Hostile input is counted as invalid and does not change the rest", "[optimization][bundle_adjustment]") {
+  const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+  cfp_test::BaSceneOptions options;
+  options.points = 60;
+  const cfp_test::BaScene clean = cfp_test::make_ba_scene(options, 5);
+  cfp_test::BaScene expected = clean;
+  const cfp::BundleResult reference = adjust(expected);
+  cfp_test::BaScene scene = clean;
+  const auto add = [&](int pose, int point, double u, double v, double sigma, double weight) {
+    scene.pose.push_back(pose), scene.point.push_back(point), scene.pixels.emplace_back(u, v);
+    scene.u_right.push_back(-1), scene.sigma.push_back(sigma), scene.weights.push_back(weight);
+  };
+  std::size_t invalid = 0;
+  for (const int index : {-1, 1000, (std::numeric_limits<int>::max)(), (std::numeric_limits<int>::min)()}) {
+    add(index, 0, 1, 1, 1, 1), add(0, index, 1, 1, 1, 1), invalid += 2;
+  }
+  for (const double bad : {nan, inf, -inf}) {
+    add(3, 3, bad, 1, 1, 1), add(3, 3, 1, bad, 1, 1), add(3, 3, 1, 1, bad, 1), add(3, 3, 1, 1, 1, bad), invalid += 4;
+  }
+  add(3, 3, 1, 1, 0, 1), add(3, 3, 1, 1, -1, 1), add(3, 3, 1, 1, 1, -1), add(3, 3, 1, 1, 1e-200, 1),
+      add(3, 3, 1e300, 1, 1, 1), invalid += 5;
+  scene.points.emplace_back(nan, 0, 1), add(3, static_cast<int>(scene.points.size()) - 1, 1, 1, 1, 1), ++invalid;
+  scene.points.emplace_back(0, 0, inf), add(3, static_cast<int>(scene.points.size()) - 1, 1, 1, 1, 1), ++invalid;
+  scene.poses.emplace_back(), scene.poses.back().translation.x() = nan, scene.fixed.push_back(0);
+  add(static_cast<int>(scene.poses.size()) - 1, 0, 1, 1, 1, 1), ++invalid;
+  std::vector<double> errors(scene.pose.size());
+  cfp::BundleWorkspace workspace;
+  const cfp::BundleResult result =
+      adjust_bundle(scene.problem(), cfp::BundleOptions{}, workspace, cfp::SingleThread{}, errors);
+  CHECK(result.invalid == invalid);
+  CHECK(result.used == clean.pose.size());
+  CHECK(result.final_cost == reference.final_cost);
+  CHECK(std::memcmp(scene.poses.data(), expected.poses.data(), expected.poses.size() * sizeof(expected.poses[0])) == 0);
+  for (const double error : errors) CHECK(cfp::is_finite(error));
+}
+
+TEST_CASE("Any finite numbers give a finite result and an end", "[optimization][bundle_adjustment]") {
+  cfp_test::BaSceneOptions options;
+  options.poses = 4;
+  options.points = 10;
+  options.stereo_share = 0.5;
+  cfp::Random random(9, "hostile numbers");
+  const double extremes[] = {0, 1, -1, 1e-300, 1e-30, 1e-8, 1e8, 1e30, 1e150, 1e300, 5e-324};
+  for (int round = 0; round < 300; ++round) {
+    CAPTURE(round);
+    cfp_test::BaScene scene = cfp_test::make_ba_scene(options, 1);
+    const auto extreme = [&] { return extremes[random.index(11)]; };
+    for (int change = 0; change < 4; ++change) {
+      const std::size_t i = random.index(static_cast<std::uint32_t>(scene.pose.size()));
+      switch (random.index(7)) {
+        case 0:
+          scene.pixels[i].x() = extreme();
+          break;
+        case 1:
+          scene.u_right[i] = extreme();
+          break;
+        case 2:
+          scene.sigma[i] = extreme();
+          break;
+        case 3:
+          scene.weights[i] = extreme();
+          break;
+        case 4:
+          scene.points[i % 10][static_cast<int>(random.index(3))] = extreme();
+          break;
+        case 5:
+          scene.poses[i % 4].translation[static_cast<int>(random.index(3))] = extreme();
+          break;
+        default:
+          scene.poses[i % 4].rotation(static_cast<int>(random.index(3)), 1) = extreme();
+          break;
+      }
+    }
+    cfp::BundleOptions ba;
+    ba.loss = static_cast<cfp::LossType>(random.index(5));
+    ba.levenberg_marquardt.max_iterations = 30;
+    const cfp::BundleResult result = adjust(scene, ba);
+    CHECK(cfp::is_finite(result.final_cost));
+    CHECK(result.final_cost <= result.initial_cost);
+    CHECK(result.used + result.behind + result.invalid + result.zero_weight == scene.pose.size());
+    CHECK(all_finite(scene));
+  }
+}
+
+TEST_CASE("Badly determined problems end without harm", "[optimization][bundle_adjustment]") {
+  for (const int views : {1, 2}) {
+    cfp_test::BaSceneOptions options;
+    options.views_per_point = views;  // one view: depth is free
+    options.points = 30;
+    cfp_test::BaScene scene = cfp_test::make_ba_scene(options, 6);
+    const cfp::BundleResult result = adjust(scene);
+    CHECK(result.final_cost <= result.initial_cost);
+    CHECK(all_finite(scene));
+  }
+  cfp_test::BaSceneOptions all_equal;
+  all_equal.points = 20;
+  cfp_test::BaScene scene = cfp_test::make_ba_scene(all_equal, 7);
+  for (auto& point : scene.points) point = cfp::Vector3<double>(0, 0, 4);
+  CHECK(adjust(scene).final_cost >= 0);
+  CHECK(all_finite(scene));
+}
+
+TEST_CASE("Options of the bundle adjustment outside their range are named, nested ones with a dot",
+          "[optimization][bundle_adjustment]") {
+  cfp::BundleOptions options;
+  CHECK(invalid_field(options) == nullptr);
+  options.chi2_mono = std::numeric_limits<double>::quiet_NaN();
+  CHECK(std::string(invalid_field(options)) == "chi2_mono");
+  options = {};
+  options.chi2_stereo = 0;
+  CHECK(std::string(invalid_field(options)) == "chi2_stereo");
+  options = {};
+  options.loss = static_cast<cfp::LossType>(17);
+  CHECK(std::string(invalid_field(options)) == "loss");
+  options = {};
+  options.levenberg_marquardt.max_iterations = -1;
+  CHECK(std::string(invalid_field(options)) == "levenberg_marquardt.max_iterations");
+}

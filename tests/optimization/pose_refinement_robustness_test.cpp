@@ -1,0 +1,246 @@
+#include "cfp/optimization/pose/pose_refinement.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "support/catch.hpp"
+#include "support/pose_scene.hpp"
+
+namespace {
+
+using cfp::PoseStop;
+using cfp_test::centre_distance;
+using cfp_test::make_pose_scene;
+using cfp_test::PoseScene;
+using cfp_test::PoseSceneOptions;
+
+template <typename Scalar>
+cfp::PoseResult refine(const PoseScene<Scalar>& scene, const std::vector<Scalar>& weights = {},
+                       cfp::span<char> mask = {}) {
+  cfp::PoseWorkspace<Scalar> workspace;
+  return cfp::refine_pose(scene.observations(cfp::span<const Scalar>(weights)), scene.camera, scene.start,
+                          cfp::PoseOptions(), workspace, mask);
+}
+
+template <typename Scalar>
+bool is_untouched(const cfp::PoseResult& result, const PoseScene<Scalar>& scene) {
+  return result.T_cam_world.rotation == scene.start.rotation &&
+         result.T_cam_world.translation == scene.start.translation && result.information.isZero(0) &&
+         result.inliers == 0 && result.cost == 0 && result.chi2 == 0 && !cfp::is_refined(result.reason);
+}
+
+bool is_finite(const cfp::PoseResult& r) {
+  return r.T_cam_world.rotation.allFinite() && r.T_cam_world.translation.allFinite() && r.information.allFinite() &&
+         std::isfinite(r.cost) && std::isfinite(r.chi2) && std::isfinite(r.effective);
+}
+
+template <typename Scalar>
+void keep(PoseScene<Scalar>& scene, std::size_t n) {
+  scene.points.resize(n), scene.pixels.resize(n), scene.depths.resize(n), scene.sigmas.resize(n);
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("Weighted PnP: too little data leaves the pose untouched and says why", "[optimization]", float,
+                   double) {
+  const auto scene = make_pose_scene<TestType>(1);
+  for (const std::size_t n : {0U, 1U, 2U}) {
+    auto few = scene;
+    keep(few, n);
+    std::vector<char> mask(n, 1);
+    const auto result = refine(few, {}, mask);
+    CHECK(result.reason == PoseStop::not_enough_data);
+    CHECK(is_untouched(result, few));
+    CHECK(std::count(mask.begin(), mask.end(), 0) == static_cast<std::ptrdiff_t>(n));
+  }
+  const auto nothing = refine(scene, std::vector<TestType>(scene.points.size(), TestType(0)));
+  CHECK(nothing.reason == PoseStop::no_weight);
+  CHECK(nothing.zero_weight == 300);
+  CHECK(is_untouched(nothing, scene));
+  std::vector<TestType> two(scene.points.size(), TestType(0));
+  two[3] = two[77] = TestType(1);
+  CHECK(refine(scene, two).reason == PoseStop::not_enough_data);
+}
+
+TEMPLATE_TEST_CASE("Weighted PnP: three observations suffice", "[optimization]", float, double) {
+  PoseSceneOptions options;
+  options.points = 3, options.outlier_share = 0, options.noise_px = 0, options.start_m = 0.005, options.start_deg = 0.2;
+  int found = 0;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const auto scene = make_pose_scene<TestType>(seed, options);
+    const auto result = refine(scene);
+    CHECK(is_finite(result));
+    found += cfp::is_refined(result.reason) && centre_distance(result.T_cam_world, scene.truth) < 2e-3 ? 1 : 0;
+  }
+  CHECK(found >= 15);  // the rest: near the danger cylinder, or another of P3P's solutions
+}
+
+TEMPLATE_TEST_CASE("Weighted PnP: collinear and coincident points are degenerate", "[optimization]", float, double) {
+  for (const bool coincident : {false, true}) {
+    for (std::uint64_t seed = 0; seed < 10; ++seed) {
+      auto scene = make_pose_scene<double>(seed);
+      cfp::Random random(seed, "line");
+      const cfp::Vector3<double> a = scene.truth.inverse() * cfp::Vector3<double>(0.1, -0.2, 2),
+                                 d = cfp_test::random_direction(random) * (coincident ? 0.0 : 1.0);
+      PoseScene<TestType> line = make_pose_scene<TestType>(seed);
+      for (std::size_t i = 0; i < line.points.size(); ++i) {
+        const cfp::Vector3<double> X = a + d * random.uniform(-0.5, 0.5);
+        cfp::Vector2<double> pixel(0, 0);
+        scene.camera.project(scene.truth * X, pixel);
+        for (int c = 0; c < 3; ++c) line.points[i][static_cast<std::size_t>(c)] = static_cast<TestType>(X[c]);
+        line.pixels[i] = {static_cast<TestType>(pixel.x() + random.normal()),
+                          static_cast<TestType>(pixel.y() + random.normal())};
+      }
+      const auto result = refine(line);
+      CAPTURE(coincident, seed, to_string(result.reason));
+      CHECK(is_untouched(result, line));
+      CHECK((result.reason == PoseStop::degenerate || result.reason == PoseStop::not_enough_inliers));
+    }
+  }
+}
+
+TEMPLATE_TEST_CASE("Weighted PnP: everything behind the camera is degenerate; one point behind does not matter",
+                   "[optimization]", float, double) {
+  auto scene = make_pose_scene<TestType>(3);
+  auto behind = scene;
+  const cfp::SE3<double> half_turn{cfp::so3_exp<double>({0, cfp::pi<double>, 0}), cfp::Vector3<double>::Zero()};
+  behind.start = half_turn * scene.start;
+  const auto result = refine(behind);
+  CHECK(result.reason == PoseStop::degenerate);
+  CHECK(is_untouched(result, behind));
+
+  const cfp::Vector3<double> X = scene.truth.inverse() * cfp::Vector3<double>(0.1, 0.1, -2);
+  auto one = scene;
+  one.points.push_back({static_cast<TestType>(X.x()), static_cast<TestType>(X.y()), static_cast<TestType>(X.z())});
+  one.pixels.push_back({TestType(320), TestType(240)});
+  one.depths.push_back(TestType(-1)), one.sigmas.push_back(TestType(1));
+  std::vector<char> mask(one.points.size());
+  const auto with = refine(one, {}, mask), without = refine(scene);
+  CHECK(centre_distance(with.T_cam_world, without.T_cam_world) < 1e-4);
+  CHECK(mask.back() == 0);
+  CHECK(with.inliers == without.inliers);
+}
+
+TEMPLATE_TEST_CASE("Weighted PnP: unusable observations are skipped and counted, and change nothing", "[optimization]",
+                   float, double) {
+  using Limits = std::numeric_limits<TestType>;
+  const auto scene = make_pose_scene<TestType>(4);
+  std::vector<TestType> weights(scene.points.size(), TestType(1));
+  const auto clean = refine(scene, weights);
+  auto dirty = scene;
+  int bad = 0;
+  const auto add = [&](TestType x, TestType u, TestType sigma, TestType weight) {
+    dirty.points.push_back({x, TestType(0), TestType(1)}), dirty.pixels.push_back({u, TestType(5)});
+    dirty.depths.push_back(Limits::quiet_NaN()), dirty.sigmas.push_back(sigma), weights.push_back(weight);
+    ++bad;
+  };
+  for (const TestType value :
+       {Limits::quiet_NaN(), Limits::infinity(), -Limits::infinity(), (Limits::max)(), Limits::lowest()}) {
+    add(value, TestType(5), TestType(1), TestType(1));
+    add(TestType(1), value, TestType(1), TestType(1));
+    add(TestType(1), TestType(5), value, TestType(1));
+    add(TestType(1), TestType(5), TestType(1), value);
+  }
+  add(TestType(1), TestType(5), TestType(0), TestType(1));
+  add(TestType(1), TestType(5), Limits::denorm_min(), TestType(1));
+  add(TestType(1), TestType(5), TestType(1), TestType(-0.5));
+  std::vector<char> mask(weights.size());
+  const auto result = refine(dirty, weights, mask);
+  CHECK(result.invalid == bad);
+  CHECK(result.used == 300);
+  CHECK(result.T_cam_world.translation == clean.T_cam_world.translation);
+  CHECK(std::count(mask.begin() + 300, mask.end(), 1) == 0);
+}
+
+TEMPLATE_TEST_CASE("Weighted PnP: weights of any size give the same pose", "[optimization]", float, double) {
+  const auto scene = make_pose_scene<TestType>(5);
+  const auto one = refine(scene);
+  for (const double w : {1e-30, 1e-6, 1e6, 1e29}) {
+    const auto result = refine(scene, std::vector<TestType>(scene.points.size(), static_cast<TestType>(w)));
+    CAPTURE(w);
+    CHECK(centre_distance(result.T_cam_world, one.T_cam_world) < 1e-6);
+    CHECK(result.cost == Approx(w * one.cost));
+  }
+}
+
+TEST_CASE("Weighted PnP: an unusable start pose or camera is refused", "[optimization]") {
+  auto scene = make_pose_scene<double>(6);
+  const cfp::SE3<double> good = scene.start;
+  scene.start.rotation *= 2;
+  CHECK(refine(scene).reason == PoseStop::invalid_input);
+  CHECK(is_untouched(refine(scene), scene));
+  scene.start.rotation = -good.rotation;  // a reflection
+  CHECK(refine(scene).reason == PoseStop::invalid_input);
+  scene.start = good;
+  scene.start.translation.x() = std::nan("");
+  CHECK(refine(scene).reason == PoseStop::invalid_input);
+  CHECK(is_finite(refine(scene)));
+  scene.start = good;
+  for (const double f : {0.0, -500.0, std::nan(""), 1e300}) {
+    scene.camera.fx = f;
+    CHECK(refine(scene).reason == PoseStop::invalid_input);
+  }
+}
+
+TEMPLATE_TEST_CASE("Weighted PnP: random garbage never gives NaN, and the pose is a rotation or untouched",
+                   "[optimization]", float, double) {
+  cfp::Random random(7, "garbage");
+  const double specials[] = {
+      0, 1, -1, 1e-300, 1e300, -1e300, 1e9, 1e-9, 1e5, std::nan(""), std::numeric_limits<double>::infinity(), 5e-324};
+  cfp::PoseWorkspace<TestType> workspace;
+  for (int trial = 0; trial < 3000; ++trial) {
+    const std::uint32_t kind = random.index(3);  // 0: all garbage, 1: one value in ten, 2: huge but finite
+    const auto value = [&](double usual) {
+      if (kind == 2)
+        return static_cast<TestType>(std::pow(10.0, random.uniform(-12, 12)) * (random.uniform() < 0.5 ? -1 : 1));
+      if (kind == 1 && random.uniform() > 0.1) return static_cast<TestType>(usual);
+      return static_cast<TestType>(specials[random.index(12)]);
+    };
+    PoseScene<TestType> scene;
+    std::vector<TestType> weights;
+    for (std::uint32_t i = 0, n = random.index(40); i < n; ++i) {
+      scene.points.push_back({value(random.uniform(-1, 1)), value(random.uniform(-1, 1)), value(random.uniform(1, 4))});
+      scene.pixels.push_back({value(random.uniform(0, 640)), value(random.uniform(0, 480))});
+      scene.depths.push_back(value(2)), scene.sigmas.push_back(value(1)), weights.push_back(value(0.5));
+    }
+    for (const cfp::LossType loss : {cfp::LossType::trivial, cfp::LossType::huber, cfp::LossType::cauchy,
+                                     cfp::LossType::geman_mcclure, cfp::LossType::truncated}) {
+      cfp::PoseOptions options = trial % 2 == 0 ? cfp::PoseOptions() : cfp::orb_slam2_pose_options();
+      options.rounds[0].loss = loss;
+      if (trial % 3 == 0) options.convention = cfp::WeightConvention::information_scale;
+      const auto result = cfp::refine_pose(scene.observations(cfp::span<const TestType>(weights)), scene.camera,
+                                           scene.start, options, workspace);
+      REQUIRE(is_finite(result));
+      REQUIRE((result.T_cam_world.rotation.transpose() * result.T_cam_world.rotation - cfp::Matrix3<double>::Identity())
+                  .norm() < 1e-9);
+      REQUIRE(static_cast<std::size_t>(result.used + result.zero_weight + result.invalid) == weights.size());
+      REQUIRE(result.inliers <= result.used);
+    }
+  }
+}
+
+TEST_CASE("Weighted PnP: options outside their range are named", "[optimization]") {
+  cfp::PoseOptions options;
+  CHECK(invalid_field(options) == nullptr);
+  CHECK(invalid_field(cfp::orb_slam2_pose_options()) == nullptr);
+  const auto named = [](auto change) {
+    cfp::PoseOptions changed;
+    change(changed);
+    const char* field = invalid_field(changed);
+    return std::string(field == nullptr ? "" : field);
+  };
+  CHECK(named([](auto& o) { o.chi2_mono = 0; }) == "chi2_mono");
+  CHECK(named([](auto& o) { o.chi2_stereo = std::nan(""); }) == "chi2_stereo");
+  CHECK(named([](auto& o) { o.convention = static_cast<cfp::WeightConvention>(9); }) == "convention");
+  CHECK(named([](auto& o) { o.min_observations = 2; }) == "min_observations");
+  CHECK(named([](auto& o) { o.round_count = 0; }) == "round_count");
+  CHECK(named([](auto& o) { o.round_count = 9; }) == "round_count");
+  CHECK(named([](auto& o) { o.rounds[1].loss = static_cast<cfp::LossType>(9); }) == "rounds.loss");
+  CHECK(named([](auto& o) { o.rounds[0].scale = -1; }) == "rounds.scale");
+  CHECK(named([](auto& o) { o.rounds[1].max_iterations = 0; }) == "rounds.max_iterations");
+  CHECK(named([](auto& o) { o.rounds[1].min_decrease = 0; }) == "rounds.min_decrease");
+  CHECK(named([](auto& o) { o.rounds[1].min_mean_decrease = -1; }) == "rounds.min_mean_decrease");
+}

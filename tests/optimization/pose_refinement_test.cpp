@@ -1,0 +1,293 @@
+#include "cfp/optimization/pose/pose_refinement.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include "support/allocation_counter.hpp"
+#include "support/catch.hpp"
+#include "support/pose_scene.hpp"
+
+namespace {
+
+using cfp_test::angle_between;
+using cfp_test::centre_distance;
+using cfp_test::make_pose_scene;
+using cfp_test::PoseScene;
+using cfp_test::PoseSceneOptions;
+
+PoseSceneOptions mixed(int points = 200) {
+  PoseSceneOptions options;
+  options.points = points;
+  options.stereo_share = 0.5;
+  options.octaves = true;
+  return options;
+}
+
+/// Converged far below the statistical error, so that two ways to the same minimum can be compared.
+cfp::PoseOptions tight() {
+  cfp::PoseOptions options;
+  for (cfp::PoseRound& round : options.rounds)
+    round.min_decrease = 1e-14, round.min_mean_decrease = 0, round.max_iterations = 50;
+  return options;
+}
+
+template <typename Scalar>
+cfp::PoseResult refine(const PoseScene<Scalar>& scene, const std::vector<Scalar>& weights = {},
+                       const cfp::PoseOptions& options = tight()) {
+  cfp::PoseWorkspace<Scalar> workspace;
+  return cfp::refine_pose(scene.observations(cfp::span<const Scalar>(weights)), scene.camera, scene.start, options,
+                          workspace);
+}
+
+std::vector<double> random_weights(std::uint64_t seed, std::size_t n) {
+  cfp::Random random(seed, "weights");
+  std::vector<double> weights(n);
+  for (double& w : weights) w = random.uniform();
+  return weights;
+}
+
+template <typename T>
+void permute(std::vector<T>& values, const std::vector<std::size_t>& order) {
+  std::vector<T> old = values;
+  for (std::size_t i = 0; i < order.size(); ++i) values[i] = old[order[i]];
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("Weighted PnP: without noise the truth has no gradient and is found again", "[optimization]", float,
+                   double) {
+  PoseSceneOptions options = mixed();
+  options.noise_px = 0, options.outlier_share = 0;
+  auto scene = make_pose_scene<TestType>(1, options);
+  const double tolerance = std::is_same_v<TestType, float> ? 2e-5 : 1e-9;
+  const auto found = refine(scene);
+  CHECK(cfp::is_refined(found.reason));  // asked for more than float resolves, it ends with no_decrease
+  CHECK(centre_distance(found.T_cam_world, scene.truth) < tolerance);
+  CHECK(angle_between(found.T_cam_world, scene.truth) < tolerance);
+  CHECK(found.inliers == found.used);
+  CHECK(found.cost < 1e-3);
+  scene.start = scene.truth;
+  const auto kept = refine(scene, {}, cfp::PoseOptions());
+  CHECK(kept.evaluations == 2);  // one per round
+  CHECK(centre_distance(kept.T_cam_world, scene.truth) < 1e-9);
+}
+
+TEST_CASE("Weighted PnP: a rigid motion of the world moves the pose along", "[optimization]") {
+  const auto scene = make_pose_scene<double>(2, mixed());
+  const cfp::SE3<double> motion{cfp::so3_exp<double>({0.3, -1.2, 2.0}), {40, -7, 1000}};
+  auto moved = scene;
+  for (auto& X : moved.points) {
+    const cfp::Vector3<double> Y = motion * cfp::Vector3<double>(X[0], X[1], X[2]);
+    X = {Y.x(), Y.y(), Y.z()};
+  }
+  moved.start = scene.start * motion.inverse();
+  const auto a = refine(scene), b = refine(moved);
+  CHECK(centre_distance((b.T_cam_world * motion), a.T_cam_world) < 1e-8);
+  CHECK(b.cost == Approx(a.cost).epsilon(1e-9));
+  CHECK((a.information - b.information).norm() < 1e-7 * a.information.norm());
+}
+
+TEST_CASE("Weighted PnP: scaling the world scales the translation", "[optimization]") {
+  const auto scene = make_pose_scene<double>(3, mixed());
+  auto scaled = scene;
+  const double k = 7.5;
+  for (auto& X : scaled.points) X = {k * X[0], k * X[1], k * X[2]};
+  for (double& d : scaled.depths) d = d > 0 ? k * d : d;
+  scaled.baseline_fx *= k;
+  scaled.start.translation *= k;
+  const auto a = refine(scene), b = refine(scaled);
+  CHECK((b.T_cam_world.translation / k - a.T_cam_world.translation).norm() < 1e-8);
+  CHECK(angle_between(a.T_cam_world, b.T_cam_world) < 1e-8);
+  CHECK(b.cost == Approx(a.cost).epsilon(1e-9));
+}
+
+TEST_CASE("Weighted PnP: the order of the observations does not matter", "[optimization]") {
+  const auto scene = make_pose_scene<double>(4, mixed());
+  std::vector<double> weights = random_weights(4, scene.points.size());
+  const auto a = refine(scene, weights);
+  std::vector<std::size_t> order(scene.points.size());
+  std::iota(order.begin(), order.end(), std::size_t(0));
+  cfp::Random random(4, "order");
+  for (std::size_t i = order.size() - 1; i > 0; --i)
+    std::swap(order[i], order[random.index(static_cast<std::uint32_t>(i + 1))]);
+  auto shuffled = scene;
+  permute(shuffled.points, order), permute(shuffled.pixels, order), permute(shuffled.depths, order),
+      permute(shuffled.sigmas, order), permute(weights, order);
+  const auto b = refine(shuffled, weights);
+  CHECK(centre_distance(a.T_cam_world, b.T_cam_world) < 1e-8);
+  CHECK(a.inliers == b.inliers);
+}
+
+TEST_CASE("Weighted PnP: every observation twice equals weight two; information doubles, the pose stays",
+          "[optimization]") {
+  const auto scene = make_pose_scene<double>(5, mixed());
+  auto twice = scene;
+  twice.points.insert(twice.points.end(), scene.points.begin(), scene.points.end());
+  twice.pixels.insert(twice.pixels.end(), scene.pixels.begin(), scene.pixels.end());
+  twice.depths.insert(twice.depths.end(), scene.depths.begin(), scene.depths.end());
+  twice.sigmas.insert(twice.sigmas.end(), scene.sigmas.begin(), scene.sigmas.end());
+  const auto one = refine(scene), doubled = refine(twice),
+             weighted = refine(scene, std::vector<double>(scene.points.size(), 2.0));
+  CHECK(centre_distance(doubled.T_cam_world, weighted.T_cam_world) < 1e-8);
+  CHECK(centre_distance(doubled.T_cam_world, one.T_cam_world) < 1e-8);
+  CHECK(doubled.cost == Approx(2 * one.cost).epsilon(1e-9));
+  CHECK(weighted.cost == Approx(2 * one.cost).epsilon(1e-9));
+  CHECK((weighted.information - 2 * one.information).norm() < 1e-9 * one.information.norm());
+  CHECK(doubled.effective == Approx(2 * one.effective));
+}
+
+TEMPLATE_TEST_CASE("Weighted PnP: weight 0 is absence, to the bit", "[optimization]", float, double) {
+  const auto scene = make_pose_scene<TestType>(6, mixed());
+  std::vector<TestType> weights(scene.points.size(), TestType(0.7));
+  PoseScene<TestType> rest = scene;
+  rest.points.clear(), rest.pixels.clear(), rest.depths.clear(), rest.sigmas.clear();
+  std::vector<TestType> rest_weights;
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    if (i % 3 == 0) {
+      weights[i] = 0;
+      continue;
+    }
+    rest.points.push_back(scene.points[i]), rest.pixels.push_back(scene.pixels[i]),
+        rest.depths.push_back(scene.depths[i]), rest.sigmas.push_back(scene.sigmas[i]);
+    rest_weights.push_back(weights[i]);
+  }
+  const auto a = refine(scene, weights), b = refine(rest, rest_weights);
+  CHECK(a.T_cam_world.rotation == b.T_cam_world.rotation);
+  CHECK(a.T_cam_world.translation == b.T_cam_world.translation);
+  CHECK(a.information == b.information);
+  CHECK(a.zero_weight == static_cast<int>((scene.points.size() + 2) / 3));
+  CHECK(a.used == b.used);
+}
+
+TEMPLATE_TEST_CASE("Weighted PnP: packets and scalars give the same pose within rounding", "[optimization]", float,
+                   double) {
+  using Scalar = TestType;
+  const double tolerance =
+      std::is_same_v<Scalar, float> ? 5e-5 : 1e-9;  // float resolves costs to 1e-7, poses to its root
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const auto scene = make_pose_scene<Scalar>(seed, mixed(17 + static_cast<int>(seed) * 13));
+    cfp::PoseWorkspace<Scalar> workspace;
+    std::vector<char> a_mask(scene.points.size()), b_mask(scene.points.size());
+    const auto a = cfp::detail::refine_pose_with<cfp::Packet<Scalar>>(scene.observations(), scene.camera, scene.start,
+                                                                      tight(), workspace, a_mask);
+    const auto b = cfp::detail::refine_pose_with<Scalar>(scene.observations(), scene.camera, scene.start, tight(),
+                                                         workspace, b_mask);
+    CAPTURE(seed);
+    CHECK(centre_distance(a.T_cam_world, b.T_cam_world) < tolerance);
+    CHECK(a_mask == b_mask);
+    CHECK(std::count(a_mask.begin(), a_mask.end(), 1) == a.inliers);
+  }
+}
+
+TEMPLATE_TEST_CASE("Weighted PnP: any type with the camera interface gives the pinhole camera's pose", "[optimization]",
+                   float, double) {
+  const auto scene = make_pose_scene<TestType>(12, mixed());
+  const cfp_test::PlainCamera plain{scene.camera};
+  cfp::PoseWorkspace<TestType> workspace;
+  for (const cfp::PoseOptions& options : {cfp::PoseOptions(), cfp::orb_slam2_pose_options()}) {
+    const auto a = cfp::refine_pose(scene.observations(), scene.camera, scene.start, options, workspace);
+    const auto b = cfp::refine_pose(scene.observations(), plain, scene.start, options, workspace);
+    CHECK(centre_distance(a.T_cam_world, b.T_cam_world) < 5e-5);
+    CHECK(a.used_stereo == b.used_stereo);
+    CHECK((a.information - b.information).norm() < 1e-3 * a.information.norm());
+  }
+}
+
+TEST_CASE("Weighted PnP: float is as accurate as double, wherever the origin is", "[optimization]") {
+  std::vector<double> ratio;
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    const auto scene = make_pose_scene<double>(seed, mixed());
+    cfp::PoseWorkspace<float> in_float;
+    const auto d = refine(scene, {}, cfp::PoseOptions());
+    const auto f = cfp::refine_pose(scene.observations(), scene.camera, scene.start, cfp::PoseOptions(),
+                                    in_float);  // double in, float inside
+    ratio.push_back(centre_distance(f.T_cam_world, scene.truth) / centre_distance(d.T_cam_world, scene.truth));
+    auto far = scene;
+    for (auto& X : far.points) X = {X[0] + 3e5, X[1] - 2e6, X[2] + 1e5};
+    const cfp::SE3<double> shift{cfp::Matrix3<double>::Identity(), {-3e5, 2e6, -1e5}};
+    far.start = scene.start * shift;
+    const auto g = cfp::refine_pose(far.observations(), far.camera, far.start, cfp::PoseOptions(), in_float);
+    CHECK(centre_distance(g.T_cam_world * shift.inverse(), f.T_cam_world) < 1e-5);
+  }
+  std::nth_element(ratio.begin(), ratio.begin() + 50, ratio.end());
+  CHECK(ratio[50] == Approx(1.0).epsilon(0.01));
+}
+
+TEST_CASE("Weighted PnP: g2o's convention is the weight in the information", "[optimization]") {
+  const auto scene = make_pose_scene<double>(8, mixed());
+  const std::vector<double> weights = random_weights(8, scene.points.size());
+  cfp::PoseOptions options = tight();
+  options.convention = cfp::WeightConvention::information_scale;
+  const auto a = refine(scene, weights, options);
+  auto folded = scene;
+  for (std::size_t i = 0; i < weights.size(); ++i) folded.sigmas[i] /= std::sqrt(weights[i]);
+  const auto b = refine(folded);
+  CHECK(centre_distance(a.T_cam_world, b.T_cam_world) < 1e-8);
+  CHECK(a.inliers == b.inliers);
+  CHECK(a.inliers > refine(scene, weights).inliers);  // small weights let gross errors pass the test
+}
+
+TEST_CASE("Weighted PnP: depth, u_right, sigma and its inverse square are two names for one thing", "[optimization]") {
+  const auto scene = make_pose_scene<double>(9, mixed());
+  std::vector<double> u_right, inverse_sq;
+  for (std::size_t i = 0; i < scene.points.size(); ++i) {
+    u_right.push_back(scene.depths[i] > 0 ? scene.pixels[i][0] - scene.baseline_fx / scene.depths[i] : std::nan(""));
+    inverse_sq.push_back(1 / (scene.sigmas[i] * scene.sigmas[i]));
+  }
+  auto view = scene.observations();
+  view.depths = {}, view.sigmas = {};
+  view.u_right = u_right, view.inverse_sigmas_sq = inverse_sq;
+  cfp::PoseWorkspace<double> workspace;
+  const auto a = refine(scene), b = cfp::refine_pose(view, scene.camera, scene.start, tight(), workspace);
+  CHECK(a.used_stereo > 50);
+  // A column in the right image left of its border (u_right <= 0) is no measurement; a depth has no such limit.
+  CHECK(b.used_stereo <= a.used_stereo);
+  CHECK(centre_distance(a.T_cam_world, b.T_cam_world) < (a.used_stereo == b.used_stereo ? 1e-9 : 1e-2));
+}
+
+TEMPLATE_TEST_CASE("Weighted PnP: allocates nothing after warm-up", "[optimization]", float, double) {
+  const auto scene = make_pose_scene<TestType>(10, mixed(500));
+  const auto small = make_pose_scene<TestType>(11, mixed(100));
+  cfp::PoseWorkspace<TestType> workspace;
+  std::vector<char> mask(500), small_mask(100);
+  for (const cfp::PoseOptions& options : {cfp::PoseOptions(), cfp::orb_slam2_pose_options()}) {
+    cfp::refine_pose(scene.observations(), scene.camera, scene.start, options, workspace, mask);
+    CHECK(cfp_test::allocations_in([&] {
+            cfp::refine_pose(scene.observations(), scene.camera, scene.start, options, workspace, mask);
+          }) == 0);
+    CHECK(cfp_test::allocations_in([&] {
+            cfp::refine_pose(small.observations(), small.camera, small.start, options, workspace, small_mask);
+          }) == 0);
+  }
+}
+
+TEST_CASE("Weighted PnP: most points on a moving person: weights save the pose", "[optimization]") {
+  std::vector<double> labels_error, weights_error, plain_error;
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    PoseSceneOptions options = mixed(400);
+    options.moving_share = 0.6;
+    options.outlier_share = 0.05;
+    const auto scene = make_pose_scene<double>(seed, options);
+    // As the model gives them: static points high with some losses, moving ones low, not 0; gross errors look static.
+    cfp::Random random(seed, "weights");
+    std::vector<double> weights, labels;
+    for (std::size_t i = 0; i < scene.points.size(); ++i) {
+      const bool moving = i < 240;
+      labels.push_back(scene.static_labels[i]);
+      weights.push_back(moving ? random.uniform(0.0, 0.02) : random.uniform(0.5, 1.0));
+    }
+    labels_error.push_back(centre_distance(refine(scene, labels, {}).T_cam_world, scene.truth));
+    weights_error.push_back(centre_distance(refine(scene, weights, {}).T_cam_world, scene.truth));
+    plain_error.push_back(centre_distance(refine(scene, {}, {}).T_cam_world, scene.truth));
+  }
+  const auto median = [](std::vector<double>& x) {
+    std::nth_element(x.begin(), x.begin() + 30, x.end());
+    return x[30];
+  };
+  const double best = median(labels_error), weighted = median(weights_error), plain = median(plain_error);
+  CAPTURE(best, weighted, plain);
+  CHECK(weighted <= 1.2 * best);
+  CHECK(plain >= 10 * best);
+}

@@ -1,0 +1,47 @@
+#include "cfp/probability/first_stage_probability.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "support/catch.hpp"
+
+TEMPLATE_TEST_CASE("The background factor is the printed formula", "[probability]", float, double) {
+  const TestType t = TestType(0.9);
+  // (1 - 0.9) / 0.9^4 = 0.1524157902...; 0.5^3 = 0.125.
+  CHECK_THAT(cfp::background_factor(TestType(0.5), TestType(0.5), t), WithinAbs(1.0190519738, 1e-6));
+  CHECK_THAT(cfp::background_factor(TestType(0.95), TestType(0.95), t), WithinAbs(1 / 0.95, 1e-6));
+  CHECK(cfp::background_factor(TestType(0), TestType(0.95), t) == 1);
+}
+
+TEMPLATE_TEST_CASE("K after the first stage is continuous at O_Th and 1 above it for background", "[probability]",
+                   float, double) {
+  const TestType t = TestType(0.9);
+  const TestType below = cfp::first_stage_probability(t, false, t);
+  const TestType above = cfp::first_stage_probability(std::nextafter(t, TestType(1)), false, t);
+  CHECK_THAT(below, WithinAbs(1.0, 1e-6));
+  CHECK(above == 1);
+  CHECK_THAT(cfp::first_stage_probability(TestType(0.5), false, t), WithinAbs(0.5 * 1.0190519738, 1e-6));
+}
+
+TEMPLATE_TEST_CASE("Foreground: nothing of a high-dynamic object, O of a low-dynamic one", "[probability]", float,
+                   double) {
+  const TestType t = TestType(0.9);
+  CHECK(cfp::first_stage_probability(t, true, t) == 0);
+  CHECK(cfp::first_stage_probability(TestType(0.3), true, t) == 0);
+  CHECK(cfp::first_stage_probability(TestType(0.95), true, t) == TestType(0.95));
+}
+
+TEMPLATE_TEST_CASE("The first stage keeps its range for hostile input", "[probability]", float, double) {
+  using Limits = std::numeric_limits<TestType>;
+  for (const TestType o : {TestType(0), Limits::denorm_min(), TestType(1), TestType(2), TestType(-1),
+                           Limits::infinity(), -Limits::infinity(), Limits::quiet_NaN()}) {
+    for (const TestType t : {TestType(0.9), TestType(1e-6), TestType(0.999999)}) {
+      for (const bool foreground : {false, true}) {
+        const TestType k = cfp::first_stage_probability(o, foreground, t);
+        CHECK((k >= 0 && k <= 1));
+      }
+      CHECK(std::isfinite(cfp::background_factor(cfp::clamp_probability(o), o, t)));
+    }
+  }
+  CHECK(cfp::is_high_dynamic(Limits::quiet_NaN(), TestType(0.9)));
+}

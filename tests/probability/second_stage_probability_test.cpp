@@ -1,0 +1,100 @@
+#include "cfp/probability/second_stage_probability.hpp"
+
+#include <limits>
+#include <vector>
+
+#include "cfp/probability/confidence.hpp"
+#include "support/catch.hpp"
+
+namespace {
+template <typename Scalar>
+using Evidence = cfp::Evidence<Scalar>;
+}
+
+TEMPLATE_TEST_CASE("The statistical confidence is the printed logistic and never overflows", "[probability]", float,
+                   double) {
+  CHECK_THAT(cfp::statistical_confidence(std::size_t(5), TestType(10)), WithinAbs(0.5, 1e-7));
+  CHECK_THAT(cfp::statistical_confidence(std::size_t(7), TestType(10)), WithinAbs(0.880797078, 1e-6));
+  CHECK(cfp::statistical_confidence(std::size_t(1000000000), TestType(10)) == 1);
+  const TestType none = cfp::statistical_confidence(std::size_t(0), TestType(1e30));
+  CHECK((none >= 0 && none <= 1e-6));
+}
+
+TEMPLATE_TEST_CASE("High dynamic: the product, or the one constraint there is", "[probability]", float, double) {
+  const Evidence<TestType> t{TestType(0.8), TestType(0.1), true}, f{TestType(0.5), TestType(0.9), true}, none{};
+  CHECK_THAT(cfp::fuse_high_dynamic(t, f), WithinAbs(0.4, 1e-7));
+  CHECK_THAT(cfp::fuse_high_dynamic(t, none), WithinAbs(0.8, 1e-7));
+  CHECK_THAT(cfp::fuse_high_dynamic(none, f), WithinAbs(0.5, 1e-7));
+  CHECK(cfp::fuse_high_dynamic(none, none) == 0);
+}
+
+TEMPLATE_TEST_CASE("Low dynamic: the confidence-weighted mean, K^T where the paper has 0/0", "[probability]", float,
+                   double) {
+  const Evidence<TestType> t{TestType(0.8), TestType(0.3), true}, f{TestType(0.5), TestType(0.1), true}, none{};
+  CHECK_THAT(cfp::fuse_low_dynamic(t, f), WithinAbs(0.8 * 0.75 + 0.5 * 0.25, 1e-6));
+  CHECK_THAT(cfp::fuse_low_dynamic(t, none), WithinAbs(0.8, 1e-7));
+  CHECK_THAT(cfp::fuse_low_dynamic(none, f), WithinAbs(0.5, 1e-7));
+  CHECK(cfp::fuse_low_dynamic(none, none) == 0);
+  Evidence<TestType> t0 = t, f0 = f;
+  t0.confidence = f0.confidence = 0;
+  CHECK(cfp::fuse_low_dynamic(t0, f0) == TestType(0.8));
+  CHECK(cfp::fuse_low_dynamic(t0, f) == TestType(0.5));
+  t0.confidence = f0.confidence = std::numeric_limits<TestType>::denorm_min();
+  CHECK(cfp::fuse_low_dynamic(t0, f0) == TestType(0.8));
+}
+
+TEST_CASE("The second stage follows the paper's rules in their order", "[probability]") {
+  cfp::SecondStageKeypoint<double> p;
+  p.projection = {0.8, 0.4, true};
+  p.epipolar = {0.5, 0.4, true};
+  p.object_probability = 0.2;
+  p.map_point_probability = 0.7;
+  p.matched = true;
+  const double threshold = 0.9;
+  SECTION("matched, high dynamic") { CHECK(cfp::second_stage_probability(p, threshold) == 0.4); }
+  SECTION("matched, low dynamic") {
+    p.object_probability = 0.95;
+    CHECK_THAT(cfp::second_stage_probability(p, threshold), WithinAbs(0.65, 1e-12));
+  }
+  SECTION("exactly at the threshold counts as high dynamic") {
+    p.object_probability = 0.9;
+    CHECK(cfp::second_stage_probability(p, threshold) == 0.4);
+  }
+  SECTION("the foreground of a box without a past is not trusted, its background is") {
+    p.box_associated = false;
+    CHECK(cfp::second_stage_probability(p, threshold) == 0);
+    p.foreground = false;
+    CHECK(cfp::second_stage_probability(p, threshold) == 0.4);
+  }
+  SECTION("unmatched: foreground 0, background M") {
+    p.matched = false;
+    CHECK(cfp::second_stage_probability(p, threshold) == 0);
+    p.foreground = false;
+    CHECK(cfp::second_stage_probability(p, threshold) == 0.7);
+  }
+  SECTION("matched without any constraint counts as unmatched") {
+    p.projection.available = p.epipolar.available = false;
+    CHECK(cfp::second_stage_probability(p, threshold) == 0);
+    p.foreground = false;
+    CHECK(cfp::second_stage_probability(p, threshold) == 0.7);
+  }
+}
+
+TEMPLATE_TEST_CASE("The second stage keeps its range for hostile input", "[probability]", float, double) {
+  using Limits = std::numeric_limits<TestType>;
+  const std::vector<TestType> hostile = {TestType(0),        TestType(1),          TestType(-3),
+                                         TestType(7),        Limits::denorm_min(), Limits::max(),
+                                         Limits::infinity(), -Limits::infinity(),  Limits::quiet_NaN()};
+  for (const TestType a : hostile) {
+    for (const TestType b : hostile) {
+      for (const TestType o : {TestType(0.2), TestType(0.95), Limits::quiet_NaN()}) {
+        for (const bool flag : {false, true}) {
+          const cfp::SecondStageKeypoint<TestType> p{{a, b, true}, {b, a, flag}, o, a, !flag, flag, true};
+          const TestType k = cfp::second_stage_probability(p, TestType(0.9));
+          INFO(a << " " << b << " " << o << " " << flag);
+          CHECK((k >= 0 && k <= 1));
+        }
+      }
+    }
+  }
+}

@@ -1,0 +1,360 @@
+#include "cfp/robust/fundamental_ransac.hpp"
+
+#include <fstream>
+#include <limits>
+#include <numeric>
+#include <sstream>
+#include <vector>
+
+#include "cfp/geometry/epipolar.hpp"
+#include "support/allocation_counter.hpp"
+#include "support/catch.hpp"
+#include "support/data.hpp"
+#include "support/dynamic_scene.hpp"
+#include "support/two_view_scene.hpp"
+
+using cfp::fundamental_ransac;
+using cfp::FundamentalRansacOptions;
+using cfp::FundamentalRansacWorkspace;
+using cfp::FundamentalReason;
+using cfp::FundamentalResult;
+using cfp::Matrix3;
+using cfp_test::make_two_view_scene;
+using cfp_test::SceneShape;
+using cfp_test::TwoViewOptions;
+
+namespace {
+
+TwoViewOptions noisy(std::size_t pairs, double outlier_share) {
+  TwoViewOptions options;
+  options.pairs = pairs;
+  options.outlier_share = outlier_share;
+  options.noise_px = 0.5;
+  return options;
+}
+
+struct Labelled {
+  std::vector<std::array<double, 2>> prev, cur;
+  std::vector<char> label;
+};
+
+Labelled read_labelled(const std::filesystem::path& path) {
+  Labelled pairs;
+  std::ifstream file(path);
+  for (std::string line; std::getline(file, line);) {
+    std::istringstream in(line);
+    std::array<double, 2> p{}, q{};
+    double one = 0, label = 0;
+    if (!(in >> p[0] >> p[1] >> one >> q[0] >> q[1] >> one >> label)) continue;
+    pairs.prev.push_back(p), pairs.cur.push_back(q), pairs.label.push_back(label != 0 ? 1 : 0);
+  }
+  return pairs;
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("F survives mismatches", "[geometry]", float, double) {
+  cfp::Random random(31, "mismatches");
+  FundamentalRansacWorkspace workspace;
+  for (const double outliers : {0.0, 0.2, 0.4, 0.55}) {
+    for (int trial = 0; trial < 20; ++trial) {
+      const auto scene = make_two_view_scene<TestType>(random, noisy(300, outliers));
+      std::vector<char> mask(300);
+      const auto result =
+          fundamental_ransac<TestType>(scene.prev, scene.cur, {}, mask, FundamentalRansacOptions{}, workspace, nullptr);
+      REQUIRE(result.has_fundamental());
+      CHECK(cfp_test::median_sampson_of_truth<TestType>(scene, result.F) < 0.35);  // noise is 0.5 px per coordinate
+      CHECK(std::size_t(std::count(mask.begin(), mask.end(), 1)) == result.inliers);
+      CHECK_THAT(result.inlier_share, WithinAbs(double(result.inliers) / 300, 1e-9));
+      int kept = 0, caught = 0, mismatches = 0;
+      for (std::size_t i = 0; i < 300; ++i) {
+        mismatches += scene.is_inlier[i] == 0 ? 1 : 0;
+        (scene.is_inlier[i] != 0 ? kept : caught) += mask[i];
+      }
+      CHECK(kept > 0.8 * (300 - mismatches));  // 95 % under the true F
+      CHECK(caught <= 0.2 * mismatches + 3);   // a shift along the line cannot be seen
+      CHECK_THAT(double(result.F.norm()), WithinAbs(1, 1e-6));
+      CHECK(std::abs(double(result.F.determinant())) < 1e-7);
+    }
+  }
+}
+
+TEST_CASE("F is nearly as good as from the true inliers alone", "[geometry]") {
+  // A short baseline has several minima; one that chance led into would show in the mean.
+  FundamentalRansacWorkspace workspace;
+  for (const double outliers : {0.2, 0.4}) {
+    cfp::Random random(45, "efficiency");
+    double found = 0, ideal = 0;
+    for (int trial = 0; trial < 60; ++trial) {
+      const auto scene = make_two_view_scene<double>(random, noisy(500, outliers));
+      found += cfp_test::median_sampson_of_truth<double>(
+          scene, fundamental_ransac<double>(scene.prev, scene.cur, {}, {}, FundamentalRansacOptions{}, workspace).F);
+      const std::vector<double> labels(scene.is_inlier.begin(), scene.is_inlier.end());
+      cfp::detail::PairArrays inliers;
+      inliers.load<double>(scene.prev, scene.cur, labels);
+      cfp::detail::FactoredF F(inliers.scale_cur.matrix().inverse().transpose() * scene.F *
+                               inliers.scale_prev.matrix().inverse());
+      cfp::detail::refine_fundamental(inliers.exact_columns(), 1e6, 30, 1e-10, F);
+      ideal += cfp_test::median_sampson_of_truth<double>(scene, inliers.to_pixels(F.matrix()));
+    }
+    CHECK(found < (outliers < 0.3 ? 1.2 : 1.3) * ideal);
+  }
+}
+
+TEST_CASE("Few pairs and many mismatches: F is found as far as samples go", "[geometry]") {
+  FundamentalRansacWorkspace workspace;
+  cfp::Random random(46, "hard");
+  int lost = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    const auto scene = make_two_view_scene<double>(random, noisy(120, 0.55));
+    const auto result =
+        fundamental_ransac<double>(scene.prev, scene.cur, {}, {}, FundamentalRansacOptions{}, workspace);
+    lost += result.has_fundamental() && cfp_test::median_sampson_of_truth<double>(scene, result.F) < 0.4 ? 0 : 1;
+  }
+  CHECK(lost <= 4);  // a thousand samples miss with a chance of 2.5 %
+}
+
+TEST_CASE("Without noise mismatches move F by a fiftieth of the threshold at most", "[geometry]") {
+  cfp::Random random(32, "exact");
+  FundamentalRansacWorkspace workspace;
+  for (int trial = 0; trial < 20; ++trial) {
+    TwoViewOptions options = noisy(200, 0.3);
+    options.noise_px = 0;
+    const auto scene = make_two_view_scene<double>(random, options);
+    FundamentalRansacOptions tight;
+    tight.threshold_px = 0.1;
+    const auto result = fundamental_ransac<double>(scene.prev, scene.cur, {}, {}, tight, workspace);
+    REQUIRE(result.has_fundamental());
+    CHECK(cfp_test::median_sampson_of_truth<double>(scene, result.F) < 0.02 * tight.threshold_px);
+  }
+}
+
+TEST_CASE("Pairs that a homography explains give a reason and no F", "[geometry]") {
+  cfp::Random random(33, "degenerate");
+  FundamentalRansacWorkspace workspace;
+  struct Case {
+    SceneShape shape;
+    double translation_m, rotation_rad;
+    FundamentalReason with_camera, without;
+  };
+  const Case cases[] = {{SceneShape::volume, 0, 0.035, FundamentalReason::pure_rotation, FundamentalReason::homography},
+                        {SceneShape::plane, 0.1, 0.035, FundamentalReason::planar, FundamentalReason::homography},
+                        {SceneShape::volume, 0, 0, FundamentalReason::no_motion, FundamentalReason::no_motion}};
+  for (const Case& c : cases) {
+    for (const double outliers : {0.0, 0.2, 0.4}) {
+      for (int trial = 0; trial < 30; ++trial) {
+        TwoViewOptions options = noisy(trial % 2 == 0 ? 150 : 500, outliers);
+        options.shape = c.shape;
+        options.translation_m = c.translation_m;
+        options.rotation_rad = c.rotation_rad;
+        const auto scene = make_two_view_scene<double>(random, options);
+        const auto result = fundamental_ransac<double>(scene.prev, scene.cur, {}, {}, FundamentalRansacOptions{},
+                                                       workspace, &scene.camera);
+        CHECK(result.reason == c.with_camera);
+        CHECK(result.F.isZero());
+        CHECK(result.homography.determinant() > 0);
+        const auto true_inliers = std::count(scene.is_inlier.begin(), scene.is_inlier.end(), 1);
+        CHECK(double(result.inliers) > 0.85 * double(true_inliers));
+        CHECK(fundamental_ransac<double>(scene.prev, scene.cur, {}, {}, FundamentalRansacOptions{}, workspace).reason ==
+              c.without);
+        double squares = 0;
+        for (std::size_t i = 0; i < scene.world.size(); ++i) {
+          const Eigen::Vector3d mapped =
+              result.homography * Eigen::Vector3d(scene.exact_prev[i][0], scene.exact_prev[i][1], 1);
+          squares +=
+              (mapped.hnormalized() - Eigen::Vector2d(scene.exact_cur[i][0], scene.exact_cur[i][1])).squaredNorm() /
+              double(scene.world.size());
+        }
+        CHECK(std::sqrt(squares) < 0.5);
+      }
+    }
+  }
+}
+
+TEST_CASE("A dominant plane with parallax beside it gives F", "[geometry]") {
+  cfp::Random random(34, "dominant plane");
+  FundamentalRansacWorkspace workspace;
+  for (int trial = 0; trial < 30; ++trial) {
+    TwoViewOptions options = noisy(500, 0.2);
+    options.shape = SceneShape::volume_and_plane;
+    options.plane_share = 0.75;
+    const auto scene = make_two_view_scene<double>(random, options);
+    const auto result =
+        fundamental_ransac<double>(scene.prev, scene.cur, {}, {}, FundamentalRansacOptions{}, workspace);
+    REQUIRE(result.has_fundamental());
+    CHECK(cfp_test::median_sampson_of_truth<double>(scene, result.F) < 0.3);
+  }
+}
+
+TEST_CASE("Same input and seed give the same bits, in a fresh or a used workspace", "[geometry]") {
+  cfp::Random random(35, "bits");
+  FundamentalRansacWorkspace used;
+  for (const cfp::Sampling sampling : {cfp::Sampling::uniform, cfp::Sampling::weighted, cfp::Sampling::progressive}) {
+    const auto scene = make_two_view_scene<double>(random, noisy(400, 0.4));
+    std::vector<double> weights(400);
+    for (double& w : weights) w = random.uniform(0.1, 1);
+    FundamentalRansacOptions options;
+    options.sampling = sampling;
+    options.seed = 77;
+    FundamentalRansacWorkspace fresh;
+    std::vector<char> mask_a(400), mask_b(400);
+    const auto a = fundamental_ransac<double>(scene.prev, scene.cur, weights, mask_a, options, used);
+    const auto b = fundamental_ransac<double>(scene.prev, scene.cur, weights, mask_b, options, fresh);
+    CHECK(a.F == b.F);
+    CHECK(a.iterations == b.iterations);
+    CHECK(mask_a == mask_b);
+  }
+}
+
+TEST_CASE("Absent pairs change nothing, weights guide the search", "[geometry]") {
+  cfp::Random random(36, "weights");
+  FundamentalRansacWorkspace workspace;
+  auto scene = make_two_view_scene<double>(random, noisy(300, 0.3));
+  const auto expected = fundamental_ransac<double>(scene.prev, scene.cur, std::vector<double>(300, 1.0), {},
+                                                   FundamentalRansacOptions{}, workspace);
+  std::vector<double> weights(300, 1.0);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::array<double, 2> hostile[] = {
+      {nan, 0}, {1, std::numeric_limits<double>::infinity()}, {1e300, 5}, {5, 5}, {7, 7}, {9, 9}};
+  for (std::size_t k = 0; k < 6; ++k) {
+    scene.prev.push_back(hostile[k]);
+    scene.cur.push_back({100, 100});
+    weights.push_back(k < 3 ? 1.0 : k == 3 ? 0.0 : k == 4 ? -2.0 : nan);
+  }
+  const auto result =
+      fundamental_ransac<double>(scene.prev, scene.cur, weights, {}, FundamentalRansacOptions{}, workspace);
+  CHECK(result.F == expected.F);
+  CHECK(result.pairs == 300);
+
+  // 70 % mismatches: out of reach for 1000 uniform samples, within it when the weights know.
+  double iterations[2] = {0, 0};
+  for (int trial = 0; trial < 10; ++trial) {
+    const auto hard = make_two_view_scene<double>(random, noisy(400, 0.7));
+    std::vector<double> known(400);
+    for (std::size_t i = 0; i < 400; ++i)
+      known[i] = hard.is_inlier[i] != 0 ? random.uniform(0.5, 1) : random.uniform(0, 0.3);
+    for (const cfp::Sampling sampling : {cfp::Sampling::weighted, cfp::Sampling::progressive}) {
+      FundamentalRansacOptions options;
+      options.sampling = sampling;
+      const auto guided = fundamental_ransac<double>(hard.prev, hard.cur, known, {}, options, workspace);
+      REQUIRE(guided.has_fundamental());
+      CHECK(cfp_test::median_sampson_of_truth<double>(hard, guided.F) < 0.4);
+      iterations[sampling == cfp::Sampling::weighted ? 0 : 1] += double(guided.iterations) / 10;
+    }
+  }
+  CHECK(iterations[0] < 400);
+  CHECK(iterations[1] < 400);
+}
+
+TEST_CASE("Too little, coincident or unstructured input is reported and never crashes", "[geometry]") {
+  FundamentalRansacWorkspace workspace;
+  const auto run = [&](const std::vector<std::array<double, 2>>& prev, const std::vector<std::array<double, 2>>& cur) {
+    const FundamentalResult<double> result =
+        fundamental_ransac<double>(prev, cur, {}, {}, FundamentalRansacOptions{}, workspace);
+    CHECK(result.F.allFinite());
+    CHECK(result.homography.allFinite());
+    CHECK((result.inlier_share >= 0 && result.inlier_share <= 1));
+    return result.reason;
+  };
+  cfp::Random random(37, "hostile");
+  const auto scene = make_two_view_scene<double>(random, noisy(6, 0));
+  CHECK(run({}, {}) == FundamentalReason::too_few_pairs);
+  CHECK(run(scene.prev, scene.cur) == FundamentalReason::too_few_pairs);
+  const std::vector<std::array<double, 2>> equal(50, {10.0, 20.0});
+  CHECK(run(equal, equal) == FundamentalReason::coincident);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<std::array<double, 2>> bad(50, {nan, nan});
+  CHECK(run(bad, bad) == FundamentalReason::too_few_pairs);
+  std::vector<std::array<double, 2>> line, shifted, a, b;
+  for (int i = 0; i < 60; ++i) {
+    line.push_back({10.0 * i, 5.0 * i + 3});
+    shifted.push_back({10.0 * i + 4, 5.0 * i + 9});
+    a.push_back({random.uniform(0, 640), random.uniform(0, 480)});
+    b.push_back({random.uniform(0, 640), random.uniform(0, 480)});
+  }
+  CHECK_FALSE(run(line, shifted) == FundamentalReason::ok);
+  CHECK_FALSE(run(line, line) == FundamentalReason::ok);
+  const FundamentalReason chance = run(a, b);
+  CHECK((chance == FundamentalReason::no_consensus || chance == FundamentalReason::iteration_limit));
+  std::vector<std::array<double, 2>> two_places(60, {10.0, 20.0});
+  for (std::size_t i = 0; i < 30; ++i) two_places[i] = {400.0, 300.0};
+  CHECK_FALSE(run(two_places, two_places) == FundamentalReason::ok);
+}
+
+TEST_CASE("Options outside their range are named", "[geometry]") {
+  FundamentalRansacOptions options;
+  CHECK(invalid_field(options) == nullptr);
+  options.threshold_px = std::numeric_limits<double>::quiet_NaN();
+  CHECK(std::string(invalid_field(options)) == "threshold_px");
+  options = {};
+  options.confidence = 1;
+  CHECK(std::string(invalid_field(options)) == "confidence");
+  options = {};
+  options.min_inliers = 7;
+  CHECK(std::string(invalid_field(options)) == "min_inliers");
+}
+
+TEST_CASE("A second call allocates nothing", "[geometry]") {
+  cfp::Random random(38, "allocation");
+  const auto scene = make_two_view_scene<double>(random, noisy(500, 0.4));
+  TwoViewOptions rotation_options = noisy(500, 0.2);
+  rotation_options.translation_m = 0;
+  const auto rotation = make_two_view_scene<double>(random, rotation_options);
+  std::vector<double> weights(500, 0.5);
+  std::vector<char> mask(500);
+  FundamentalRansacWorkspace workspace;
+  for (const cfp::Sampling sampling : {cfp::Sampling::weighted, cfp::Sampling::progressive}) {
+    FundamentalRansacOptions options;
+    options.sampling = sampling;
+    (void)fundamental_ransac<double>(scene.prev, scene.cur, weights, mask, options, workspace);
+    CHECK(cfp_test::allocations_in([&] {
+            (void)fundamental_ransac<double>(scene.prev, scene.cur, weights, mask, options, workspace);
+            (void)fundamental_ransac<double>(rotation.prev, rotation.cur, weights, mask, options, workspace,
+                                             &rotation.camera);
+          }) == 0);
+  }
+}
+
+TEST_CASE("Labelled real pairs: the labelled inliers fit F", "[geometry]") {
+  CFP_REQUIRE_DATA(folder, "two_view");
+  FundamentalRansacWorkspace workspace;
+  for (const char* name : {"johnssonb", "unihouse", "physics"}) {
+    const Labelled pairs = read_labelled(folder / (std::string(name) + "_pts.txt"));
+    REQUIRE(pairs.prev.size() > 100);
+    FundamentalRansacOptions options;
+    options.threshold_px = 2;
+    std::vector<char> mask(pairs.prev.size());
+    const auto result = fundamental_ransac<double>(pairs.prev, pairs.cur, {}, mask, options, workspace);
+    INFO(name << ": " << to_string(result.reason) << ", " << result.inliers << " inliers, " << result.iterations
+              << " iterations");
+    REQUIRE(result.has_fundamental());
+    double labelled = 0, found = 0;
+    for (std::size_t i = 0; i < mask.size(); ++i)
+      labelled += pairs.label[i], found += pairs.label[i] != 0 && mask[i] != 0 ? 1 : 0;
+    CHECK(found > 0.85 * labelled);
+  }
+}
+
+TEST_CASE("A slow camera before a far wall has an F where its noise allows, and a rotation is never one",
+          "[geometry]") {
+  // A video's parallax over a far wall is often below threshold_px; the choice must rest on the noise, not on the
+  // threshold.
+  FundamentalRansacWorkspace workspace;
+  for (const double noise_px : {0.02, 0.1, 0.3, 0.5}) {
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      for (const double translation_m : {0.0, 0.03, 0.1}) {
+        cfp_test::DynamicSceneOptions options;
+        options.people = 0;
+        options.pixel_noise_px = noise_px;
+        options.translation_m = translation_m;
+        const auto scene = cfp_test::make_dynamic_scene<double>(options, seed);
+        const auto result = fundamental_ransac<double>(scene.previous_keypoints, scene.keypoints, {}, {},
+                                                       FundamentalRansacOptions{}, workspace, &scene.camera);
+        INFO("noise " << noise_px << " px, translation " << translation_m << " m, seed " << seed << ": "
+                      << to_string(result.reason));
+        if (translation_m == 0) CHECK(result.reason == FundamentalReason::pure_rotation);
+        if (translation_m == 0.1 || (translation_m > 0 && noise_px <= 0.1)) CHECK(result.has_fundamental());
+      }
+    }
+  }
+}

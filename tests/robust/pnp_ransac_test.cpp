@@ -1,0 +1,228 @@
+#include "cfp/robust/pnp_ransac.hpp"
+
+#include <limits>
+#include <vector>
+
+#include "cfp/geometry/camera.hpp"
+#include "cfp/geometry/radial_tangential_camera.hpp"
+#include "support/absolute_pose_scene.hpp"
+#include "support/allocation_counter.hpp"
+#include "support/catch.hpp"
+
+using cfp::PinholeCamera;
+using cfp::pnp_ransac;
+using cfp::PnpRansacOptions;
+using cfp::PnpRansacReason;
+using cfp::PnpRansacWorkspace;
+using cfp::Sampling;
+using cfp_test::AbsolutePoseOptions;
+using cfp_test::make_absolute_pose_scene;
+
+namespace {
+
+template <typename Scalar>
+constexpr PinholeCamera<Scalar> camera{Scalar(535.4), Scalar(539.2), Scalar(320.1), Scalar(247.6)};
+
+AbsolutePoseOptions scene_options(std::size_t points, double outlier_share, double noise_px = 1) {
+  AbsolutePoseOptions options;
+  options.points = points;
+  options.outlier_share = outlier_share;
+  options.noise_px = noise_px;
+  return options;
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("The pose survives mismatches", "[optimization]", float, double) {
+  cfp::Random random(51, "pnp");
+  PnpRansacWorkspace workspace;
+  for (const double outliers : {0.0, 0.3, 0.6, 0.8}) {
+    for (int trial = 0; trial < 20; ++trial) {
+      const auto scene = make_absolute_pose_scene<TestType>(random, camera<TestType>, scene_options(300, outliers));
+      std::vector<char> mask(300);
+      const auto result =
+          pnp_ransac(camera<TestType>, {scene.world}, {scene.pixels}, {}, mask, PnpRansacOptions{}, workspace);
+      REQUIRE(result.has_pose());
+      const auto error = cfp_test::pose_distance(result.T_cam_world, scene.T_cam_world);
+      CHECK(error[0] < 0.03);
+      CHECK(error[1] < 0.01);
+      std::size_t kept = 0, caught = 0, inliers = 0;
+      for (std::size_t i = 0; i < mask.size(); ++i) {
+        inliers += scene.is_inlier[i] != 0 ? 1 : 0;
+        (scene.is_inlier[i] != 0 ? kept : caught) += mask[i] != 0 ? 1 : 0;
+      }
+      CHECK(double(kept) > 0.8 * double(inliers));  // 95 % under the true pose
+      CHECK(caught <= 2);
+      CHECK(kept + caught == result.inliers);
+    }
+  }
+}
+
+TEMPLATE_TEST_CASE("Without noise the pose is exact", "[optimization]", float, double) {
+  cfp::Random random(52, "pnp");
+  PnpRansacWorkspace workspace;
+  for (int trial = 0; trial < 20; ++trial) {
+    const auto scene = make_absolute_pose_scene<TestType>(random, camera<TestType>, scene_options(100, 0, 0));
+    const auto result =
+        pnp_ransac(camera<TestType>, {scene.world}, {scene.pixels}, {}, {}, PnpRansacOptions{}, workspace);
+    REQUIRE(result.reason == PnpRansacReason::ok);
+    CHECK(result.inliers == 100);
+    CHECK(cfp_test::pose_distance(result.T_cam_world, scene.T_cam_world)[0] <
+          (std::is_same_v<TestType, float> ? 1e-4 : 1e-9));
+  }
+}
+
+TEST_CASE("A distorted camera is served through the same interface", "[optimization]") {
+  cfp::Random random(53, "pnp");
+  cfp::RadialTangentialCamera<double> distorted;
+  distorted.fx = 517.3, distorted.fy = 516.5, distorted.cx = 318.6, distorted.cy = 255.3;
+  distorted.k1 = 0.2624, distorted.k2 = -0.9531, distorted.p1 = -0.0054, distorted.p2 = 0.0026, distorted.k3 = 1.1633;
+  PnpRansacWorkspace workspace;
+  for (int trial = 0; trial < 10; ++trial) {
+    const auto scene = make_absolute_pose_scene<double>(random, distorted, scene_options(300, 0.4));
+    const auto result = pnp_ransac(distorted, {scene.world}, {scene.pixels}, {}, {}, PnpRansacOptions{}, workspace);
+    INFO(to_string(result.reason) << " " << result.matches << " " << result.iterations);
+    REQUIRE(result.has_pose());
+    CHECK(cfp_test::pose_distance(result.T_cam_world, scene.T_cam_world)[0] < 0.03);
+  }
+}
+
+TEST_CASE("Weights at least halve the samples at 60 % mismatches, with the same accuracy", "[optimization]") {
+  cfp::Random random(54, "pnp");
+  PnpRansacWorkspace workspace;
+  double uniform = 0, guided[2] = {0, 0}, uniform_error = 0, guided_error[2] = {0, 0};
+  constexpr int trials = 50;
+  for (int trial = 0; trial < trials; ++trial) {
+    const auto scene = make_absolute_pose_scene<double>(random, camera<double>, scene_options(300, 0.6));
+    const auto run = [&](Sampling sampling, double& iterations, double& error) {
+      PnpRansacOptions options;
+      options.sampling = sampling;
+      const auto result =
+          pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {scene.weights}, {}, options, workspace);
+      REQUIRE(result.has_pose());
+      iterations += double(result.iterations) / trials;
+      error += cfp_test::pose_distance(result.T_cam_world, scene.T_cam_world)[0] / trials;
+    };
+    run(Sampling::uniform, uniform, uniform_error);
+    run(Sampling::weighted, guided[0], guided_error[0]);
+    run(Sampling::progressive, guided[1], guided_error[1]);
+  }
+  INFO("iterations: uniform " << uniform << ", weighted " << guided[0] << ", progressive " << guided[1]);
+  for (int k = 0; k < 2; ++k) {
+    CHECK(2 * guided[k] <= uniform);
+    CHECK(guided_error[k] < 1.1 * uniform_error);
+  }
+}
+
+TEST_CASE("Absent matches change nothing", "[optimization]") {
+  cfp::Random random(55, "pnp");
+  PnpRansacWorkspace workspace;
+  auto scene = make_absolute_pose_scene<double>(random, camera<double>, scene_options(200, 0.3));
+  const auto expected =
+      pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {scene.weights}, {}, PnpRansacOptions{}, workspace);
+  const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+  const std::array<double, 3> points[] = {{nan, 0, 1}, {0, infinity, 1}, {1e300, 1, 1}, {1, 2, 3},
+                                          {1, 2, 3},   {1, 2, 3},        {1, 2, 3}};
+  const double weights[] = {1, 1, 1, 0, -1, nan, infinity};
+  for (std::size_t k = 0; k < 7; ++k) {
+    scene.world.push_back(points[k]);
+    scene.pixels.push_back({100, 100});
+    scene.weights.push_back(weights[k]);
+  }
+  scene.world.push_back({1, 2, 3});
+  scene.pixels.push_back({nan, 5});
+  scene.weights.push_back(1);
+  const auto result =
+      pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {scene.weights}, {}, PnpRansacOptions{}, workspace);
+  CHECK(result.T_cam_world.rotation == expected.T_cam_world.rotation);
+  CHECK(result.T_cam_world.translation == expected.T_cam_world.translation);
+  CHECK(result.matches == 200);
+}
+
+TEST_CASE("A rigid motion of the world moves the pose with it", "[optimization]") {
+  cfp::Random random(56, "pnp");
+  PnpRansacWorkspace workspace;
+  auto scene = make_absolute_pose_scene<double>(random, camera<double>, scene_options(200, 0.3));
+  const auto expected =
+      pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {}, {}, PnpRansacOptions{}, workspace);
+  cfp::SE3<double> T;
+  T.rotation = cfp::so3_exp<double>(cfp::Vector3<double>(0.3, -1, 2));
+  T.translation = cfp::Vector3<double>(1000, -2000, 500);
+  for (auto& x : scene.world) {
+    const cfp::Vector3<double> moved = T * cfp::Vector3<double>(x[0], x[1], x[2]);
+    x = {moved.x(), moved.y(), moved.z()};
+  }
+  const auto result = pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {}, {}, PnpRansacOptions{}, workspace);
+  REQUIRE(result.has_pose());
+  CHECK(cfp_test::pose_distance<double>(result.T_cam_world * T, expected.T_cam_world)[0] < 1e-3);
+}
+
+TEST_CASE("Same matches and seed give the same bits", "[optimization]") {
+  cfp::Random random(57, "pnp");
+  PnpRansacWorkspace used;
+  for (const Sampling sampling : {Sampling::uniform, Sampling::weighted, Sampling::progressive}) {
+    const auto scene = make_absolute_pose_scene<double>(random, camera<double>, scene_options(250, 0.5));
+    PnpRansacWorkspace fresh;
+    PnpRansacOptions options;
+    options.sampling = sampling;
+    options.seed = 9;
+    const auto a = pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {scene.weights}, {}, options, used);
+    const auto b = pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {scene.weights}, {}, options, fresh);
+    CHECK(a.T_cam_world.rotation == b.T_cam_world.rotation);
+    CHECK(a.T_cam_world.translation == b.T_cam_world.translation);
+    CHECK(a.iterations == b.iterations);
+  }
+}
+
+TEST_CASE("Too few, collinear or unrelated matches leave the identity and say why", "[optimization]") {
+  PnpRansacWorkspace workspace;
+  const auto run = [&](const std::vector<std::array<double, 3>>& world,
+                       const std::vector<std::array<double, 2>>& pixels) {
+    std::vector<char> mask(world.size());
+    const auto result = pnp_ransac(camera<double>, {world}, {pixels}, {}, mask, PnpRansacOptions{}, workspace);
+    CHECK_FALSE(result.has_pose());
+    CHECK(result.T_cam_world.rotation.isIdentity());
+    CHECK(result.T_cam_world.translation.isZero());
+    CHECK(std::count(mask.begin(), mask.end(), 1) == 0);
+    return result.reason;
+  };
+  cfp::Random random(58, "pnp");
+  CHECK(run({}, {}) == PnpRansacReason::too_few_matches);
+  const auto few = make_absolute_pose_scene<double>(random, camera<double>, scene_options(3, 0));
+  CHECK(run(few.world, few.pixels) == PnpRansacReason::too_few_matches);
+  std::vector<std::array<double, 3>> line, equal, anywhere;
+  std::vector<std::array<double, 2>> pixels, places;
+  for (int i = 0; i < 60; ++i) {
+    line.push_back({0.1 * i, 0.05 * i, 2 + 0.02 * i});
+    equal.push_back({1, 2, 3});
+    anywhere.push_back({random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(1, 5)});
+    pixels.push_back({10.0 * i, 200});
+    places.push_back({random.uniform(0, 640), random.uniform(0, 480)});
+  }
+  CHECK(run(line, pixels) == PnpRansacReason::no_consensus);
+  CHECK(run(equal, pixels) == PnpRansacReason::no_consensus);
+  CHECK(run(anywhere, places) == PnpRansacReason::no_consensus);
+}
+
+TEST_CASE("RANSAC options outside their range are named; a second call allocates nothing", "[optimization]") {
+  PnpRansacOptions options;
+  CHECK(invalid_field(options) == nullptr);
+  options.threshold_px = std::numeric_limits<double>::quiet_NaN();
+  CHECK(std::string(invalid_field(options)) == "threshold_px");
+  options = {};
+  options.min_iterations = 2000;
+  CHECK(std::string(invalid_field(options)) == "min_iterations");
+
+  cfp::Random random(59, "pnp");
+  const auto scene = make_absolute_pose_scene<double>(random, camera<double>, scene_options(300, 0.5));
+  std::vector<char> mask(300);
+  PnpRansacWorkspace workspace;
+  for (const Sampling sampling : {Sampling::weighted, Sampling::progressive}) {
+    options = {};
+    options.sampling = sampling;
+    (void)pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {scene.weights}, mask, options, workspace);
+    CHECK(cfp_test::allocations_in([&] {
+            (void)pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {scene.weights}, mask, options, workspace);
+          }) == 0);
+  }
+}
