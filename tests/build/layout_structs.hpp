@@ -129,6 +129,7 @@
   CFP_LAYOUT_OPAQUE(cfp::SingleThread)                                   \
   CFP_LAYOUT_OPAQUE(cfp::BlockCholesky)                                  \
   CFP_LAYOUT(cfp::LevenbergMarquardtOptions, min_absolute_decrease)      \
+  CFP_LAYOUT(cfp::LeastSquaresResult, accepted)                          \
   CFP_LAYOUT_OPAQUE(cfp::Damping)                                        \
   CFP_LAYOUT(cfp::PnpRansacWorkspace, sampler)                           \
   CFP_LAYOUT(cfp::PnpRansacOptions, seed)                                \

@@ -175,7 +175,7 @@ TEST_CASE("Free gauge: without a fixed pose it converges to the cost it has with
     const cfp::BundleResult a = adjust(free, until_converged()), b = adjust(fixed, until_converged());
     CAPTURE(stereo_share, a.iterations, b.iterations);
     CHECK(a.free_poses == 8);
-    CHECK(a.reason == cfp::StopReason::converged);
+    CHECK(a.reason == cfp::SolverStatus::converged);
     CHECK_THAT(a.final_cost, WithinAbs(b.final_cost, 1e-7 * b.final_cost));
     // The free directions stay near the start.
     CHECK((free.poses[0].translation - free.true_poses[0].translation).norm() < 0.1);

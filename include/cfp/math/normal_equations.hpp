@@ -10,7 +10,19 @@
 
 #include "cfp/core/numeric.hpp"
 
+namespace cfp::detail {
+
+/// H step = -g, H symmetric (its upper triangle counts). For local use: alignment depends on flags.
+template <int N>
+struct NormalEquations {
+  Eigen::Matrix<double, N, N> H = Eigen::Matrix<double, N, N>::Zero();
+  Eigen::Matrix<double, N, 1> g = Eigen::Matrix<double, N, 1>::Zero();
+};
+
+}  // namespace cfp::detail
+
 namespace cfp {
+inline namespace CFP_ISA {
 
 /// Solves (H + damping diag H) step = -g by Cholesky (L D L^T) of the matrix scaled to a unit diagonal; H symmetric,
 /// its upper triangle is read. False, and step meaningless, for an H that is not positive definite, whose smallest
@@ -54,4 +66,14 @@ template <int N>
   return finite;
 }
 
+/// By how much the quadratic model falls with that step: step^T (damping diag(H) step - g).
+template <int N>
+[[nodiscard]] double predicted_decrease(const Eigen::Matrix<double, N, N>& H, const Eigen::Matrix<double, N, 1>& g,
+                                        double damping, const Eigen::Matrix<double, N, 1>& step) noexcept {
+  double decrease = 0;
+  for (int i = 0; i < N; ++i) decrease += step[i] * (damping * H(i, i) * step[i] - g[i]);
+  return decrease;
+}
+
+}  // namespace CFP_ISA
 }  // namespace cfp

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -140,47 +141,37 @@ template <typename Executor>
   return is_finite(promised);
 }
 
+/// Bundle adjustment as minimize_least_squares wants it.
+template <typename Linearize, typename Executor>
+struct BundleLeastSquares {
+  BundleWorkspace& work;
+  const Linearize& linearize_at;  // (state, linear) -> cost
+  Executor& executor;
+
+  double linearize() { return linearize_at(work.state, work.linear); }
+  double propose(double damping) {
+    double promised = 0;
+    return take_step(work, damping, executor, promised) ? promised : std::numeric_limits<double>::quiet_NaN();
+  }
+  double linearize_trial() { return linearize_at(work.next_state, work.next_linear); }
+  void accept() {
+    std::swap(work.state, work.next_state);
+    std::swap(work.linear, work.next_linear);
+  }
+};
+
 template <typename Camera, typename Scalar, typename MonoLoss, typename StereoLoss, typename Executor>
 void minimize(const BundleProblem<Camera, Scalar>& problem, const LevenbergMarquardtOptions& options,
               const MonoLoss& mono, const StereoLoss& stereo, BundleWorkspace& work, Executor& executor,
               BundleResult& result) {
-  double cost = linearize(problem, mono, stereo, work.index, work.state, work.linear, executor);
-  result.reason = StopReason::not_finite;
-  if (!is_finite(cost)) return;
-  result.initial_cost = result.final_cost = cost;
-  result.reason = StopReason::max_iterations;
-  Damping damping(options);
-  while (result.iterations < options.max_iterations) {
-    ++result.iterations;
-    double promised = 0;
-    if (take_step(work, damping.value(), executor, promised)) {
-      if (!(promised > options.min_absolute_decrease && promised > options.min_relative_decrease * cost)) {
-        result.reason = damping.last_step_rejected() ? StopReason::no_progress : StopReason::converged;
-        break;
-      }
-      const double next_cost =
-          linearize(problem, mono, stereo, work.index, work.next_state, work.next_linear, executor);
-      const double decrease = cost - next_cost;
-      if (damping.accept(decrease / promised)) {
-        std::swap(work.state, work.next_state);
-        std::swap(work.linear, work.next_linear);
-        cost = next_cost;
-        ++result.accepted;
-        if (!(decrease > options.min_relative_decrease * cost)) {
-          result.reason = StopReason::converged;
-          break;
-        }
-        continue;
-      }
-    } else {
-      damping.reject();
-    }
-    if (damping.exhausted()) {
-      result.reason = StopReason::no_progress;
-      break;
-    }
-  }
-  result.final_cost = cost;
+  const auto linearize_at = [&](const BundleState& state, BundleLinearization& linear) {
+    return linearize(problem, mono, stereo, work.index, state, linear, executor);
+  };
+  BundleLeastSquares<decltype(linearize_at), Executor> least_squares{work, linearize_at, executor};
+  const LeastSquaresResult solved = minimize_least_squares(least_squares, options);
+  result.reason = solved.status;
+  result.initial_cost = solved.initial_cost, result.final_cost = solved.final_cost;
+  result.iterations = solved.iterations, result.accepted = solved.accepted;
 }
 
 template <typename Camera, typename Scalar>

@@ -10,7 +10,7 @@
 #include "cfp/core/span.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/math/se3.hpp"
-#include "cfp/optimization/levenberg_marquardt.hpp"
+#include "cfp/optimization/least_squares.hpp"
 #include "cfp/optimization/robust_loss.hpp"
 
 namespace cfp {
@@ -52,9 +52,10 @@ struct BundleOptions {
 /// The first field outside its range, or nullptr.
 [[nodiscard]] inline const char* invalid_field(const BundleOptions& options) noexcept {
   constexpr const char* nested[] = {
-      "levenberg_marquardt.max_iterations",        "levenberg_marquardt.initial_damping",
-      "levenberg_marquardt.min_damping",           "levenberg_marquardt.max_damping",
-      "levenberg_marquardt.min_relative_decrease", "levenberg_marquardt.min_absolute_decrease"};
+      "levenberg_marquardt.max_iterations",       "levenberg_marquardt.initial_damping",
+      "levenberg_marquardt.min_damping",          "levenberg_marquardt.rejected_damping",
+      "levenberg_marquardt.max_damping",          "levenberg_marquardt.min_relative_decrease",
+      "levenberg_marquardt.min_absolute_decrease"};
   if (const char* field = invalid_field(options.levenberg_marquardt)) {
     for (const char* name : nested) {
       if (std::strcmp(std::strchr(name, '.') + 1, field) == 0) return name;
@@ -69,7 +70,7 @@ struct BundleOptions {
 
 /// Every observation is counted once: used + zero_weight + invalid + behind = all.
 struct BundleResult {
-  StopReason reason = StopReason::not_enough_data;
+  SolverStatus reason = SolverStatus::not_enough_data;
   double initial_cost = 0;      ///< sum of w rho(|r|^2 / sigma^2) over the used observations
   double final_cost = 0;        ///< <= initial_cost
   int iterations = 0;           ///< steps tried

@@ -1,0 +1,193 @@
+/// @file least_squares.hpp
+/// The one Gauss-Newton/Levenberg-Marquardt loop of cfp, for a handful of unknowns and for bundle adjustment alike.
+///
+/// The loop knows a *problem* by four functions. Costs are sums of w rho(s), s in units of sigma^2:
+///   double linearize()              cost and normal equations at the start
+///   double propose(double damping)  solves (H + damping D) h = -g, keeps the trial it leads to and returns the
+///   decrease
+///                                   of the quadratic model, h^T (damping D h - g); NaN: not positive definite; 0 ends
+///   double linearize_trial()        cost and normal equations at the trial; NaN: the trial is refused
+///   void accept()                   the trial is the solution from now on
+/// detail::DenseLeastSquares makes such a problem from two functions of a model. Nothing allocates but the problem.
+/// Sources: Nielsen: "Damping parameter in Marquardt's method", 1999; Madsen, Nielsen, Tingleff 2004, section 3.2.
+#pragma once
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include <Eigen/Core>
+
+#include "cfp/core/numeric.hpp"
+#include "cfp/math/normal_equations.hpp"
+#include "cfp/optimization/solver_status.hpp"
+
+namespace cfp {
+
+/// Costs are sums of squares in units of sigma^2, so the absolute limit has a meaning of its own.
+struct LevenbergMarquardtOptions {
+  int max_iterations = 10;              ///< steps tried, accepted or not, >= 0
+  double initial_damping = 1e-4;        ///< relative to the scale of the Hessian's diagonal, >= 0; 0: Gauss-Newton
+  double min_damping = 1e-8;            ///< >= 0: below it rounding would make an undetermined system singular
+  double rejected_damping = 1e-6;       ///< a refused step raises the damping at least to this; > 0
+  double max_damping = 1e10;            ///< >= min_damping, > 0; beyond it no step helps
+  double min_relative_decrease = 1e-6;  ///< stop when a step promises or brings less than this share of the cost, >= 0
+  double min_absolute_decrease = 1e-9;  ///< stop when a step promises less than this, >= 0
+};
+
+struct LeastSquaresResult {
+  SolverStatus status = SolverStatus::not_enough_data;
+  double initial_cost = 0;
+  double final_cost = 0;  ///< <= initial_cost
+  int iterations = 0;     ///< steps tried
+  int accepted = 0;       ///< steps taken
+};
+
+inline namespace CFP_ISA {
+
+/// The first field outside its range, or nullptr.
+[[nodiscard]] inline const char* invalid_field(const LevenbergMarquardtOptions& options) noexcept {
+  const auto not_negative = [](double x) { return x >= 0 && is_finite(x); };
+  if (!(options.max_iterations >= 0)) return "max_iterations";
+  if (!not_negative(options.initial_damping)) return "initial_damping";
+  if (!not_negative(options.min_damping)) return "min_damping";
+  if (!(options.rejected_damping > 0) || !is_finite(options.rejected_damping)) return "rejected_damping";
+  if (!(options.max_damping >= options.min_damping && options.max_damping > 0) || !is_finite(options.max_damping))
+    return "max_damping";
+  if (!not_negative(options.min_relative_decrease)) return "min_relative_decrease";
+  if (!not_negative(options.min_absolute_decrease)) return "min_absolute_decrease";
+  return nullptr;
+}
+
+/// The damping factor lambda of (H + lambda D) h = -g, and the decision about each step.
+class Damping {
+ public:
+  explicit Damping(const LevenbergMarquardtOptions& options) noexcept
+      : min_(options.min_damping),
+        rejected_((std::min)(options.rejected_damping, options.max_damping)),
+        max_(options.max_damping),
+        value_(clamped(options.initial_damping)) {}
+
+  [[nodiscard]] double value() const noexcept { return value_; }
+  /// Whether the last step was refused; then a small promise means a short step, not an optimum.
+  [[nodiscard]] bool last_step_rejected() const noexcept { return growth_ > 2; }
+  /// True once the damping was at its limit and the step was refused there, too.
+  [[nodiscard]] bool exhausted() const noexcept { return exhausted_; }
+
+  /// Judges a step by gain = (cost before - cost after) / (predicted decrease); NaN is refused. Accepted (gain above
+  /// 1e-3): lambda shrinks by max(1/3, 1 - (2 gain - 1)^3), and does not grow for gain >= 1/2; below a tenth of
+  /// rejected_damping it falls to min_damping at once. Refused: lambda grows 2, 4, 8, … times.
+  bool accept(double gain) noexcept {
+    if (!(gain > 1e-3)) {
+      reject();
+      return false;
+    }
+    const double t = 2 * (std::min)(gain, 1.0) - 1;
+    value_ = clamped(value_ * (std::max)(1.0 / 3, 1 - t * t * t));
+    if (value_ < 0.1 * rejected_) value_ = min_;
+    growth_ = 2;
+    return true;
+  }
+  /// The step could not be computed or evaluated.
+  void reject() noexcept {
+    exhausted_ = value_ >= max_;
+    value_ = clamped((std::max)(value_ * growth_, rejected_));
+    growth_ *= 2;
+  }
+
+ private:
+  [[nodiscard]] double clamped(double value) const noexcept { return (std::min)((std::max)(value, min_), max_); }
+
+  double min_, rejected_, max_;
+  double value_;
+  double growth_ = 2;
+  bool exhausted_ = false;
+};
+
+/// Runs the loop. The cost never rises; what the problem holds at the end belongs to the last accepted step. A system
+/// that is not positive definite is damped, or, with damping 0, ends as degenerate.
+template <typename Problem>
+LeastSquaresResult minimize_least_squares(Problem& problem, const LevenbergMarquardtOptions& options) {
+  LeastSquaresResult result;
+  double cost = problem.linearize();
+  result.status = SolverStatus::not_finite;
+  if (!is_finite(cost)) return result;
+  result.initial_cost = cost;
+  result.status = SolverStatus::iteration_limit;
+  Damping damping(options);
+  while (result.iterations < options.max_iterations) {
+    ++result.iterations;
+    const double promised = problem.propose(damping.value());
+    if (is_finite(promised)) {
+      if (!(promised > (std::max)(options.min_absolute_decrease, options.min_relative_decrease * cost))) {
+        result.status = damping.last_step_rejected() ? SolverStatus::no_decrease : SolverStatus::converged;
+        break;
+      }
+      const double next = problem.linearize_trial(), decrease = cost - next;
+      if (damping.accept(decrease / promised)) {
+        problem.accept();
+        ++result.accepted;
+        cost = next;
+        if (decrease > options.min_relative_decrease * cost) continue;
+        result.status = SolverStatus::converged;
+        break;
+      }
+    } else if (damping.value() > 0) {
+      damping.reject();
+    } else {
+      result.status = SolverStatus::degenerate;
+      break;
+    }
+    if (damping.exhausted()) {
+      result.status = SolverStatus::no_decrease;
+      break;
+    }
+  }
+  result.final_cost = cost;
+  return result;
+}
+
+}  // namespace CFP_ISA
+}  // namespace cfp
+
+namespace cfp::detail {
+inline namespace CFP_ISA {
+
+/// A problem of N unknowns from a model with
+///   double linearize(const State& state, NormalEquations<N>& equations)   writes H (upper triangle) = sum of
+///                                   w rho'(s) J^T J, g = sum of w rho'(s) J^T r and returns the cost
+///   State moved(const State& state, const Eigen::Matrix<double, N, 1>& step)
+/// For local use: alignment depends on flags.
+template <int N, typename State, typename Model>
+class DenseLeastSquares {
+ public:
+  DenseLeastSquares(Model& model, const State& start, double min_pivot = 1e-12) noexcept
+      : model_(model), state_(start), trial_(start), min_pivot_(min_pivot) {}
+
+  [[nodiscard]] const State& state() const noexcept { return state_; }
+  /// At state().
+  [[nodiscard]] const NormalEquations<N>& equations() const noexcept { return equations_; }
+
+  double linearize() { return model_.linearize(state_, equations_); }
+  double propose(double damping) {
+    Eigen::Matrix<double, N, 1> step;
+    if (!solve_normal_equations<N>(equations_.H, equations_.g, damping, min_pivot_, step))
+      return std::numeric_limits<double>::quiet_NaN();
+    trial_ = model_.moved(state_, step);
+    return predicted_decrease<N>(equations_.H, equations_.g, damping, step);
+  }
+  double linearize_trial() { return model_.linearize(trial_, trial_equations_); }
+  void accept() {
+    std::swap(state_, trial_);
+    std::swap(equations_, trial_equations_);
+  }
+
+ private:
+  Model& model_;
+  State state_, trial_;
+  NormalEquations<N> equations_, trial_equations_;
+  double min_pivot_;
+};
+
+}  // namespace CFP_ISA
+}  // namespace cfp::detail

@@ -1,0 +1,178 @@
+#include "cfp/optimization/least_squares.hpp"
+
+#include <limits>
+#include <string>
+
+#include "cfp/core/types.hpp"
+#include "support/catch.hpp"
+
+TEST_CASE("The damping follows Nielsen's rule", "[optimization][least_squares]") {
+  cfp::LevenbergMarquardtOptions options;
+  options.initial_damping = 1;
+  cfp::Damping damping(options);
+  CHECK(damping.accept(1.0));
+  CHECK_THAT(damping.value(), WithinAbs(1.0 / 3, 1e-15));
+  CHECK(damping.accept(0.5));
+  CHECK_THAT(damping.value(), WithinAbs(1.0 / 3, 1e-15));
+  CHECK(damping.accept(0.25));
+  CHECK_THAT(damping.value(), WithinAbs(1.125 / 3, 1e-15));
+  CHECK_FALSE(damping.accept(0));
+  CHECK_FALSE(damping.accept(std::numeric_limits<double>::quiet_NaN()));
+  damping.reject();
+  CHECK_THAT(damping.value(), WithinAbs(1.125 / 3 * 2 * 4 * 8, 1e-12));
+  CHECK(damping.last_step_rejected());
+  CHECK(damping.accept(1e300));
+  CHECK_FALSE(damping.last_step_rejected());
+}
+
+TEST_CASE("The damping stays in its range and is exhausted only after a refusal at the limit",
+          "[optimization][least_squares]") {
+  cfp::LevenbergMarquardtOptions options;
+  options.min_damping = 0.5;
+  options.initial_damping = 1;
+  options.max_damping = 4;
+  cfp::Damping damping(options);
+  for (int i = 0; i < 5; ++i) CHECK(damping.accept(1));
+  CHECK(damping.value() == 0.5);
+  damping.reject();
+  damping.reject();
+  CHECK(damping.value() == 4);
+  CHECK_FALSE(damping.exhausted());
+  damping.reject();
+  CHECK(damping.exhausted());
+  CHECK(damping.value() == 4);
+}
+
+TEST_CASE("A refused step raises the damping to its floor, and small damping falls to the minimum",
+          "[optimization][least_squares]") {
+  cfp::LevenbergMarquardtOptions options;
+  options.initial_damping = 0;
+  options.min_damping = 0;
+  options.rejected_damping = 1e-3;
+  cfp::Damping damping(options);
+  CHECK(damping.value() == 0);
+  damping.reject();
+  CHECK(damping.value() == 1e-3);
+  CHECK(damping.accept(1));
+  CHECK(damping.accept(1));
+  CHECK(damping.value() > 1e-4);
+  CHECK(damping.accept(1));
+  CHECK(damping.value() == 0);
+}
+
+namespace {
+
+// Rosenbrock's valley, r = (1 - x, 10 (y - x^2)), from the far side.
+struct Valley {
+  int evaluations = 0;
+  double linearize(const cfp::Vector2<double>& p, cfp::detail::NormalEquations<2>& equations) {
+    ++evaluations;
+    Eigen::Matrix2d J;
+    J.row(0) = cfp::Vector2<double>(-1, 0);
+    J.row(1) = cfp::Vector2<double>(-20 * p.x(), 10);
+    const cfp::Vector2<double> r(1 - p.x(), 10 * (p.y() - p.x() * p.x()));
+    equations.H = J.transpose() * J;
+    equations.g = J.transpose() * r;
+    return r.squaredNorm();
+  }
+  static cfp::Vector2<double> moved(const cfp::Vector2<double>& p, const cfp::Vector2<double>& step) {
+    return p + step;
+  }
+};
+
+template <typename Model>
+cfp::LeastSquaresResult minimize(Model& model, cfp::Vector2<double>& p, double damping, int iterations = 100) {
+  cfp::LevenbergMarquardtOptions options;
+  options.initial_damping = options.min_damping = damping;
+  options.max_iterations = iterations;
+  cfp::detail::DenseLeastSquares<2, cfp::Vector2<double>, Model> problem(model, p);
+  const cfp::LeastSquaresResult result = minimize_least_squares(problem, options);
+  p = problem.state();
+  return result;
+}
+
+}  // namespace
+
+TEST_CASE("The loop finds the end of Rosenbrock's valley with and without damping", "[optimization][least_squares]") {
+  for (const double damping : {0.0, 1e-4}) {
+    Valley valley;
+    cfp::Vector2<double> p(-1.2, 1);
+    const cfp::LeastSquaresResult result = minimize(valley, p, damping);
+    CHECK(result.status == cfp::SolverStatus::converged);
+    CHECK_THAT(result.initial_cost, WithinAbs(24.2, 1e-12));
+    CHECK(result.final_cost < 1e-9);
+    CHECK((p - cfp::Vector2<double>(1, 1)).norm() < 1e-4);
+    CHECK(result.accepted <= result.iterations);
+    CHECK(valley.evaluations <= result.iterations + 1);
+  }
+}
+
+TEST_CASE("The cost never rises, however early the loop is stopped", "[optimization][least_squares]") {
+  double last = 24.2;
+  for (int iterations = 1; iterations < 20; ++iterations) {
+    Valley valley;
+    cfp::Vector2<double> p(-1.2, 1);
+    const cfp::LeastSquaresResult result = minimize(valley, p, 0, iterations);
+    CHECK(result.final_cost <= last);
+    cfp::detail::NormalEquations<2> equations;
+    CHECK(valley.linearize(p, equations) == result.final_cost);
+    last = result.final_cost;
+  }
+}
+
+TEST_CASE("A system without a solution is degenerate, a start without a cost is refused",
+          "[optimization][least_squares]") {
+  struct Flat : Valley {
+    double linearize(const cfp::Vector2<double>&, cfp::detail::NormalEquations<2>& equations) {
+      equations = {};
+      equations.H(0, 0) = 1;
+      return 1;
+    }
+  } flat;
+  struct Infinite : Valley {
+    double linearize(const cfp::Vector2<double>&, cfp::detail::NormalEquations<2>&) {
+      return std::numeric_limits<double>::infinity();
+    }
+  } infinite;
+  cfp::Vector2<double> p(3, 4);
+  CHECK(minimize(flat, p, 0).status == cfp::SolverStatus::degenerate);
+  CHECK(minimize(flat, p, 1e-8).status == cfp::SolverStatus::no_decrease);
+  CHECK(minimize(infinite, p, 0).status == cfp::SolverStatus::not_finite);
+  CHECK(p == cfp::Vector2<double>(3, 4));
+}
+
+TEST_CASE("A trial that has no cost is refused", "[optimization][least_squares]") {
+  struct Wall : Valley {
+    double linearize(const cfp::Vector2<double>& p, cfp::detail::NormalEquations<2>& equations) {
+      const double cost = Valley::linearize(p, equations);
+      return p.x() > -1 ? std::numeric_limits<double>::quiet_NaN() : cost;
+    }
+  } wall;
+  cfp::Vector2<double> p(-1.2, 1);
+  const cfp::LeastSquaresResult result = minimize(wall, p, 0);
+  CHECK(p.x() <= -1);
+  CHECK(result.final_cost < result.initial_cost);
+}
+
+TEST_CASE("Options outside their range are named", "[optimization][least_squares]") {
+  using Options = cfp::LevenbergMarquardtOptions;
+  const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+  const auto bad = [](auto member, auto value) {
+    Options options;
+    options.*member = value;
+    const char* field = invalid_field(options);
+    return std::string(field != nullptr ? field : "");
+  };
+  CHECK(invalid_field(Options{}) == nullptr);
+  CHECK(bad(&Options::max_iterations, -1) == "max_iterations");
+  for (const double value : {0.0, -1.0, nan, inf}) {
+    CHECK(bad(&Options::rejected_damping, value) == "rejected_damping");
+    CHECK(bad(&Options::max_damping, value) == "max_damping");
+  }
+  for (const double value : {-1.0, nan, inf}) {
+    CHECK(bad(&Options::initial_damping, value) == "initial_damping");
+    CHECK(bad(&Options::min_damping, value) == "min_damping");
+    CHECK(bad(&Options::min_relative_decrease, value) == "min_relative_decrease");
+    CHECK(bad(&Options::min_absolute_decrease, value) == "min_absolute_decrease");
+  }
+}
