@@ -51,6 +51,7 @@
 #include "cfp/math/cubic.hpp"
 #include "cfp/math/exponential.hpp"
 #include "cfp/math/logistic.hpp"
+#include "cfp/math/matrix3.hpp"
 #include "cfp/math/normal_equations.hpp"
 #include "cfp/math/order_statistic.hpp"
 #include "cfp/math/se3.hpp"
