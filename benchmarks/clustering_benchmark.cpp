@@ -97,7 +97,7 @@ template <typename Scalar>
 void cfp_dbscan(benchmark::State& state) {
   cfp::DbscanWorkspace<Scalar> workspace;
   run<Scalar>(state, [&](const std::vector<Scalar>& values, std::vector<int>& labels) {
-    const cfp::DbscanResult result = cfp::dbscan<Scalar>(values, {eps, min_pts}, workspace, labels);
+    const cfp::DbscanResult result = cfp::dbscan(values, {eps, min_pts}, workspace, labels);
     return Outcome{result.clusters, result.noise};
   });
 }
@@ -148,12 +148,11 @@ void nanoflann_dbscan(benchmark::State& state) {
 #endif
 
 template <typename Scalar>
-void sort_ascending(benchmark::State& state) {
-  cfp::AscendingWorkspace<Scalar> workspace;
+void sort_values(benchmark::State& state) {
+  cfp::SortWorkspace<Scalar> workspace;
   run<Scalar>(state, [&](const std::vector<Scalar>& values, std::vector<int>&) {
-    return Outcome{cfp::sort_ascending<Scalar>(values, workspace, [](Scalar value) { return cfp::is_finite(value); })
-                       .values.size(),
-                   0};
+    const auto keep = [](Scalar value) { return cfp::is_finite(value); };
+    return Outcome{cfp::sort_values(values, keep, workspace).values.size(), 0};
   });
 }
 
@@ -184,7 +183,7 @@ void foreground(benchmark::State& state, cfp::AdaptiveRule rule) {
   options.adaptive.rule = rule;
   std::vector<char> mask(static_cast<std::size_t>(state.range(0)));
   run<float>(state, [&](const std::vector<float>& values, std::vector<int>&) {
-    const cfp::ForegroundResult result = cfp::depth_foreground<float>(values, options, workspace, mask);
+    const cfp::ForegroundResult result = cfp::depth_foreground(values, options, workspace, mask);
     return Outcome{result.clusters, result.background};
   });
 }
@@ -196,15 +195,12 @@ BENCHMARK(nanoflann_dbscan)->SIZES;
 #endif
 BENCHMARK(cfp_dbscan<float>)->SIZES->Arg(50000);
 BENCHMARK(cfp_dbscan<double>)->SIZES->Arg(50000);
-BENCHMARK(sort_ascending<float>)->SIZES;
+BENCHMARK(sort_values<float>)->SIZES;
 BENCHMARK(sort_std<float>)->SIZES;
 BENCHMARK(sort_std_values_only<float>)->SIZES;
-BENCHMARK(sort_ascending<double>)->SIZES;
+BENCHMARK(sort_values<double>)->SIZES;
 BENCHMARK(sort_std<double>)->SIZES;
 BENCHMARK_CAPTURE(foreground, density, cfp::AdaptiveRule::foreground_density)->SIZES;
-BENCHMARK_CAPTURE(foreground, median, cfp::AdaptiveRule::k_distance_median)->SIZES;
-BENCHMARK_CAPTURE(foreground, knee, cfp::AdaptiveRule::k_distance_knee)->SIZES;
-BENCHMARK_CAPTURE(foreground, kann, cfp::AdaptiveRule::kann)->Arg(12)->Arg(50)->Arg(200)->Arg(1000);
 BENCHMARK_CAPTURE(foreground, fixed, cfp::AdaptiveRule::fixed)->SIZES;
 
 }  // namespace

@@ -50,7 +50,7 @@ cv::Mat annotate(const cv::Mat& rgb, const cv::Mat& depth, double units_per_metr
                                           units_per_metre));
     }
     std::vector<char> foreground(depths.size());
-    const cfp::ForegroundResult result = cfp::depth_foreground<float>(depths, {}, workspace, foreground);
+    const cfp::ForegroundResult result = cfp::depth_foreground(depths, {}, workspace, foreground);
     for (std::size_t i = 0; i < points.size(); ++i) {
       const cv::Scalar colour = depths[i] <= 0       ? cv::Scalar(160, 160, 160)
                                 : foreground[i] != 0 ? cv::Scalar(0, 0, 255)

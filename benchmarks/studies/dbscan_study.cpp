@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "cfp/clustering/depth_foreground.hpp"
+#include "support/k_distance.hpp"
 #include "support/person_scene.hpp"
 #ifdef CFP_HAVE_OPENCV
 #include "support/real_boxes.hpp"
@@ -55,7 +56,7 @@ std::vector<char> label(const Keypoints& points, const cfp::ForegroundOptions& o
                         cfp::ForegroundResult* result = nullptr) {
   static cfp::ForegroundWorkspace<double> workspace;
   std::vector<char> mask(points.depths.size());
-  const cfp::ForegroundResult r = cfp::depth_foreground<double>(points.depths, options, workspace, mask);
+  const cfp::ForegroundResult r = cfp::depth_foreground(points.depths, options, workspace, mask);
   if (result != nullptr) *result = r;
   return mask;
 }
@@ -100,24 +101,25 @@ void print_table(const std::vector<std::vector<Box>>& boxes, bool all_background
   std::printf("\n|---|");
   for (std::size_t s = 0; s < sizes.size(); ++s) std::printf("---|");
   std::printf("\n");
-  const auto rule_row = [&](cfp::AdaptiveRule rule) {
+  const auto rule_row = [&](cfp_study::Rule rule) {
     return evaluate(boxes, all_background, [rule](const Keypoints& points) {
       cfp::ForegroundOptions options;
-      options.adaptive.rule = rule;
+      options.adaptive.rule = cfp::AdaptiveRule::fixed;
+      options.adaptive.fixed = cfp_study::options_by(rule, points.depths);
       return label(points, options);
     });
   };
   print("best cut (ceiling)", evaluate(boxes, all_background, [all_background](const Keypoints& points) {
           return best_cut(points, all_background);
         }));
-  const Row ours = rule_row(cfp::AdaptiveRule::foreground_density);
+  const Row ours = evaluate(boxes, all_background, [](const Keypoints& points) { return label(points, {}); });
   print("foreground density", ours);
   std::vector<Row> rivals;
-  rivals.push_back(rule_row(cfp::AdaptiveRule::k_distance_median));
+  rivals.push_back(rule_row(cfp_study::Rule::k_distance_median));
   print("k-distance median", rivals.back());
-  rivals.push_back(rule_row(cfp::AdaptiveRule::k_distance_knee));
+  rivals.push_back(rule_row(cfp_study::Rule::k_distance_knee));
   print("k-distance knee", rivals.back());
-  rivals.push_back(rule_row(cfp::AdaptiveRule::kann));
+  rivals.push_back(rule_row(cfp_study::Rule::kann));
   print("KANN-DBSCAN", rivals.back());
   Row best(sizes.size());
   for (const double eps : {0.05, 0.1, 0.15, 0.2, 0.3}) {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <fstream>
+#include <functional>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -17,6 +18,7 @@
 
 #include "cfp/clustering/depth_foreground.hpp"
 #include "cfp/geometry/box.hpp"
+#include "support/k_distance.hpp"
 
 namespace cfp_study {
 
@@ -82,19 +84,29 @@ inline void print_real_boxes(const std::string& data) {
     std::printf("left out: no recordings under %s\n", data.c_str());
     return;
   }
-  struct Rule {
-    const char* name;
-    cfp::AdaptiveRule rule;
-    cfp::DbscanOptions fixed;
+  using Options = cfp::ForegroundOptions;
+  const auto fixed = [](const cfp::DbscanOptions& dbscan) {
+    Options options;
+    options.adaptive.rule = cfp::AdaptiveRule::fixed;
+    options.adaptive.fixed = dbscan;
+    return options;
   };
-  const Rule rules[] = {{"foreground density", cfp::AdaptiveRule::foreground_density, {}},
-                        {"k-distance median", cfp::AdaptiveRule::k_distance_median, {}},
-                        {"k-distance knee", cfp::AdaptiveRule::k_distance_knee, {}},
-                        {"KANN-DBSCAN", cfp::AdaptiveRule::kann, {}},
-                        {"fixed 0.05 m / 5", cfp::AdaptiveRule::fixed, {0.05, 5}},
-                        {"fixed 0.1 m / 5", cfp::AdaptiveRule::fixed, {0.1, 5}},
-                        {"fixed 0.15 m / 10", cfp::AdaptiveRule::fixed, {0.15, 10}},
-                        {"fixed 0.2 m / 10", cfp::AdaptiveRule::fixed, {0.2, 10}}};
+  const auto by = [&](Rule rule) { return [=](const RealBox& box) { return fixed(options_by(rule, box.depths)); }; };
+  const auto always = [&](double eps, std::size_t min_pts) {
+    return [=](const RealBox&) { return fixed({eps, min_pts}); };
+  };
+  struct Row {
+    const char* name;
+    std::function<Options(const RealBox&)> options;
+  };
+  const Row rows[] = {{"foreground density", [](const RealBox&) { return Options{}; }},
+                      {"k-distance median", by(Rule::k_distance_median)},
+                      {"k-distance knee", by(Rule::k_distance_knee)},
+                      {"KANN-DBSCAN", by(Rule::kann)},
+                      {"fixed 0.05 m / 5", always(0.05, 5)},
+                      {"fixed 0.1 m / 5", always(0.1, 5)},
+                      {"fixed 0.15 m / 10", always(0.15, 10)},
+                      {"fixed 0.2 m / 10", always(0.2, 10)}};
   const char* groups[] = {"walking, left man", "walking, right man", "five people"};
   std::printf("| foreground / background kept, %% |");
   for (const char* group : groups) {
@@ -106,18 +118,15 @@ inline void print_real_boxes(const std::string& data) {
   }
   std::printf("\n|---|---|---|---|\n");
   cfp::ForegroundWorkspace<double> workspace;
-  for (const Rule& rule : rules) {
-    std::printf("| %-18s |", rule.name);
-    cfp::ForegroundOptions options;
-    options.adaptive.rule = rule.rule;
-    options.adaptive.fixed = rule.fixed;
+  for (const Row& row : rows) {
+    std::printf("| %-18s |", row.name);
     for (const char* group : groups) {
       double foreground = 0, background = 0;
       int boxes_f = 0, boxes_b = 0;
       for (const RealBox& box : boxes) {
         if (box.group != group) continue;
         std::vector<char> mask(box.depths.size());
-        cfp::depth_foreground<double>(box.depths, options, workspace, mask);
+        cfp::depth_foreground(box.depths, row.options(box), workspace, mask);
         int f = 0, f_kept = 0, b = 0, b_kept = 0;
         for (std::size_t i = 0; i < mask.size(); ++i) {
           if (!cfp::is_valid_depth(box.depths[i])) continue;

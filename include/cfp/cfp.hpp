@@ -6,11 +6,10 @@
 #include "cfp/version.hpp"
 
 #include "cfp/clustering/adaptive.hpp"
-#include "cfp/clustering/ascending.hpp"
 #include "cfp/clustering/dbscan.hpp"
 #include "cfp/clustering/dbscan_verifier.hpp"
 #include "cfp/clustering/depth_foreground.hpp"
-#include "cfp/clustering/k_distance.hpp"
+#include "cfp/clustering/sorted_values.hpp"
 #include "cfp/core/assert.hpp"
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"

@@ -103,29 +103,21 @@ static void instantiate_detection() noexcept {
 }
 
 // ---- clustering ----
-template struct cfp::AdaptiveWorkspace<float>;
-template struct cfp::AdaptiveWorkspace<double>;
-template struct cfp::Ascending<float>;
-template struct cfp::Ascending<double>;
-template struct cfp::AscendingWorkspace<float>;
-template struct cfp::AscendingWorkspace<double>;
+template struct cfp::SortedValues<float>;
+template struct cfp::SortedValues<double>;
+template struct cfp::SortWorkspace<float>;
+template struct cfp::SortWorkspace<double>;
 template struct cfp::DbscanWorkspace<float>;
 template struct cfp::DbscanWorkspace<double>;
 template struct cfp::ForegroundWorkspace<float>;
 template struct cfp::ForegroundWorkspace<double>;
-template struct cfp::KDistanceWorkspace<float>;
-template struct cfp::KDistanceWorkspace<double>;
 template <typename Scalar>
 static void instantiate_clustering() noexcept {
   use(&cfp::adaptive_options<Scalar>);
-  use(&cfp::dbscan_ascending<Scalar>);
+  use(&cfp::dbscan_sorted<Scalar>);
   use(&cfp::dbscan<Scalar>);
-  use(&cfp::verify_dbscan<Scalar>);
+  use(&cfp::verify_dbscan<cfp::span<const Scalar>>);
   use(&cfp::depth_foreground<Scalar>);
-  use(&cfp::k_distances<Scalar>);
-  use(&cfp::median_k_distance<Scalar>);
-  use(&cfp::knee_k_distance<Scalar>);
-  use(&cfp::kann_options<Scalar>);
 }
 
 // ---- probability ----

@@ -88,7 +88,7 @@ void run(Results& results) {
     z = Scalar(random.uniform() < 0.5 ? 2 + 0.12 * random.normal() : 3.5 + 0.05 * random.normal());
   std::vector<char> foreground(n);
   cfp::ForegroundWorkspace<Scalar> work;
-  cfp::depth_foreground<Scalar>(depths, cfp::ForegroundOptions{}, work, foreground);
+  cfp::depth_foreground(depths, cfp::ForegroundOptions{}, work, foreground);
   for (const char f : foreground) results.add(Scalar(f), 0);
 }
 

@@ -9,25 +9,21 @@
 // clang-format off
 #define CFP_LAYOUTS                                                      \
   CFP_LAYOUT(cfp::DepthNoise, nearest_m)                                 \
-  CFP_LAYOUT(cfp::AdaptiveOptions, k_fraction)                           \
-  CFP_LAYOUT(cfp::AdaptiveWorkspace<float>, k_distance)                  \
-  CFP_LAYOUT(cfp::AdaptiveWorkspace<double>, k_distance)                 \
-  CFP_LAYOUT(cfp::Ascending<float>, index)                               \
-  CFP_LAYOUT(cfp::Ascending<double>, index)                              \
-  CFP_LAYOUT(cfp::AscendingWorkspace<float>, index)                      \
-  CFP_LAYOUT(cfp::AscendingWorkspace<double>, index)                     \
+  CFP_LAYOUT(cfp::AdaptiveOptions, body_depth_m)                         \
+  CFP_LAYOUT(cfp::SortedValues<double>, index)                           \
+  CFP_LAYOUT(cfp::SortWorkspace<double>, index)                          \
+  CFP_LAYOUT(cfp::SortedValues<float>, index)                            \
+  CFP_LAYOUT(cfp::SortWorkspace<float>, index)                           \
   CFP_LAYOUT(cfp::DbscanOptions, min_pts)                                \
   CFP_LAYOUT(cfp::DbscanResult, invalid)                                 \
-  CFP_LAYOUT(cfp::DbscanWorkspace<float>, core)                          \
-  CFP_LAYOUT(cfp::DbscanWorkspace<double>, core)                         \
+  CFP_LAYOUT(cfp::DbscanWorkspace<float>, neighbours)                    \
+  CFP_LAYOUT(cfp::DbscanWorkspace<double>, neighbours)                   \
   CFP_LAYOUT(cfp::DbscanVerifierOptions, ascending_numbers)              \
   CFP_LAYOUT(cfp::DbscanVerdict, index)                                  \
   CFP_LAYOUT(cfp::ForegroundOptions, invalid_is_foreground)              \
   CFP_LAYOUT(cfp::ForegroundResult, near_m)                              \
   CFP_LAYOUT(cfp::ForegroundWorkspace<float>, labels)                    \
   CFP_LAYOUT(cfp::ForegroundWorkspace<double>, labels)                   \
-  CFP_LAYOUT(cfp::KDistanceWorkspace<float>, labels)                     \
-  CFP_LAYOUT(cfp::KDistanceWorkspace<double>, labels)                    \
   CFP_LAYOUT_OPAQUE(cfp::Tolerance<float>)                               \
   CFP_LAYOUT_OPAQUE(cfp::Random)                                         \
   CFP_LAYOUT_OPAQUE(cfp::span<const float>)                              \

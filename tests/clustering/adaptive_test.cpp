@@ -12,9 +12,7 @@
 
 namespace {
 
-constexpr cfp::AdaptiveRule rules[] = {cfp::AdaptiveRule::foreground_density, cfp::AdaptiveRule::k_distance_median,
-                                       cfp::AdaptiveRule::k_distance_knee, cfp::AdaptiveRule::kann,
-                                       cfp::AdaptiveRule::fixed};
+constexpr cfp::AdaptiveRule rules[] = {cfp::AdaptiveRule::foreground_density, cfp::AdaptiveRule::fixed};
 
 std::vector<double> random_depths(cfp::Random& random, std::size_t n) {
   std::vector<double> depths;
@@ -24,85 +22,16 @@ std::vector<double> random_depths(cfp::Random& random, std::size_t n) {
   return depths;
 }
 
-// All distances to the others, ascending; entry k - 1 is the k-distance.
-std::vector<double> sorted_distances(const std::vector<double>& values, std::size_t of) {
-  std::vector<double> distances;
-  for (std::size_t j = 0; j < values.size(); ++j) {
-    if (j != of) distances.push_back(std::abs(values[j] - values[of]));
-  }
-  std::sort(distances.begin(), distances.end());
-  return distances;
-}
-
 }  // namespace
 
-TEST_CASE("k-distances agree with sorting all distances", "[clustering]") {
-  cfp::Random random(21, "k distances");
-  cfp::KDistanceWorkspace<double> workspace;
-  for (int round = 0; round < 200; ++round) {
-    const std::vector<double> values = random_depths(random, 2 + random.index(40));
-    const std::size_t k = 1 + random.index(50), used = (std::min)(k, values.size() - 1);
-    cfp::k_distances<double>(values, k, workspace);
-    std::vector<double> expected;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      expected.push_back(sorted_distances(values, i)[used - 1]);
-      REQUIRE(workspace.distances[i] == expected[i]);
-    }
-    std::sort(expected.begin(), expected.end());
-    CHECK(cfp::median_k_distance<double>(values, k, workspace) == expected[expected.size() / 2]);
-  }
-}
-
-TEST_CASE("The knee is the corner of a two-slope curve", "[clustering]") {
-  // Twenty values 0.01 apart, then five 1 apart: with k = 1 the curve is flat at 0.01, then at 1; its corner is the
-  // last small one.
-  std::vector<double> values;
-  for (int i = 0; i < 20; ++i) values.push_back(1 + 0.01 * i);
-  for (int i = 0; i < 5; ++i) values.push_back(3 + i);
-  cfp::KDistanceWorkspace<double> workspace;
-  CHECK_THAT(cfp::knee_k_distance<double>(values, 1, workspace), WithinAbs(0.01, 1e-9));
-}
-
-TEST_CASE("KANN-DBSCAN takes mean k-distance and mean neighbour count of the largest K of the first stable run",
-          "[clustering]") {
-  cfp::Random random(22, "kann");
-  cfp::KDistanceWorkspace<double> workspace;
-  cfp::DbscanWorkspace<double> dbscan_workspace;
-  for (int round = 0; round < 60; ++round) {
-    const std::vector<double> values = random_depths(random, 10 + random.index(60));
-    const std::size_t n = values.size(), max_k = n / 2, stable = 1 + random.index(6);
-    // The definition, quadratic.
-    cfp::DbscanOptions expected;
-    std::size_t run = 0, before = 0;
-    for (std::size_t k = 1; k <= max_k; ++k) {
-      cfp::DbscanOptions trial{0.0, 0};
-      for (std::size_t i = 0; i < n; ++i) trial.eps += sorted_distances(values, i)[k - 1] / static_cast<double>(n);
-      double neighbours = 0;
-      for (const double a : values) {
-        for (const double b : values) neighbours += std::abs(a - b) <= trial.eps ? 1 : 0;
-      }
-      trial.min_pts = static_cast<std::size_t>(std::round(neighbours / static_cast<double>(n)));
-      std::vector<int> labels(n);
-      const std::size_t now = cfp::dbscan<double>(values, trial, dbscan_workspace, labels).clusters;
-      if (run >= stable && now != before) break;
-      run = run > 0 && now == before ? run + 1 : 1;
-      before = now;
-      expected = trial;
-    }
-    const cfp::DbscanOptions chosen = cfp::kann_options<double>(values, stable, max_k, {}, workspace);
-    CHECK_THAT(chosen.eps, WithinAbs(expected.eps, 1e-12));
-    CHECK(chosen.min_pts == expected.min_pts);
-  }
-}
-
 TEST_CASE("The default's min_pts grows with n at unchanged shape", "[clustering]") {
-  cfp::AdaptiveWorkspace<double> workspace;
+  cfp::DbscanWorkspace<double> workspace;
   std::size_t before = 0;
   for (const int copies : {1, 2, 4, 8}) {
     std::vector<double> depths;
     for (int i = 0; i < 60; ++i)
       depths.insert(depths.end(), static_cast<std::size_t>(copies), i < 40 ? 2 + 0.01 * i : 5 + 0.01 * i);
-    const cfp::DbscanOptions chosen = cfp::adaptive_options<double>(depths, {}, workspace);
+    const cfp::DbscanOptions chosen = cfp::adaptive_options(depths, {}, workspace);
     CHECK(chosen.min_pts > before);
     before = chosen.min_pts;
   }
@@ -110,7 +39,7 @@ TEST_CASE("The default's min_pts grows with n at unchanged shape", "[clustering]
 
 TEMPLATE_TEST_CASE("Every rule keeps eps above the sensor's noise and survives hostile depths", "[clustering]", float,
                    double) {
-  cfp::AdaptiveWorkspace<TestType> workspace;
+  cfp::DbscanWorkspace<TestType> workspace;
   const TestType big = (std::numeric_limits<TestType>::max)(), tiny = std::numeric_limits<TestType>::denorm_min();
   const std::vector<std::vector<TestType>> inputs{{},
                                                   {TestType(1)},
@@ -124,7 +53,7 @@ TEMPLATE_TEST_CASE("Every rule keeps eps above the sensor's noise and survives h
     for (const auto& input : inputs) {
       cfp::AdaptiveOptions options;
       options.rule = rule;
-      const cfp::DbscanOptions chosen = cfp::adaptive_options<TestType>(input, options, workspace);
+      const cfp::DbscanOptions chosen = cfp::adaptive_options(input, options, workspace);
       CHECK(invalid_field(chosen) == nullptr);
     }
     if (rule == cfp::AdaptiveRule::fixed) continue;
@@ -132,7 +61,7 @@ TEMPLATE_TEST_CASE("Every rule keeps eps above the sensor's noise and survives h
     stereo.rule = rule;
     stereo.noise = {0.0, 0.02, 0.0};
     const std::vector<TestType> far(50, TestType(10));
-    CHECK(cfp::adaptive_options<TestType>(far, stereo, workspace).eps >= 3 * 0.02 * 100 - 1e-9);
+    CHECK(cfp::adaptive_options(far, stereo, workspace).eps >= 3 * 0.02 * 100 - 1e-9);
   }
 }
 
@@ -155,8 +84,6 @@ TEST_CASE("Adaptive options outside their range are named", "[clustering]") {
   CHECK(named([&](auto& o) { o.min_density = 0; }) == "min_density");
   CHECK(named([&](auto& o) { o.max_density = 0.01; }) == "max_density");
   CHECK(named([&](auto& o) { o.body_depth_m = nan; }) == "body_depth_m");
-  CHECK(named([&](auto& o) { o.k_factor = 0; }) == "k_factor");
-  CHECK(named([&](auto& o) { o.k_fraction = nan; }) == "k_fraction");
 }
 
 TEST_CASE("The noise model gives its published figure", "[clustering]") {
@@ -168,13 +95,13 @@ TEST_CASE("No rule allocates after warm-up", "[clustering]") {
   cfp::Random random(23, "allocation");
   const std::vector<double> first = random_depths(random, 600), second = random_depths(random, 500);
   for (const cfp::AdaptiveRule rule : rules) {
-    cfp::AdaptiveWorkspace<double> workspace;
+    cfp::DbscanWorkspace<double> workspace;
     cfp::AdaptiveOptions options;
     options.rule = rule;
-    double keep = cfp::adaptive_options<double>(first, options, workspace).eps;
+    double keep = cfp::adaptive_options(first, options, workspace).eps;
     CHECK(cfp_test::allocations_in([&] {
-            keep += cfp::adaptive_options<double>(second, options, workspace).eps;
-            keep += cfp::adaptive_options<double>(first, options, workspace).eps;
+            keep += cfp::adaptive_options(second, options, workspace).eps;
+            keep += cfp::adaptive_options(first, options, workspace).eps;
           }) == 0);
     CHECK(keep > 0);
   }

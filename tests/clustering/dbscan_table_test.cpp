@@ -25,12 +25,12 @@ TEMPLATE_TEST_CASE("DBSCAN gives scikit-learn's clusters", "[clustering]", float
     ++cases;
 
     cfp::DbscanWorkspace<TestType> workspace;
-    const cfp::DbscanResult result = cfp::dbscan<TestType>(values, options, workspace, ours);
+    const cfp::DbscanResult result = cfp::dbscan(values, options, workspace, ours);
     INFO("case " << cases << " n " << n << " eps " << options.eps << " min_pts " << options.min_pts);
     // Theirs is a DBSCAN labelling but for the freedoms of the definition: numbering, and which cluster gets a border
     // point.
-    CHECK(cfp::verify_dbscan<TestType>(values, options, theirs, {false, false}).fault == cfp::DbscanFault::none);
-    CHECK(cfp::verify_dbscan<TestType>(values, options, ours).fault == cfp::DbscanFault::none);
+    CHECK(cfp::verify_dbscan(values, options, theirs, {false, false}).fault == cfp::DbscanFault::none);
+    CHECK(cfp::verify_dbscan(values, options, ours).fault == cfp::DbscanFault::none);
     std::map<int, int> partner;
     std::size_t their_core = 0;
     for (std::size_t i = 0; i < n; ++i) {

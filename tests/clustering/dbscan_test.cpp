@@ -24,7 +24,7 @@ Labelled<Scalar> cluster(const std::vector<Scalar>& values, double eps, std::siz
   Labelled<Scalar> out;
   cfp::DbscanWorkspace<Scalar> workspace;
   out.labels.assign(values.size(), 77);
-  out.result = cfp::dbscan<Scalar>(values, {eps, min_pts}, workspace, out.labels);
+  out.result = cfp::dbscan(values, {eps, min_pts}, workspace, out.labels);
   return out;
 }
 
@@ -52,7 +52,7 @@ TEMPLATE_TEST_CASE("DBSCAN agrees with the definition", "[clustering]", float, d
     const double eps = random.index(2) == 0 ? random.index(8) / 16.0 : random.uniform(0, 0.5);
     const std::size_t min_pts = 1 + random.index(12);
     const auto out = cluster(values, eps, min_pts);
-    const cfp::DbscanVerdict verdict = cfp::verify_dbscan<TestType>(values, {eps, min_pts}, out.labels);
+    const cfp::DbscanVerdict verdict = cfp::verify_dbscan(values, {eps, min_pts}, out.labels);
     INFO("round " << round << " n " << n << " eps " << eps << " min_pts " << min_pts << " at " << verdict.index);
     REQUIRE(verdict.fault == cfp::DbscanFault::none);
     REQUIRE(out.result.status == cfp::Status::ok);
@@ -63,15 +63,14 @@ TEMPLATE_TEST_CASE("DBSCAN agrees with the definition", "[clustering]", float, d
   }
 }
 
-TEMPLATE_TEST_CASE("DBSCAN agrees with the definition where each way of sorting is used", "[clustering]", float,
+TEMPLATE_TEST_CASE("DBSCAN agrees with the definition for many values and a wild outlier", "[clustering]", float,
                    double) {
   cfp::Random random(12, "sizes");
-  for (const std::size_t n : std::vector<std::size_t>{39, 40, 41, 300, 1499, 1500, 2500}) {
+  for (const std::size_t n : std::vector<std::size_t>{40, 300, 1500, 2500}) {
     std::vector<TestType> values = random_values<TestType>(random, n);
-    if (n == 300)
-      values[7] = static_cast<TestType>(1e30);  // presses all others into one position: std::sort takes over
+    if (n == 300) values[7] = static_cast<TestType>(1e30);  // presses all others into one bucket
     const auto out = cluster(values, 0.05, 4);
-    CHECK(cfp::verify_dbscan<TestType>(values, {0.05, 4}, out.labels).fault == cfp::DbscanFault::none);
+    CHECK(cfp::verify_dbscan(values, {0.05, 4}, out.labels).fault == cfp::DbscanFault::none);
   }
 }
 
@@ -101,13 +100,12 @@ TEMPLATE_TEST_CASE("DBSCAN survives hostile input", "[clustering]", float, doubl
                                      tiny, -tiny, 1,   nan, big,  2};
   const auto out = cluster(values, 0.5, 2);
   CHECK(out.result.invalid == 4);
-  CHECK(cfp::verify_dbscan<TestType>(values, {0.5, 2}, out.labels).fault == cfp::DbscanFault::none);
+  CHECK(cfp::verify_dbscan(values, {0.5, 2}, out.labels).fault == cfp::DbscanFault::none);
   CHECK(out.labels == std::vector<int>({-1, 1, -1, 2, -1, -1, 1, 0, 0, 0, 0, 1, -1, 2, -1}));
 
   std::vector<TestType> repeated;
   for (int i = 0; i < 20; ++i) repeated.insert(repeated.end(), values.begin(), values.end());
-  CHECK(cfp::verify_dbscan<TestType>(repeated, {0.5, 30}, cluster(repeated, 0.5, 30).labels).fault ==
-        cfp::DbscanFault::none);
+  CHECK(cfp::verify_dbscan(repeated, {0.5, 30}, cluster(repeated, 0.5, 30).labels).fault == cfp::DbscanFault::none);
   const std::vector<TestType> equal(500, TestType(1.7));
   CHECK(cluster(equal, 0.0, 500).labels == std::vector<int>(500, 0));
   CHECK(cluster(equal, 0.0, 501).result.noise == 500);
@@ -139,10 +137,10 @@ TEMPLATE_TEST_CASE("DBSCAN allocates nothing after warm-up", "[clustering]", flo
   for (const std::size_t n : std::vector<std::size_t>{3000, 40, 2999, 0, 700})
     inputs.push_back(random_values<TestType>(random, n));
   inputs.back()[3] = TestType(1e25);
-  cfp::dbscan<TestType>(inputs[0], {0.1, 5}, workspace, labels);
+  cfp::dbscan(inputs[0], {0.1, 5}, workspace, labels);
   const std::size_t allocations = cfp_test::allocations_in([&] {
     for (const auto& input : inputs)
-      cfp::dbscan<TestType>(input, {0.1, 5}, workspace, cfp::span<int>(labels.data(), input.size()));
+      cfp::dbscan(input, {0.1, 5}, workspace, cfp::span<int>(labels.data(), input.size()));
   });
   CHECK(allocations == 0);
 }

@@ -17,7 +17,7 @@ const std::vector<int> right{0, 0, 0, 0, -1, 1, 1, 1, 1, -1, 0, 1, -1};
 const cfp::DbscanOptions options{0.25, 3};
 
 DbscanFault fault(std::vector<int> labels, const cfp::DbscanVerifierOptions& strictness = {}) {
-  return cfp::verify_dbscan<double>(values, options, labels, strictness).fault;
+  return cfp::verify_dbscan(values, options, labels, strictness).fault;
 }
 DbscanFault fault_with(std::size_t at, int label) {
   std::vector<int> labels = right;
@@ -56,7 +56,7 @@ TEST_CASE("The verifier knows the nearest core point and the lower one of two", 
   std::vector<double> between{-0.375, -0.375, -0.125, 0, 0.5, 1, 1.125, 1.375, 1.375};
   const std::vector<int> lower{0, 0, 0, 0, 0, 1, 1, 1, 1}, upper{0, 0, 0, 0, 1, 1, 1, 1, 1};
   const cfp::DbscanOptions wide{0.5, 5};
-  CHECK(cfp::verify_dbscan<double>(between, wide, lower).fault == DbscanFault::none);
-  CHECK(cfp::verify_dbscan<double>(between, wide, upper).fault == DbscanFault::border_not_nearest);
-  CHECK(cfp::verify_dbscan<double>(between, wide, upper, {false, true}).fault == DbscanFault::none);
+  CHECK(cfp::verify_dbscan(between, wide, lower).fault == DbscanFault::none);
+  CHECK(cfp::verify_dbscan(between, wide, upper).fault == DbscanFault::border_not_nearest);
+  CHECK(cfp::verify_dbscan(between, wide, upper, {false, true}).fault == DbscanFault::none);
 }

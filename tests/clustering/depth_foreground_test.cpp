@@ -24,7 +24,7 @@ Outcome run(const std::vector<Scalar>& depths, const cfp::ForegroundOptions& opt
   Outcome out;
   cfp::ForegroundWorkspace<Scalar> workspace;
   out.mask.assign(depths.size(), 9);
-  out.result = cfp::depth_foreground<Scalar>(depths, options, workspace, out.mask);
+  out.result = cfp::depth_foreground(depths, options, workspace, out.mask);
   return out;
 }
 
@@ -74,6 +74,16 @@ TEST_CASE("A small nearer cluster belongs to the foreground and does not win it"
   CHECK(kept(out.mask, 58, 50) == 0);
   CHECK(kept(run(depths).mask, 0, 58) == 58);
   CHECK(run(depths).result.background == 50);
+}
+
+TEST_CASE("As printed, the cluster of the lowest mean depth is the foreground, however small", "[clustering]") {
+  std::vector<double> depths;
+  add_layer(depths, 8, 1.2, 0.005);
+  add_layer(depths, 50, 2.0, 0.008);
+  cfp::ForegroundOptions options = fixed(0.1, 5);
+  options.adaptive.min_share = 0;
+  options.merge_gap_m = 0;
+  CHECK(run(depths, options).result.foreground == 8);
 }
 
 TEST_CASE("Noise nearer than the foreground's far end goes with it, noise behind does not", "[clustering]") {
@@ -197,10 +207,10 @@ TEMPLATE_TEST_CASE("Depth foreground allocates nothing after warm-up", "[cluster
   for (TestType& depth : small) depth = static_cast<TestType>(random.index(2) == 0 ? 2.0 : random.uniform(1, 5));
   cfp::ForegroundWorkspace<TestType> workspace;
   std::vector<char> mask(800);
-  cfp::depth_foreground<TestType>(large, {}, workspace, mask);
+  cfp::depth_foreground(large, {}, workspace, mask);
   CHECK(cfp_test::allocations_in([&] {
-          cfp::depth_foreground<TestType>(small, {}, workspace, cfp::span<char>(mask.data(), small.size()));
-          cfp::depth_foreground<TestType>(large, {}, workspace, mask);
+          cfp::depth_foreground(small, {}, workspace, cfp::span<char>(mask.data(), small.size()));
+          cfp::depth_foreground(large, {}, workspace, mask);
         }) == 0);
 }
 
@@ -215,4 +225,7 @@ TEST_CASE("Foreground options outside their range are named", "[clustering]") {
   options = {};
   options.adaptive.min_share = -0.1;
   CHECK(std::string(invalid_field(options)) == "min_share");
+  options.adaptive.min_share = 0;
+  options.merge_gap_m = 0;
+  CHECK(invalid_field(options) == nullptr);
 }

@@ -29,7 +29,7 @@ template <typename Scalar>
 std::vector<int> labels_of(const std::vector<Scalar>& values, const cfp::DbscanOptions& options) {
   cfp::DbscanWorkspace<Scalar> workspace;
   std::vector<int> labels(values.size());
-  cfp::dbscan<Scalar>(values, options, workspace, labels);
+  cfp::dbscan(values, options, workspace, labels);
   return labels;
 }
 
@@ -50,7 +50,7 @@ std::vector<double> any_box() {
 std::vector<char> foreground_of(const std::vector<double>& depths, const cfp::ForegroundOptions& options = {}) {
   cfp::ForegroundWorkspace<double> workspace;
   std::vector<char> mask(depths.size());
-  cfp::depth_foreground<double>(depths, options, workspace, mask);
+  cfp::depth_foreground(depths, options, workspace, mask);
   return mask;
 }
 
@@ -74,7 +74,7 @@ TEST_CASE("DBSCAN properties", "[properties]") {
   rc::prop("the verifier accepts every labelling", [] {
     const std::vector<double> values = grid_values();
     const cfp::DbscanOptions options = any_options();
-    RC_ASSERT(cfp::verify_dbscan<double>(values, options, labels_of(values, options)).fault == cfp::DbscanFault::none);
+    RC_ASSERT(cfp::verify_dbscan(values, options, labels_of(values, options)).fault == cfp::DbscanFault::none);
   });
   rc::prop("permuting the values permutes the labels", [] {
     const std::vector<double> values = grid_values();

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "cfp/clustering/dbscan.hpp"
-#include "cfp/clustering/k_distance.hpp"
 #include "cfp/core/assert.hpp"
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
@@ -26,39 +25,29 @@ struct DepthNoise {
   double nearest_m = 0.4;      ///< defaults: structured light, Nguyen, Izadi and Lovell, 3DIMPVT 2012
 
   /// Example: 0.0140 m at z = 3 m with the defaults.
-  [[nodiscard]] constexpr double sigma_m(double depth_m) const noexcept {
+  [[nodiscard]] constexpr CFP_INLINE double sigma_m(double depth_m) const noexcept {
     return constant_m + quadratic * (depth_m - nearest_m) * (depth_m - nearest_m);
   }
 };
 
 enum class AdaptiveRule : std::uint8_t {
   foreground_density,  ///< the default, see `adaptive_options`
-  k_distance_median,   ///< eps = k_factor x median k-distance; min_pts = k + 1; k = fraction of n
-  k_distance_knee,     ///< eps = knee of the k-distances; min_pts = k + 1; k = 4
-  kann,                ///< KANN-DBSCAN, see `kann_options`: ten equal cluster counts in a row
   fixed                ///< `fixed` as it stands
 };
 
 struct AdaptiveOptions {
   AdaptiveRule rule = AdaptiveRule::foreground_density;
-  DbscanOptions fixed;  ///< for `fixed`, and where a rule has too few values to work on
+  DbscanOptions fixed;  ///< for `fixed`, and where the rule has too few values to work on
   DepthNoise noise;
-  double noise_factor =
-      3.0;  ///< eps of every rule but `fixed` is at least so many sigmas at the foreground's depth; >= 0
-  double min_eps_m =
-      0.1;  ///< foreground_density: smallest radius; a smaller one tears bodies, limbs become background; > 0
-  double max_eps_m = 0.3;  ///< foreground_density: a larger one bridges to the wall; >= min_eps_m
-  double spacing_factor =
-      3.0;  ///< foreground_density: eps follows so many mean spacings, for boxes with few points; > 0
-  double min_share =
-      0.15;  ///< nearer ones may be a hand or spray: the foreground's depth is read at this share of all; (0, 1)
-  double min_density =
-      0.15;  ///< foreground_density: first share of the foreground's density that a core point must have; (0, 1]
-  double max_density = 0.6;  ///< foreground_density: last share tried; [min_density, 1]
-  double body_depth_m =
-      0.5;  ///< foreground_density: the share is raised while the foreground reaches farther behind its depth; > 0
-  double k_factor = 3.0;     ///< k_distance_median; > 0
-  double k_fraction = 0.05;  ///< k_distance_median: k = max(2, fraction of n); (0, 1)
+  double noise_factor = 3.0;    ///< eps is at least so many sigmas at the foreground's depth; >= 0
+  double min_eps_m = 0.1;       ///< smallest eps; a smaller one tears bodies, limbs become background; > 0
+  double max_eps_m = 0.3;       ///< largest eps; a larger one bridges to the wall; >= min_eps_m
+  double spacing_factor = 3.0;  ///< eps follows so many mean spacings, for boxes with few points; > 0
+  double min_share = 0.15;      ///< the foreground's depth is read at this share of all points, as nearer ones may be a
+                                ///< hand or flying pixels at a silhouette; [0, 1)
+  double min_density = 0.15;    ///< first share of the foreground's density that a core point must have; (0, 1]
+  double max_density = 0.6;     ///< last share tried; [min_density, 1]
+  double body_depth_m = 0.5;    ///< the share is raised while the foreground reaches farther behind its depth; > 0
 };
 
 [[nodiscard]] constexpr const char* invalid_field(const AdaptiveOptions& o) noexcept {
@@ -71,22 +60,14 @@ struct AdaptiveOptions {
   if (!positive(o.min_eps_m)) return "min_eps_m";
   if (!(o.max_eps_m >= o.min_eps_m) || !is_finite(o.max_eps_m)) return "max_eps_m";
   if (!positive(o.spacing_factor)) return "spacing_factor";
-  if (!(o.min_share > 0.0 && o.min_share < 1.0)) return "min_share";
+  if (!(o.min_share >= 0.0 && o.min_share < 1.0)) return "min_share";
   if (!(o.min_density > 0.0 && o.min_density <= 1.0)) return "min_density";
   if (!(o.max_density >= o.min_density && o.max_density <= 1.0)) return "max_density";
-  if (!positive(o.body_depth_m)) return "body_depth_m";
-  if (!positive(o.k_factor)) return "k_factor";
-  return o.k_fraction > 0.0 && o.k_fraction < 1.0 ? nullptr : "k_fraction";
+  return positive(o.body_depth_m) ? nullptr : "body_depth_m";
 }
 
-/// Grows to the largest input seen, then allocates nothing.
-template <typename Scalar>
-struct AdaptiveWorkspace {
-  std::vector<unsigned char> core;
-  KDistanceWorkspace<Scalar> k_distance;
-};
-
 namespace detail {
+inline namespace CFP_ISA {
 
 // Position, among n > 0 ascending depths, of one that belongs to the foreground.
 constexpr std::size_t foreground_position(std::size_t n, const AdaptiveOptions& options) noexcept {
@@ -96,12 +77,12 @@ constexpr std::size_t foreground_position(std::size_t n, const AdaptiveOptions& 
 
 // The last core point of the first cluster that ends at or behind position `least`; n when no cluster does.
 template <typename Scalar>
-std::size_t foreground_end(span<const Scalar> values, Scalar eps, std::size_t least,
-                           const std::vector<unsigned char>& core) noexcept {
+std::size_t foreground_end(span<const Scalar> values, Scalar eps, std::size_t least, std::size_t min_pts,
+                           const std::vector<std::uint32_t>& neighbours) noexcept {
   const std::size_t n = values.size();
   std::size_t last = n;
   for (std::size_t i = 0; i < n; ++i) {
-    if (core[i] == 0) continue;
+    if (neighbours[i] < min_pts) continue;
     if (last != n && last >= least && !(values[i] - values[last] <= eps)) return last;
     last = i;
   }
@@ -110,7 +91,7 @@ std::size_t foreground_end(span<const Scalar> values, Scalar eps, std::size_t le
 
 template <typename Scalar>
 DbscanOptions density_options(span<const Scalar> depths, const AdaptiveOptions& options, double floor_m, std::size_t at,
-                              AdaptiveWorkspace<Scalar>& workspace) {
+                              std::vector<std::uint32_t>& neighbours) {
   const std::size_t n = depths.size();
   const auto around =
       (std::max)(std::size_t(3), static_cast<std::size_t>(std::lround(0.5 * std::sqrt(static_cast<double>(n)))));
@@ -121,21 +102,16 @@ DbscanOptions density_options(span<const Scalar> depths, const AdaptiveOptions& 
   chosen.eps = (std::min)((std::max)(options.min_eps_m, options.spacing_factor * spacing), options.max_eps_m);
   chosen.eps = (std::max)(chosen.eps, floor_m);
   const Scalar eps = radius<Scalar>(chosen.eps);
-  std::size_t peak = 0;
-  for (std::size_t i = 0, begin = 0, end = 0; i < n && (i <= at || depths[i] - depths[at] <= eps); ++i) {
-    while (!(depths[i] - depths[begin] <= eps)) ++begin;
-    while (end < n && depths[end] - depths[i] <= eps) ++end;
-    peak = (std::max)(peak, end - begin);
-  }
+  count_neighbours(depths, eps, neighbours);
+  std::uint32_t peak = 0;
+  for (std::size_t i = 0; i < n && (i <= at || depths[i] - depths[at] <= eps); ++i)
+    peak = (std::max)(peak, neighbours[i]);
 
-  std::size_t nearest = n, tried = 0;
+  std::size_t nearest = n;
   for (double share = options.min_density; share <= options.max_density; share *= 1.4) {
     const auto min_pts =
         (std::max)(std::size_t(2), static_cast<std::size_t>(std::ceil(share * static_cast<double>(peak))));
-    if (min_pts == tried) continue;
-    tried = min_pts;
-    find_core_points(depths, eps, min_pts, workspace.core);
-    const std::size_t end = foreground_end(depths, eps, at, workspace.core);
+    const std::size_t end = foreground_end(depths, eps, at, min_pts, neighbours);
     if (end >= nearest && nearest != n) continue;
     nearest = end;
     chosen.min_pts = min_pts;
@@ -144,38 +120,30 @@ DbscanOptions density_options(span<const Scalar> depths, const AdaptiveOptions& 
   return chosen;
 }
 
+}  // namespace CFP_ISA
 }  // namespace detail
+
+inline namespace CFP_ISA {
 
 /// eps (metres) and min_pts for depths that are valid and ascending.
 /// The default reads the foreground's depth z at `min_share`, sets eps to `spacing_factor` mean spacings around it
-/// within [min_eps_m, max_eps_m], counts the neighbours of the points up to z + eps, and asks of a core point
-/// `min_density` of the largest count, at least 2. So min_pts grows with n and with the density of the foreground, not
-/// of the wall. While the foreground then reaches more than `body_depth_m` behind z, that share is raised by 1.4: what
-/// connects a body to a wall or to a slanted plane is thinner than the body. The share with the nearest end stands.
-/// Fewer than three depths, or an eps that overflows: `fixed`. eps of every other rule is at least noise_factor sigmas
-/// at z. O(n), but O(n min(n / 2, 200)) for KANN and O(n k) for the median. Allocates only when the workspace grows.
-/// Source: ours; paper IV-C leaves it open.
+/// within [min_eps_m, max_eps_m], but at least noise_factor sigmas at z, counts the neighbours of the points up to
+/// z + eps, and asks of a core point `min_density` of the largest count, at least 2. So min_pts grows with n and with
+/// the density of the foreground, not of the wall. While the foreground then reaches more than `body_depth_m` behind z,
+/// that share is raised by 1.4: what connects a body to a wall or to a slanted plane is thinner than the body. The
+/// share with the nearest end stands. Fewer than three depths, or an eps that overflows: `fixed`. O(n). Allocates only
+/// when the workspace grows. Source: ours; paper IV-C leaves it open.
 template <typename Scalar>
-[[nodiscard]] DbscanOptions adaptive_options(span<const Scalar> depths, const AdaptiveOptions& options,
-                                             AdaptiveWorkspace<Scalar>& workspace) {
+[[nodiscard]] DbscanOptions adaptive_options(span<const detail::non_deduced<Scalar>> depths,
+                                             const AdaptiveOptions& options, DbscanWorkspace<Scalar>& workspace) {
   CFP_ASSERT(std::is_sorted(depths.begin(), depths.end()));
   const std::size_t n = depths.size();
   if (n < 3 || options.rule == AdaptiveRule::fixed) return options.fixed;
   const std::size_t at = detail::foreground_position(n, options);
   const double floor_m = options.noise_factor * options.noise.sigma_m(static_cast<double>(depths[at]));
-  DbscanOptions chosen = options.fixed;
-  if (options.rule == AdaptiveRule::foreground_density) {
-    chosen = detail::density_options(depths, options, floor_m, at, workspace);
-  } else if (options.rule == AdaptiveRule::k_distance_median) {
-    const auto k = (std::max)(std::size_t(2), static_cast<std::size_t>(options.k_fraction * static_cast<double>(n)));
-    chosen = {options.k_factor * static_cast<double>(median_k_distance(depths, k, workspace.k_distance)), k + 1};
-  } else if (options.rule == AdaptiveRule::k_distance_knee) {
-    chosen = {static_cast<double>(knee_k_distance(depths, 4, workspace.k_distance)), 5};
-  } else {
-    chosen = kann_options(depths, 10, (std::min)(n / 2, std::size_t(200)), options.fixed, workspace.k_distance);
-  }
-  chosen.eps = (std::max)(chosen.eps, floor_m);
+  const DbscanOptions chosen = detail::density_options(depths, options, floor_m, at, workspace.neighbours);
   return is_finite(chosen.eps) ? chosen : options.fixed;
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

@@ -9,7 +9,7 @@
 #include <limits>
 #include <vector>
 
-#include "cfp/clustering/ascending.hpp"
+#include "cfp/clustering/sorted_values.hpp"
 #include "cfp/core/assert.hpp"
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
@@ -41,11 +41,12 @@ struct DbscanResult {
 /// Reused from call to call; grows to the largest input seen, then allocates nothing.
 template <typename Scalar>
 struct DbscanWorkspace {
-  AscendingWorkspace<Scalar> ascending;
-  std::vector<unsigned char> core;
+  SortWorkspace<Scalar> sort;
+  std::vector<std::uint32_t> neighbours;
 };
 
 namespace detail {
+inline namespace CFP_ISA {
 
 // eps in the type of the values; a finite double beyond the range of float counts as the largest float.
 template <typename Scalar>
@@ -54,40 +55,24 @@ template <typename Scalar>
                                                                          : (std::numeric_limits<Scalar>::max)();
 }
 
-// core[i] = whether at least min_pts of the ascending values lie within eps of value i.
+// neighbours[i] = how many of the ascending values lie within eps of value i, itself included.
 template <typename Scalar>
-void find_core_points(span<const Scalar> values, Scalar eps, std::size_t min_pts, std::vector<unsigned char>& core) {
+void count_neighbours(span<const Scalar> values, Scalar eps, std::vector<std::uint32_t>& neighbours) {
   const std::size_t n = values.size();
-  core.assign(n, 0);
-  if (min_pts > n) return;
-  const Scalar* v = values.data();
-  const std::size_t reach = min_pts - 1;
-  // One-sided test first: whoever has min_pts values within eps on one side alone. It settles nearly all core points
-  // and vectorises.
-  for (std::size_t i = 0; i < n - reach; ++i) core[i] = v[i + reach] - v[i] <= eps ? 1 : 0;
-  for (std::size_t i = reach; i < n; ++i)
-    core[i] = static_cast<unsigned char>(core[i] | (v[i] - v[i - reach] <= eps ? 1 : 0));
-  // The rest: the first of the min_pts - 1 values before i that is a neighbour starts the only run that can suffice.
-  for (std::size_t i = 0; i < n; ++i) {
-    if (core[i] != 0) continue;
-    std::size_t first = i < reach ? 0 : i - reach, last = i;
-    while (first < last) {
-      const std::size_t middle = first + (last - first) / 2;
-      if (v[i] - v[middle] <= eps)
-        last = middle;
-      else
-        first = middle + 1;
-    }
-    core[i] = first + reach < n && v[first + reach] - v[i] <= eps ? 1 : 0;
+  neighbours.resize(n);
+  for (std::size_t i = 0, begin = 0, end = 0; i < n; ++i) {
+    while (!(values[i] - values[begin] <= eps)) ++begin;
+    while (end < n && values[end] - values[i] <= eps) ++end;
+    neighbours[i] = static_cast<std::uint32_t>(end - begin);
   }
 }
 
 // Calls emit(i, label) once for every ascending value i.
 template <typename Scalar, typename Emit>
-DbscanResult sweep(span<const Scalar> values, const DbscanOptions& options, std::vector<unsigned char>& core,
-                   const Emit& emit) {
+DbscanResult label_sorted(span<const Scalar> values, const DbscanOptions& options,
+                          std::vector<std::uint32_t>& neighbours, const Emit& emit) {
   DbscanResult result;
-  const std::size_t n = values.size();
+  const std::size_t n = values.size(), none = n;
   if (invalid_field(options) != nullptr) {
     for (std::size_t i = 0; i < n; ++i) emit(i, dbscan_noise);
     result.status = Status::invalid_input;
@@ -95,14 +80,13 @@ DbscanResult sweep(span<const Scalar> values, const DbscanOptions& options, std:
     return result;
   }
   const Scalar eps = radius<Scalar>(options.eps);
-  find_core_points(values, eps, options.min_pts, core);
-  const std::size_t none = n;
+  count_neighbours(values, eps, neighbours);
   std::size_t left = none;  // the last core point seen
-  int label = -1;
+  int label = -1;           // and its cluster
   for (std::size_t begin = 0; begin < n;) {
     // [begin, right) are not core points; right is the next one, or the end.
     std::size_t right = begin;
-    while (right < n && core[right] == 0) ++right;
+    while (right < n && neighbours[right] < options.min_pts) ++right;
     const bool new_cluster = left == none || (right < n && !(values[right] - values[left] <= eps));
     const int right_label = new_cluster ? label + 1 : label;
     for (std::size_t i = begin; i < right; ++i) {
@@ -123,17 +107,20 @@ DbscanResult sweep(span<const Scalar> values, const DbscanOptions& options, std:
   return result;
 }
 
+}  // namespace CFP_ISA
 }  // namespace detail
 
+inline namespace CFP_ISA {
+
 /// DBSCAN of values that are finite and ascending already (asserted in debug builds): `labels[i]` belongs to
-/// `values[i]`. As `dbscan` otherwise. O(n log min_pts), in practice O(n).
+/// `values[i]`. As `dbscan` otherwise. O(n).
 template <typename Scalar>
-DbscanResult dbscan_ascending(span<const Scalar> values, const DbscanOptions& options,
-                              DbscanWorkspace<Scalar>& workspace, span<int> labels) {
+DbscanResult dbscan_sorted(span<const detail::non_deduced<Scalar>> values, const DbscanOptions& options,
+                           DbscanWorkspace<Scalar>& workspace, span<int> labels) {
   CFP_ASSERT(labels.size() == values.size());
   CFP_ASSERT(std::is_sorted(values.begin(), values.end()));
-  int* out = labels.data();
-  return detail::sweep(values, options, workspace.core, [out](std::size_t i, int label) { out[i] = label; });
+  return detail::label_sorted(values, options, workspace.neighbours,
+                              [=](std::size_t i, int label) { labels[i] = label; });
 }
 
 /// Labels every value: clusters are numbered by ascending position, `dbscan_noise` marks the rest.
@@ -145,19 +132,17 @@ DbscanResult dbscan_ascending(span<const Scalar> values, const DbscanOptions& op
 /// when the workspace grows. Departure: the original lets a border point join the cluster that happens to find it
 /// first.
 template <typename Scalar>
-DbscanResult dbscan(span<const Scalar> values, const DbscanOptions& options, DbscanWorkspace<Scalar>& workspace,
-                    span<int> labels) {
+DbscanResult dbscan(span<const detail::non_deduced<Scalar>> values, const DbscanOptions& options,
+                    DbscanWorkspace<Scalar>& workspace, span<int> labels) {
   CFP_ASSERT(labels.size() == values.size());
-  const Ascending<Scalar> ascending =
-      sort_ascending(values, workspace.ascending, [](Scalar value) { return is_finite(value); });
-  int* out = labels.data();
-  const std::size_t invalid = values.size() - ascending.values.size();
-  if (invalid > 0) std::fill(out, out + values.size(), dbscan_noise);
-  const std::uint32_t* index = ascending.index.data();
-  const auto emit = [out, index](std::size_t i, int label) { out[index[i]] = label; };
-  DbscanResult result = detail::sweep(ascending.values, options, workspace.core, emit);
-  result.invalid = invalid;
+  const SortedValues<Scalar> sorted = sort_values(
+      values, [](Scalar value) { return is_finite(value); }, workspace.sort);
+  std::fill(labels.begin(), labels.end(), dbscan_noise);
+  DbscanResult result = detail::label_sorted(sorted.values, options, workspace.neighbours,
+                                             [=](std::size_t i, int label) { labels[sorted.index[i]] = label; });
+  result.invalid = values.size() - sorted.values.size();
   return result;
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

@@ -2,8 +2,10 @@
 /// Checks a DBSCAN labelling of scalar values against the definition, whoever made it. For tests: O(n^2), allocates.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 #include <vector>
 
 #include "cfp/clustering/dbscan.hpp"
@@ -37,101 +39,113 @@ struct DbscanVerdict {
   std::size_t index = 0;  ///< a value at which the fault shows
 };
 
-/// Whether `labels` is a DBSCAN labelling of `values`; distances are differences as rounded in Scalar, as in `dbscan`.
-template <typename Scalar>
-DbscanVerdict verify_dbscan(span<const Scalar> values, const DbscanOptions& options, span<const int> labels,
-                            const DbscanVerifierOptions& strictness = {}) {
-  const std::size_t n = values.size();
-  if (labels.size() != n) return {DbscanFault::label_count, 0};
-  const Scalar eps = detail::radius<Scalar>(options.eps);
-  const auto distance = [&](std::size_t a, std::size_t b) {
-    return values[a] < values[b] ? values[b] - values[a] : values[a] - values[b];
-  };
-  const auto near = [&](std::size_t a, std::size_t b) {
-    return is_finite(values[a]) && is_finite(values[b]) && distance(a, b) <= eps;
-  };
+namespace detail {
+inline namespace CFP_ISA {
 
-  std::vector<char> core(n, 0);
-  for (std::size_t i = 0; i < n; ++i) {
-    std::size_t count = 0;
-    for (std::size_t j = 0; j < n; ++j) count += near(i, j) ? 1U : 0U;
-    core[i] = count >= options.min_pts && is_finite(values[i]) ? 1 : 0;
-  }
-  // The true component of every core point, by flooding.
-  std::vector<std::size_t> component(n, n), front;
-  for (std::size_t seed = 0; seed < n; ++seed) {
-    if (core[seed] == 0 || component[seed] != n) continue;
-    component[seed] = seed;
-    front.assign(1, seed);
-    while (!front.empty()) {
-      const std::size_t at = front.back();
-      front.pop_back();
-      for (std::size_t j = 0; j < n; ++j) {
-        if (core[j] == 0 || component[j] != n || !near(at, j)) continue;
-        component[j] = seed;
-        front.push_back(j);
+// The definition, by comparing every value with every other one.
+template <typename Scalar>
+struct DbscanOracle {
+  span<const Scalar> values;
+  Scalar eps;
+  std::vector<char> core;
+  std::vector<std::size_t> component;  // of core points: equal for density-connected ones
+
+  DbscanOracle(span<const Scalar> v, const DbscanOptions& options)
+      : values(v), eps(radius<Scalar>(options.eps)), core(v.size(), 0), component(v.size()) {
+    const std::size_t n = values.size();
+    for (std::size_t i = 0; i < n; ++i) {
+      std::size_t count = 0;
+      for (std::size_t j = 0; j < n; ++j) count += near(i, j) ? 1U : 0U;
+      core[i] = count >= options.min_pts && is_finite(values[i]) ? 1 : 0;
+      component[i] = i;
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t j = 0; j < i; ++j) {
+        if (core[i] == 0 || core[j] == 0 || component[i] == component[j] || !near(i, j)) continue;
+        std::replace(component.begin(), component.end(), std::size_t(component[i]), std::size_t(component[j]));
       }
     }
   }
+  [[nodiscard]] Scalar distance(std::size_t a, std::size_t b) const {
+    return values[a] < values[b] ? values[b] - values[a] : values[a] - values[b];
+  }
+  [[nodiscard]] bool near(std::size_t a, std::size_t b) const {
+    return is_finite(values[a]) && is_finite(values[b]) && distance(a, b) <= eps;
+  }
+};
 
+template <typename Scalar>
+DbscanFault fault_of_core(const DbscanOracle<Scalar>& oracle, span<const int> labels, std::size_t i, bool ordered) {
+  if (labels[i] < 0) return DbscanFault::core_is_noise;
+  DbscanFault worst = DbscanFault::none;
+  const auto report = [&worst](DbscanFault fault) {
+    worst = worst == DbscanFault::none || fault < worst ? fault : worst;
+  };
+  for (std::size_t j = 0; j < labels.size(); ++j) {
+    if (oracle.core[j] == 0) continue;
+    const bool same = oracle.component[i] == oracle.component[j];
+    if (same && labels[i] != labels[j]) report(DbscanFault::cluster_torn);
+    if (!same && labels[i] == labels[j]) report(DbscanFault::clusters_joined);
+    if (ordered && oracle.values[j] < oracle.values[i] && labels[j] > labels[i]) report(DbscanFault::numbering);
+  }
+  return worst;
+}
+
+template <typename Scalar>
+DbscanFault fault_of_other(const DbscanOracle<Scalar>& oracle, span<const int> labels, std::size_t i, bool to_nearest) {
+  const std::size_t n = labels.size();
+  std::size_t nearest = n;
+  bool own = false;
+  for (std::size_t j = 0; j < n; ++j) {
+    if (oracle.core[j] == 0 || !oracle.near(i, j)) continue;
+    own = own || labels[j] == labels[i];
+    const bool better =
+        nearest == n || oracle.distance(i, j) < oracle.distance(i, nearest) ||
+        (oracle.distance(i, j) == oracle.distance(i, nearest) && oracle.values[j] < oracle.values[nearest]);
+    if (better) nearest = j;
+  }
+  if (nearest == n) return labels[i] != dbscan_noise ? DbscanFault::noise_labelled : DbscanFault::none;
+  if (labels[i] == dbscan_noise) return DbscanFault::border_is_noise;
+  if (!own) return DbscanFault::border_foreign;
+  return to_nearest && labels[i] != labels[nearest] ? DbscanFault::border_not_nearest : DbscanFault::none;
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
+
+inline namespace CFP_ISA {
+
+/// Whether `labels` is a DBSCAN labelling of `values` (any contiguous container of float or double); distances are
+/// differences as rounded in the values' type, as in `dbscan`.
+template <typename Values>
+[[nodiscard]] DbscanVerdict verify_dbscan(const Values& values, const DbscanOptions& options, span<const int> labels,
+                                          const DbscanVerifierOptions& strictness = {}) {
+  using Scalar = std::decay_t<decltype(*values.data())>;
+  if (labels.size() != values.size()) return {DbscanFault::label_count, 0};
+  const detail::DbscanOracle<Scalar> oracle(values, options);
   DbscanVerdict verdict;
   const auto report = [&verdict](DbscanFault fault, std::size_t at) {
-    if (verdict.fault == DbscanFault::none || fault < verdict.fault) verdict = {fault, at};
+    if (fault != DbscanFault::none && (verdict.fault == DbscanFault::none || fault < verdict.fault))
+      verdict = {fault, at};
   };
-  for (std::size_t i = 0; i < n; ++i) {
-    if (!is_finite(values[i])) {
-      if (labels[i] != dbscan_noise) report(DbscanFault::invalid_labelled, i);
-      continue;
-    }
-    if (core[i] != 0) {
-      if (labels[i] < 0) report(DbscanFault::core_is_noise, i);
-      for (std::size_t j = 0; j < i; ++j) {
-        if (core[j] == 0) continue;
-        if (component[i] == component[j] && labels[i] != labels[j]) report(DbscanFault::cluster_torn, i);
-        if (component[i] != component[j] && labels[i] == labels[j]) report(DbscanFault::clusters_joined, i);
-        if (strictness.ascending_numbers && values[j] < values[i] && labels[j] > labels[i])
-          report(DbscanFault::numbering, i);
-        if (strictness.ascending_numbers && values[i] < values[j] && labels[i] > labels[j])
-          report(DbscanFault::numbering, i);
-      }
-      continue;
-    }
-    std::size_t nearest = n;
-    bool own = false;
-    for (std::size_t j = 0; j < n; ++j) {
-      if (core[j] == 0 || !near(i, j)) continue;
-      own = own || labels[j] == labels[i];
-      const bool better = nearest == n || distance(i, j) < distance(i, nearest) ||
-                          (distance(i, j) == distance(i, nearest) && values[j] < values[nearest]);
-      if (better) nearest = j;
-    }
-    if (nearest == n) {
-      if (labels[i] != dbscan_noise) report(DbscanFault::noise_labelled, i);
-    } else if (labels[i] == dbscan_noise) {
-      report(DbscanFault::border_is_noise, i);
-    } else if (!own) {
-      report(DbscanFault::border_foreign, i);
-    } else if (strictness.nearest_border && labels[i] != labels[nearest]) {
-      report(DbscanFault::border_not_nearest, i);
+  int highest = dbscan_noise;
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    highest = (std::max)(highest, labels[i]);
+    if (oracle.core[i] != 0) {
+      report(detail::fault_of_core(oracle, labels, i, strictness.ascending_numbers), i);
+    } else if (is_finite(oracle.values[i])) {
+      report(detail::fault_of_other(oracle, labels, i, strictness.nearest_border), i);
+    } else if (labels[i] != dbscan_noise) {
+      report(DbscanFault::invalid_labelled, i);
     }
   }
-  if (strictness.ascending_numbers) {
-    std::vector<char> used;
-    for (std::size_t i = 0; i < n; ++i) {
-      if (labels[i] < 0) continue;
-      const std::size_t label = static_cast<std::size_t>(labels[i]);
-      if (label >= n) {
-        report(DbscanFault::numbering, i);
-        continue;
-      }
-      if (label >= used.size()) used.resize(label + 1, 0);
-      used[label] = 1;
-    }
-    for (const char seen : used) {
-      if (seen == 0) report(DbscanFault::numbering, 0);
-    }
+  for (int label = 0; strictness.ascending_numbers && label < highest; ++label) {
+    if (std::find(labels.begin(), labels.end(), label) != labels.end()) continue;
+    report(DbscanFault::numbering, 0);
+    break;
   }
   return verdict;
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

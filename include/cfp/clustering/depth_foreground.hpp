@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "cfp/clustering/adaptive.hpp"
-#include "cfp/clustering/ascending.hpp"
 #include "cfp/clustering/dbscan.hpp"
+#include "cfp/clustering/sorted_values.hpp"
 #include "cfp/core/assert.hpp"
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
@@ -68,13 +68,12 @@ struct ForegroundResult {
 /// Grows to the largest box seen, then allocates nothing.
 template <typename Scalar>
 struct ForegroundWorkspace {
-  AscendingWorkspace<Scalar> ascending;
-  AdaptiveWorkspace<Scalar> adaptive;
   DbscanWorkspace<Scalar> dbscan;
   std::vector<int> labels;
 };
 
 namespace detail {
+inline namespace CFP_ISA {
 
 // How many of the ascending depths belong to the foreground under these parameters; 0 for none.
 template <typename Scalar>
@@ -83,7 +82,7 @@ std::size_t foreground_count(span<const Scalar> depths, const DbscanOptions& par
                              std::size_t& clusters) {
   const std::size_t n = depths.size();
   workspace.labels.resize(n);
-  clusters = dbscan_ascending(depths, parameters, workspace.dbscan, span<int>(workspace.labels)).clusters;
+  clusters = dbscan_sorted(depths, parameters, workspace.dbscan, span<int>(workspace.labels)).clusters;
   const std::size_t at = foreground_position(n, options.adaptive);
   const double limit = static_cast<double>(depths[at]) + options.adaptive.body_depth_m;
   std::size_t count = 0;  // up to the end of the last cluster taken
@@ -107,26 +106,29 @@ std::size_t foreground_count(span<const Scalar> depths, const DbscanOptions& par
   return count > at ? count : 0;
 }
 
+}  // namespace CFP_ISA
 }  // namespace detail
+
+inline namespace CFP_ISA {
 
 /// mask[i] = 1 for foreground, 0 for background. Clusters the valid depths (finite, > 0) with `adaptive_options`. The
 /// foreground ends where the first cluster ends that reaches past the nearest `adaptive.min_share` of the points; a
 /// cluster that begins within `merge_gap_m` behind it, and ends within `adaptive.body_depth_m` of the foreground's
-/// depth, joins it; everything nearer goes with it, smaller clusters (a hand) and noise (spray at silhouettes) alike.
-/// The result is a cut in depth. Fewer than `sure_points` valid depths: the split is repeated with eps x 0.7 and x 1.4,
-/// and unless both agree to within one point in ten, the status is `unstable`. One cluster only is `ok`: everything is
-/// foreground because it is one layer. Points without a valid depth take no part and get the label
+/// depth, joins it; everything nearer goes with it, smaller clusters (a hand) and noise (flying pixels at silhouettes)
+/// alike. The result is a cut in depth. Fewer than `sure_points` valid depths: the split is repeated with eps x 0.7 and
+/// x 1.4, and unless both agree to within one point in ten, the status is `unstable`. One cluster only is `ok`:
+/// everything is foreground because it is one layer. Points without a valid depth take no part and get the label
 /// `invalid_is_foreground` says, whatever the status. O(n log n), in practice O(n); deterministic; permuting the points
 /// permutes the mask; allocates only when the workspace grows. Departures from the paper, which takes the cluster of
 /// the lowest mean depth (dbscan_study shows what they bring): the minimum share, for without it a tiny near cluster
 /// wins; and joining, for plain clothes leave gaps in a body.
 template <typename Scalar>
-ForegroundResult depth_foreground(span<const Scalar> depths_m, const ForegroundOptions& options,
+ForegroundResult depth_foreground(span<const detail::non_deduced<Scalar>> depths_m, const ForegroundOptions& options,
                                   ForegroundWorkspace<Scalar>& workspace, span<char> mask) {
   CFP_ASSERT(mask.size() == depths_m.size());
-  const Ascending<Scalar> ascending =
-      sort_ascending(depths_m, workspace.ascending, [](Scalar depth) { return is_valid_depth(depth); });
-  const span<const Scalar> depths = ascending.values;
+  const SortedValues<Scalar> sorted = sort_values(
+      depths_m, [](Scalar depth) { return is_valid_depth(depth); }, workspace.dbscan.sort);
+  const span<const Scalar> depths = sorted.values;
   const std::size_t n = depths.size();
   ForegroundResult result;
   result.invalid = depths_m.size() - n;
@@ -134,7 +136,7 @@ ForegroundResult depth_foreground(span<const Scalar> depths_m, const ForegroundO
 
   std::size_t count = 0;
   if (n >= options.min_points && n > 0) {
-    result.dbscan = adaptive_options(depths, options.adaptive, workspace.adaptive);
+    result.dbscan = adaptive_options(depths, options.adaptive, workspace.dbscan);
     count = detail::foreground_count(depths, result.dbscan, options, workspace, result.clusters);
     result.status = count > 0 ? ForegroundStatus::ok : ForegroundStatus::no_cluster;
     if (count > 0 && n < options.sure_points) {
@@ -147,7 +149,7 @@ ForegroundResult depth_foreground(span<const Scalar> depths_m, const ForegroundO
     }
   }
   if (result.status != ForegroundStatus::ok) count = n;
-  for (std::size_t i = 0; i < n; ++i) mask[ascending.index[i]] = i < count ? char(1) : char(0);
+  for (std::size_t i = 0; i < n; ++i) mask[sorted.index[i]] = i < count ? char(1) : char(0);
   result.foreground = count;
   result.background = n - count;
   if (count > 0) {
@@ -157,4 +159,5 @@ ForegroundResult depth_foreground(span<const Scalar> depths_m, const ForegroundO
   return result;
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp
