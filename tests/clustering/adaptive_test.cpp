@@ -54,7 +54,7 @@ TEMPLATE_TEST_CASE("Every rule keeps eps above the sensor's noise and survives h
       cfp::AdaptiveOptions options;
       options.rule = rule;
       const cfp::DbscanOptions chosen = cfp::adaptive_options(input, options, workspace);
-      CHECK(invalid_field(chosen) == nullptr);
+      CHECK(!invalid_field(chosen));
     }
     if (rule == cfp::AdaptiveRule::fixed) continue;
     cfp::AdaptiveOptions stereo;
@@ -66,16 +66,15 @@ TEMPLATE_TEST_CASE("Every rule keeps eps above the sensor's noise and survives h
 }
 
 TEST_CASE("Adaptive options outside their range are named", "[clustering]") {
-  CHECK(invalid_field(cfp::AdaptiveOptions{}) == nullptr);
+  CHECK(!invalid_field(cfp::AdaptiveOptions{}));
   const auto named = [](auto change) {
     cfp::AdaptiveOptions options;
     change(options);
-    const char* field = invalid_field(options);
-    return std::string(field == nullptr ? "" : field);
+    return invalid_field(options).string();
   };
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  CHECK(named([&](auto& o) { o.fixed.eps = nan; }) == "eps");
-  CHECK(named([&](auto& o) { o.noise.quadratic = -1; }) == "noise");
+  CHECK(named([&](auto& o) { o.fixed.eps = nan; }) == "fixed.eps");
+  CHECK(named([&](auto& o) { o.noise.quadratic = -1; }) == "noise.quadratic");
   CHECK(named([&](auto& o) { o.noise_factor = nan; }) == "noise_factor");
   CHECK(named([&](auto& o) { o.min_eps_m = 0; }) == "min_eps_m");
   CHECK(named([&](auto& o) { o.max_eps_m = 0.01; }) == "max_eps_m");

@@ -196,7 +196,7 @@ TEMPLATE_TEST_CASE("Depth foreground survives hostile depths", "[clustering]", f
     CHECK(std::all_of(out.mask.begin(), out.mask.end(), [](char m) { return m == 0 || m == 1; }));
     CHECK((out.result.near_m <= out.result.far_m && cfp::is_finite(out.result.near_m) &&
            cfp::is_finite(out.result.far_m)));
-    CHECK(invalid_field(out.result.dbscan) == nullptr);
+    CHECK(!invalid_field(out.result.dbscan));
   }
 }
 
@@ -215,17 +215,17 @@ TEMPLATE_TEST_CASE("Depth foreground allocates nothing after warm-up", "[cluster
 }
 
 TEST_CASE("Foreground options outside their range are named", "[clustering]") {
-  CHECK(invalid_field(cfp::ForegroundOptions{}) == nullptr);
+  CHECK(!invalid_field(cfp::ForegroundOptions{}));
   cfp::ForegroundOptions options;
   options.merge_gap_m = std::numeric_limits<double>::quiet_NaN();
-  CHECK(std::string(invalid_field(options)) == "merge_gap_m");
+  CHECK(invalid_field(options).string() == "merge_gap_m");
   options = {};
   options.min_points = 0;
-  CHECK(std::string(invalid_field(options)) == "min_points");
+  CHECK(invalid_field(options).string() == "min_points");
   options = {};
   options.adaptive.min_share = -0.1;
-  CHECK(std::string(invalid_field(options)) == "min_share");
+  CHECK(invalid_field(options).string() == "adaptive.min_share");
   options.adaptive.min_share = 0;
   options.merge_gap_m = 0;
-  CHECK(invalid_field(options) == nullptr);
+  CHECK(!invalid_field(options));
 }

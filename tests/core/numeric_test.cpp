@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -32,25 +31,6 @@ TEST_CASE("every status has its own name", "[core]") {
   CHECK(std::string(cfp::to_string(Status::degenerate)) == "degenerate");
   CHECK(std::string(cfp::to_string(Status::invalid_input)) == "invalid input");
   CHECK(std::string(cfp::to_string(static_cast<Status>(77))) == "unknown");
-}
-
-namespace example {
-struct Options {
-  double eps = 1;
-};
-const char* invalid_field(const Options& options) noexcept { return options.eps > 0 ? nullptr : "eps"; }
-}  // namespace example
-
-TEST_CASE("validate names the field and accepts the defaults", "[core]") {
-  CHECK_NOTHROW(cfp::validate(example::Options{}));
-  for (const double bad : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
-    try {
-      cfp::validate(example::Options{bad});
-      FAIL("accepted");
-    } catch (const std::invalid_argument& error) {
-      CHECK(std::string(error.what()).find("eps") != std::string::npos);
-    }
-  }
 }
 
 TEST_CASE("chunks cover every index once, in order, and pad with zeros", "[core]") {

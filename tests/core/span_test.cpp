@@ -24,6 +24,27 @@ static_assert(!std::is_convertible_v<std::vector<float>&, span<double>>);
 static_assert(!std::is_convertible_v<Eigen::Block<Eigen::MatrixXd>&, span<double>>);
 static_assert(!std::is_convertible_v<std::vector<bool>&, span<bool>>);
 
+// The element type deduces.
+static_assert(std::is_same_v<decltype(span(std::declval<std::vector<float>&>())), span<float>>);
+static_assert(std::is_same_v<decltype(span(std::declval<const std::vector<float>&>())), span<const float>>);
+static_assert(std::is_same_v<decltype(span(std::declval<Eigen::VectorXd&>())), span<double>>);
+static_assert(std::is_same_v<decltype(span(std::declval<span<int>&>())), span<int>>);
+static_assert(std::is_same_v<decltype(span(std::declval<int (&)[4]>())), span<int>>);
+static_assert(std::is_same_v<cfp::range_value_t<std::vector<float>>, float>);
+static_assert(std::is_same_v<cfp::range_value_t<span<const double>>, double>);
+
+// A PointSpan looks at memory: an expression would have to be evaluated into a temporary first.
+using Columns = Eigen::Matrix2Xf;
+static_assert(std::is_convertible_v<const Columns&, PointSpan<float, 2>>);
+static_assert(std::is_convertible_v<Eigen::Map<const Columns>, PointSpan<float, 2>>);
+static_assert(std::is_convertible_v<decltype(std::declval<const Columns&>().leftCols(2)), PointSpan<float, 2>>);
+static_assert(!std::is_convertible_v<decltype(2.0F * std::declval<const Columns&>()), PointSpan<float, 2>>);
+static_assert(
+    !std::is_convertible_v<decltype(Eigen::Matrix2f() * std::declval<const Columns&>()), PointSpan<float, 2>>);
+static_assert(!std::is_convertible_v<decltype(Eigen::Matrix2Xd().cast<float>()), PointSpan<float, 2>>);
+static_assert(!std::is_convertible_v<const Eigen::Matrix2Xd&, PointSpan<float, 2>>);
+static_assert(!std::is_convertible_v<const Eigen::Matrix3Xf&, PointSpan<float, 2>>);
+
 TEST_CASE("span sees the memory it was given", "[core]") {
   std::vector<int> values = {1, 2, 3, 4};
   const span<int> view(values);
@@ -75,6 +96,32 @@ TEST_CASE("PointSpan reads packed points, points in records, and one array per c
   CHECK(views[3].packed() == columns.data());
   CHECK(views[4].packed() == nullptr);
   CHECK(PointSpan<double, 3>().empty());
+}
+
+TEST_CASE("PointSpan reads Eigen maps and blocks where they lie", "[core]") {
+  std::vector<float> memory(60);
+  for (std::size_t i = 0; i < memory.size(); ++i) memory[i] = static_cast<float>(i);
+  using RowMajor = Eigen::Matrix<float, 2, Eigen::Dynamic, Eigen::RowMajor>;
+  const auto check = [&](const PointSpan<float, 2>& view, const Columns& wanted) {
+    REQUIRE(view.size() == static_cast<std::size_t>(wanted.cols()));
+    for (std::size_t i = 0; i < view.size(); ++i) CHECK(view[i] == wanted.col(static_cast<Eigen::Index>(i)));
+    const float before = memory[20];
+    memory[20] = -1;
+    bool seen = false;
+    for (std::size_t i = 0; i < view.size(); ++i) seen = seen || view(i, 0) == -1 || view(i, 1) == -1;
+    CHECK(seen);
+    memory[20] = before;
+  };
+  const Eigen::Map<const Columns> map(memory.data(), 2, 30);
+  check(map, map);
+  check(map.middleCols(5, 10), map.middleCols(5, 10));
+  const Eigen::Map<const RowMajor> rows(memory.data(), 2, 30);
+  check(rows, rows);
+  const Eigen::Map<const Columns, 0, Eigen::Stride<6, 2>> strided(memory.data(), 2, 10);
+  check(strided, strided);
+  const Eigen::Map<const Eigen::MatrixXf> table(memory.data(), 12, 5);
+  check(table.block(8, 0, 2, 5), table.block(8, 0, 2, 5));
+  check(table.leftCols(2).transpose(), table.leftCols(2).transpose());
 }
 
 TEST_CASE("PointSpan reads three coordinates and double", "[core]") {

@@ -266,11 +266,11 @@ TEST_CASE("Equal calls give equal bits, and warm frames allocate nothing", "[det
 }
 
 TEST_CASE("Tracker options outside their range are named", "[detection]") {
-  CHECK(invalid_field(cfp::BoxTrackerOptions{}) == nullptr);
+  CHECK(!invalid_field(cfp::BoxTrackerOptions{}));
   const auto named = [](auto change) {
     cfp::BoxTrackerOptions options;
     change(options);
-    return std::string(invalid_field(options));
+    return invalid_field(options).string();
   };
   CHECK(named([](auto& o) { o.min_iou = 1; }) == "min_iou");
   CHECK(named([](auto& o) { o.max_coast = -1; }) == "max_coast");

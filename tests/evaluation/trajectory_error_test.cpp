@@ -226,7 +226,7 @@ TEMPLATE_TEST_CASE("Hostile trajectories and options give finite results and a s
   cfp::RelativeErrorOptions options;
   options.delta = std::numeric_limits<double>::quiet_NaN();
   CHECK(cfp::relative_pose_error(view(one), view(one), options, workspace).status == cfp::Status::invalid_input);
-  CHECK(invalid_field(options) == std::string("delta"));
+  CHECK(invalid_field(options).string() == "delta");
   cfp::AbsoluteErrorOptions absolute;
   absolute.association.max_difference_s = -1;
   CHECK(cfp::absolute_trajectory_error(view(one), view(one), absolute, workspace).status == cfp::Status::invalid_input);

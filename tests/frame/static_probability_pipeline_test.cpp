@@ -229,5 +229,5 @@ TEST_CASE("Invalid options name their field", "[pipeline]") {
   CHECK_THROWS_WITH(cfp::validate(options), Catch::Matchers::Contains("health.min_effective_points"));
   options = {};
   options.tracker.max_coast = -1;
-  CHECK(cfp::invalid_field(options) == std::string("max_coast"));
+  CHECK(cfp::invalid_field(options).string() == "tracker.max_coast");
 }

@@ -160,10 +160,9 @@ TEST_CASE("Options outside their range are named", "[optimization][least_squares
   const auto bad = [](auto member, auto value) {
     Options options;
     options.*member = value;
-    const char* field = invalid_field(options);
-    return std::string(field != nullptr ? field : "");
+    return invalid_field(options).string();
   };
-  CHECK(invalid_field(Options{}) == nullptr);
+  CHECK(!invalid_field(Options{}));
   CHECK(bad(&Options::max_iterations, -1) == "max_iterations");
   for (const double value : {0.0, -1.0, nan, inf}) {
     CHECK(bad(&Options::rejected_damping, value) == "rejected_damping");

@@ -103,18 +103,18 @@ TEMPLATE_TEST_CASE("K with M as its prior is Bayes' rule on the odds", "[probabi
 
 TEST_CASE("Map-point options outside their range are named", "[probability]") {
   cfp::MapPointOptions options;
-  CHECK(cfp::invalid_field(options) == nullptr);
+  CHECK(!cfp::invalid_field(options));
   options.rate = 0;
   CHECK_THROWS_WITH(cfp::validate(options), Catch::Matchers::Contains("rate"));
   options = {};
   options.evidence_limit = 0.5;
-  CHECK(cfp::invalid_field(options) == std::string("evidence_limit"));
+  CHECK(cfp::invalid_field(options).string() == "evidence_limit");
   options = {};
   options.deletion_threshold = -0.1;
-  CHECK(cfp::invalid_field(options) == std::string("deletion_threshold"));
+  CHECK(cfp::invalid_field(options).string() == "deletion_threshold");
   options = {};
   options.mismatch_threshold = 0;
-  CHECK(cfp::invalid_field(options) == std::string("mismatch_threshold"));
+  CHECK(cfp::invalid_field(options).string() == "mismatch_threshold");
 }
 
 TEST_CASE("A map point that was never in doubt keeps M = 1 under every policy", "[probability]") {

@@ -127,7 +127,7 @@ TEMPLATE_TEST_CASE("Hostile distances give a probability in range", "[probabilit
       options.score = score;
       options.degrees_of_freedom = k;
       options.min_pairs = 1;
-      if (cfp::invalid_field(options) != nullptr) continue;
+      if (cfp::invalid_field(options)) continue;
       for (const TestType d : hostile) {
         const TestType s = cfp::object_score(d, options);
         CHECK((s >= 0 && s <= 1));
@@ -151,21 +151,21 @@ TEST_CASE("The object score allocates nothing", "[probability]") {
 }
 
 TEST_CASE("Object options outside their range are named", "[probability]") {
-  CHECK(cfp::invalid_field(ObjectProbabilityOptions{}) == nullptr);
+  CHECK(!cfp::invalid_field(ObjectProbabilityOptions{}));
   ObjectProbabilityOptions options;
   options.sigma_px = 0;
   CHECK_THROWS_WITH(cfp::validate(options), Catch::Matchers::Contains("sigma_px"));
   options = {};
   options.positions[1] = std::numeric_limits<double>::quiet_NaN();
-  CHECK(cfp::invalid_field(options) == std::string("positions"));
+  CHECK(cfp::invalid_field(options).string() == "positions");
   options = {};
   options.score = ObjectScore::normalized_density;
   options.degrees_of_freedom = 1;
-  CHECK(cfp::invalid_field(options) == std::string("degrees_of_freedom"));
+  CHECK(cfp::invalid_field(options).string() == "degrees_of_freedom");
   options = {};
   options.min_pairs = 0;
-  CHECK(cfp::invalid_field(options) == std::string("min_pairs"));
+  CHECK(cfp::invalid_field(options).string() == "min_pairs");
   options = {};
   options.unknown_object_probability = 1.5;
-  CHECK(cfp::invalid_field(options) == std::string("unknown_object_probability"));
+  CHECK(cfp::invalid_field(options).string() == "unknown_object_probability");
 }

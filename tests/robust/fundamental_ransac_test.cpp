@@ -283,15 +283,15 @@ TEST_CASE("Too little, coincident or unstructured input is reported and never cr
 
 TEST_CASE("Options outside their range are named", "[geometry]") {
   FundamentalRansacOptions options;
-  CHECK(invalid_field(options) == nullptr);
+  CHECK(!invalid_field(options));
   options.threshold_px = std::numeric_limits<double>::quiet_NaN();
-  CHECK(std::string(invalid_field(options)) == "threshold_px");
+  CHECK(invalid_field(options).string() == "threshold_px");
   options = {};
   options.confidence = 1;
-  CHECK(std::string(invalid_field(options)) == "confidence");
+  CHECK(invalid_field(options).string() == "confidence");
   options = {};
   options.min_inliers = 7;
-  CHECK(std::string(invalid_field(options)) == "min_inliers");
+  CHECK(invalid_field(options).string() == "min_inliers");
 }
 
 TEST_CASE("A second call allocates nothing", "[geometry]") {

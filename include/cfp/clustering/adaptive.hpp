@@ -13,6 +13,7 @@
 #include "cfp/clustering/dbscan.hpp"
 #include "cfp/core/assert.hpp"
 #include "cfp/core/numeric.hpp"
+#include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 
 namespace cfp {
@@ -50,20 +51,25 @@ struct AdaptiveOptions {
   double body_depth_m = 0.5;    ///< the share is raised while the foreground reaches farther behind its depth; > 0
 };
 
-[[nodiscard]] constexpr const char* invalid_field(const AdaptiveOptions& o) noexcept {
-  if (const char* field = invalid_field(o.fixed)) return field;
-  const auto positive = [](double x) { return x > 0.0 && is_finite(x); };
-  const auto non_negative = [](double x) { return x >= 0.0 && is_finite(x); };
-  if (!non_negative(o.noise.constant_m) || !non_negative(o.noise.quadratic) || !is_finite(o.noise.nearest_m))
-    return "noise";
-  if (!non_negative(o.noise_factor)) return "noise_factor";
-  if (!positive(o.min_eps_m)) return "min_eps_m";
+[[nodiscard]] constexpr OptionPath invalid_field(const DepthNoise& noise) noexcept {
+  if (!detail::non_negative(noise.constant_m)) return "constant_m";
+  if (!detail::non_negative(noise.quadratic)) return "quadratic";
+  if (!is_finite(noise.nearest_m)) return "nearest_m";
+  return {};
+}
+
+[[nodiscard]] constexpr OptionPath invalid_field(const AdaptiveOptions& o) noexcept {
+  if (const OptionPath field = nested("fixed", invalid_field(o.fixed))) return field;
+  if (const OptionPath field = nested("noise", invalid_field(o.noise))) return field;
+  if (!detail::non_negative(o.noise_factor)) return "noise_factor";
+  if (!detail::positive(o.min_eps_m)) return "min_eps_m";
   if (!(o.max_eps_m >= o.min_eps_m) || !is_finite(o.max_eps_m)) return "max_eps_m";
-  if (!positive(o.spacing_factor)) return "spacing_factor";
+  if (!detail::positive(o.spacing_factor)) return "spacing_factor";
   if (!(o.min_share >= 0.0 && o.min_share < 1.0)) return "min_share";
   if (!(o.min_density > 0.0 && o.min_density <= 1.0)) return "min_density";
   if (!(o.max_density >= o.min_density && o.max_density <= 1.0)) return "max_density";
-  return positive(o.body_depth_m) ? nullptr : "body_depth_m";
+  if (!detail::positive(o.body_depth_m)) return "body_depth_m";
+  return {};
 }
 
 namespace detail {
@@ -134,7 +140,7 @@ inline namespace CFP_ISA {
 /// share with the nearest end stands. Fewer than three depths, or an eps that overflows: `fixed`. O(n). Allocates only
 /// when the workspace grows. Source: ours; paper IV-C leaves it open.
 template <typename Scalar>
-[[nodiscard]] DbscanOptions adaptive_options(span<const detail::non_deduced<Scalar>> depths,
+[[nodiscard]] DbscanOptions adaptive_options(span<const non_deduced<Scalar>> depths,
                                              const AdaptiveOptions& options, DbscanWorkspace<Scalar>& workspace) {
   CFP_ASSERT(std::is_sorted(depths.begin(), depths.end()));
   const std::size_t n = depths.size();

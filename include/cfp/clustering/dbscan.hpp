@@ -12,6 +12,7 @@
 #include "cfp/clustering/sorted_values.hpp"
 #include "cfp/core/assert.hpp"
 #include "cfp/core/numeric.hpp"
+#include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/status.hpp"
 
@@ -25,9 +26,10 @@ struct DbscanOptions {
   std::size_t min_pts = 5;  ///< a value with at least so many neighbours, itself included, is a core point; >= 1
 };
 
-[[nodiscard]] constexpr const char* invalid_field(const DbscanOptions& options) noexcept {
-  if (!(options.eps >= 0.0) || !is_finite(options.eps)) return "eps";
-  return options.min_pts >= 1 ? nullptr : "min_pts";
+[[nodiscard]] constexpr OptionPath invalid_field(const DbscanOptions& options) noexcept {
+  if (!detail::non_negative(options.eps)) return "eps";
+  if (options.min_pts < 1) return "min_pts";
+  return {};
 }
 
 struct DbscanResult {
@@ -73,7 +75,7 @@ DbscanResult label_sorted(span<const Scalar> values, const DbscanOptions& option
                           std::vector<std::uint32_t>& neighbours, const Emit& emit) {
   DbscanResult result;
   const std::size_t n = values.size(), none = n;
-  if (invalid_field(options) != nullptr) {
+  if (invalid_field(options)) {
     for (std::size_t i = 0; i < n; ++i) emit(i, dbscan_noise);
     result.status = Status::invalid_input;
     result.noise = n;
@@ -115,7 +117,7 @@ inline namespace CFP_ISA {
 /// DBSCAN of values that are finite and ascending already (asserted in debug builds): `labels[i]` belongs to
 /// `values[i]`. As `dbscan` otherwise. O(n).
 template <typename Scalar>
-DbscanResult dbscan_sorted(span<const detail::non_deduced<Scalar>> values, const DbscanOptions& options,
+DbscanResult dbscan_sorted(span<const non_deduced<Scalar>> values, const DbscanOptions& options,
                            DbscanWorkspace<Scalar>& workspace, span<int> labels) {
   CFP_ASSERT(labels.size() == values.size());
   CFP_ASSERT(std::is_sorted(values.begin(), values.end()));
@@ -132,7 +134,7 @@ DbscanResult dbscan_sorted(span<const detail::non_deduced<Scalar>> values, const
 /// when the workspace grows. Departure: the original lets a border point join the cluster that happens to find it
 /// first.
 template <typename Scalar>
-DbscanResult dbscan(span<const detail::non_deduced<Scalar>> values, const DbscanOptions& options,
+DbscanResult dbscan(span<const non_deduced<Scalar>> values, const DbscanOptions& options,
                     DbscanWorkspace<Scalar>& workspace, span<int> labels) {
   CFP_ASSERT(labels.size() == values.size());
   const SortedValues<Scalar> sorted = sort_values(

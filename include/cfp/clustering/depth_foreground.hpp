@@ -13,6 +13,7 @@
 #include "cfp/clustering/sorted_values.hpp"
 #include "cfp/core/assert.hpp"
 #include "cfp/core/numeric.hpp"
+#include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 
 namespace cfp {
@@ -26,10 +27,11 @@ struct ForegroundOptions {
   bool invalid_is_foreground = true;  ///< label of points without a valid depth: true is the safe side
 };
 
-[[nodiscard]] constexpr const char* invalid_field(const ForegroundOptions& options) noexcept {
-  if (const char* field = invalid_field(options.adaptive)) return field;
-  if (!(options.merge_gap_m >= 0.0) || !is_finite(options.merge_gap_m)) return "merge_gap_m";
-  return options.min_points >= 1 ? nullptr : "min_points";
+[[nodiscard]] constexpr OptionPath invalid_field(const ForegroundOptions& options) noexcept {
+  if (const OptionPath field = nested("adaptive", invalid_field(options.adaptive))) return field;
+  if (!detail::non_negative(options.merge_gap_m)) return "merge_gap_m";
+  if (options.min_points < 1) return "min_points";
+  return {};
 }
 
 /// Every way of ending but `ok` says that the depths cannot tell, and labels every point with a valid depth foreground:
@@ -123,7 +125,7 @@ inline namespace CFP_ISA {
 /// the lowest mean depth (dbscan_study shows what they bring): the minimum share, for without it a tiny near cluster
 /// wins; and joining, for plain clothes leave gaps in a body.
 template <typename Scalar>
-ForegroundResult depth_foreground(span<const detail::non_deduced<Scalar>> depths_m, const ForegroundOptions& options,
+ForegroundResult depth_foreground(span<const non_deduced<Scalar>> depths_m, const ForegroundOptions& options,
                                   ForegroundWorkspace<Scalar>& workspace, span<char> mask) {
   CFP_ASSERT(mask.size() == depths_m.size());
   const SortedValues<Scalar> sorted = sort_values(

@@ -41,7 +41,7 @@ inline namespace CFP_ISA {
 /// must refuse NaN and infinities. One counting pass puts the values into buckets of equal width, std::sort orders each
 /// bucket: O(n) unless the values crowd into few buckets, never worse than O(n log n).
 template <typename Scalar, typename Keep>
-SortedValues<Scalar> sort_values(span<const detail::non_deduced<Scalar>> values, const Keep& keep,
+SortedValues<Scalar> sort_values(span<const non_deduced<Scalar>> values, const Keep& keep,
                                  SortWorkspace<Scalar>& workspace) {
   using Item = typename SortWorkspace<Scalar>::Item;
   CFP_ASSERT(values.size() < 0xffffffffU);

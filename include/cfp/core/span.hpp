@@ -49,12 +49,18 @@ template <typename T>
 struct same_type {
   using type = T;
 };
-/// T, not deduced: a parameter span<non_deduced<Scalar>> takes whatever converts, the scalar being given by another
-/// one.
-template <typename T>
-using non_deduced = typename same_type<T>::type;
 
 }  // namespace detail
+
+/// T, not deduced. Scalar deduces from one argument of a call, a workspace, a model or an output struct; every other
+/// parameter is a `span<const non_deduced<Scalar>>`, to which a std::vector converts. Where nothing else carries the
+/// Scalar, the function takes `const Range&` and reads it as `range_value_t<Range>`.
+template <typename T>
+using non_deduced = typename detail::same_type<T>::type;
+
+/// The element type of a contiguous range, without const.
+template <typename Range>
+using range_value_t = std::remove_cv_t<std::remove_pointer_t<decltype(std::declval<const Range&>().data())>>;
 
 /// Pointer and length, as C++20's std::span with dynamic extent. Converts from arrays, std::vector, std::array,
 /// std::span, plain Eigen vectors: whatever has data() and size() over adjacent elements.
@@ -100,6 +106,9 @@ class span {
   std::size_t size_ = 0;
 };
 
+template <typename C>
+span(C&) -> span<std::remove_pointer_t<decltype(std::declval<C&>().data())>>;
+
 namespace detail {
 
 template <typename Point, typename Scalar, int Dim, typename = void>
@@ -133,9 +142,19 @@ class PointSpan {
   PointSpan(const C& points) noexcept
       : PointSpan(reinterpret_cast<const Scalar*>(points.data()), static_cast<std::size_t>(points.size()),
                   sizeof(Element)) {}
-  /// From an Eigen matrix with one point per column.
-  PointSpan(const Eigen::Matrix<Scalar, Dim, Eigen::Dynamic>& columns) noexcept
-      : PointSpan(columns.data(), static_cast<std::size_t>(columns.cols())) {}
+  /// From an Eigen matrix, map or block with one point per column, whatever its strides. What has no memory of its own,
+  /// a product or a cast, does not compile.
+  template <typename Derived,
+            std::enable_if_t<std::is_same_v<typename Derived::Scalar, Scalar> &&
+                                 (Derived::Flags & Eigen::DirectAccessBit) != 0 &&
+                                 (Derived::RowsAtCompileTime == Dim || Derived::RowsAtCompileTime == Eigen::Dynamic),
+                             int> = 0>
+  PointSpan(const Eigen::DenseBase<Derived>& columns) noexcept
+      : PointSpan(columns.derived().data(), static_cast<std::size_t>(columns.cols()),
+                  static_cast<std::size_t>(columns.derived().colStride()) * sizeof(Scalar),
+                  static_cast<std::size_t>(columns.derived().rowStride()) * sizeof(Scalar)) {
+    CFP_ASSERT(columns.rows() == Dim);
+  }
 
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   [[nodiscard]] bool empty() const noexcept { return size_ == 0; }

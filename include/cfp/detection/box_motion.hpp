@@ -24,6 +24,7 @@
 #include <Eigen/Core>
 
 #include "cfp/core/numeric.hpp"
+#include "cfp/core/options.hpp"
 #include "cfp/geometry/box.hpp"
 
 namespace cfp {
@@ -37,21 +38,13 @@ struct BoxMotionOptions {
   double initial_size_rate = 0.2;    ///< the same of the log size rate, per second, > 0
 };
 
-namespace detail {
-/// Named as seen from options that contain these as `motion`.
-[[nodiscard]] inline const char* invalid_motion_field(const BoxMotionOptions& o) noexcept {
-  if (!(o.edge_noise > 0 && o.edge_noise <= 1)) return "motion.edge_noise";
-  if (!(o.centre_acceleration >= 0 && o.centre_acceleration <= 1e6)) return "motion.centre_acceleration";
-  if (!(o.size_acceleration >= 0 && o.size_acceleration <= 1e6)) return "motion.size_acceleration";
-  if (!(o.initial_centre_rate > 0 && o.initial_centre_rate <= 1e6)) return "motion.initial_centre_rate";
-  if (!(o.initial_size_rate > 0 && o.initial_size_rate <= 1e6)) return "motion.initial_size_rate";
-  return nullptr;
-}
-}  // namespace detail
-
-[[nodiscard]] inline const char* invalid_field(const BoxMotionOptions& o) noexcept {
-  const char* field = detail::invalid_motion_field(o);
-  return field == nullptr ? nullptr : field + sizeof("motion.") - 1;
+[[nodiscard]] inline OptionPath invalid_field(const BoxMotionOptions& o) noexcept {
+  if (!(o.edge_noise > 0 && o.edge_noise <= 1)) return "edge_noise";
+  if (!(o.centre_acceleration >= 0 && o.centre_acceleration <= 1e6)) return "centre_acceleration";
+  if (!(o.size_acceleration >= 0 && o.size_acceleration <= 1e6)) return "size_acceleration";
+  if (!(o.initial_centre_rate > 0 && o.initial_centre_rate <= 1e6)) return "initial_centre_rate";
+  if (!(o.initial_size_rate > 0 && o.initial_size_rate <= 1e6)) return "initial_size_rate";
+  return {};
 }
 
 /// One of the four filters: a value, its rate per second, and their covariance.

@@ -26,7 +26,7 @@ class BoxTracker {
  public:
   /// Options outside their ranges are the caller's error: see `validate`.
   explicit BoxTracker(const BoxTrackerOptions& options = {}) : options_(options) {
-    CFP_ASSERT(invalid_field(options) == nullptr);
+    CFP_ASSERT(!invalid_field(options));
   }
 
   /// The next frame, dt_s seconds after the one before (0 for the first). Every detection that counts is output, from

@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "cfp/core/numeric.hpp"
+#include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/status.hpp"
 #include "cfp/detection/box_motion.hpp"
@@ -54,8 +55,8 @@ struct BoxTrackerOptions {
   double image_height = 0;    ///< px
 };
 
-[[nodiscard]] inline const char* invalid_field(const BoxTrackerOptions& o) noexcept {
-  if (const char* field = detail::invalid_motion_field(o.motion)) return field;
+[[nodiscard]] inline OptionPath invalid_field(const BoxTrackerOptions& o) noexcept {
+  if (const OptionPath field = nested("motion", invalid_field(o.motion))) return field;
   if (!(o.min_iou >= 0 && o.min_iou < 1)) return "min_iou";
   if (!is_finite(o.min_score)) return "min_score";
   if (!is_finite(o.birth_score)) return "birth_score";
@@ -66,7 +67,7 @@ struct BoxTrackerOptions {
   if (!(o.max_gap_s > 0 && o.max_gap_s <= 1e6)) return "max_gap_s";
   if (!(o.image_width >= 0 && o.image_width <= 1e6)) return "image_width";
   if (!(o.image_height >= 0 && o.image_height <= 1e6)) return "image_height";
-  return nullptr;
+  return {};
 }
 
 /// One frame's result. `boxes` views the tracker's memory and holds until its next call.

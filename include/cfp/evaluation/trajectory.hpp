@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/math/se3.hpp"
 
@@ -54,10 +55,10 @@ struct AssociationOptions {
   double offset_s = 0;  ///< added to the stamps of the second trajectory, finite
 };
 
-[[nodiscard]] inline const char* invalid_field(const AssociationOptions& options) noexcept {
+[[nodiscard]] inline OptionPath invalid_field(const AssociationOptions& options) noexcept {
   if (!(options.max_difference_s > 0)) return "max_difference_s";
   if (!is_finite(options.offset_s)) return "offset_s";
-  return nullptr;
+  return {};
 }
 
 /// Indices into the two trajectories.

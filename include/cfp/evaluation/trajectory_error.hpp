@@ -28,9 +28,8 @@ struct AbsoluteErrorOptions {
   std::size_t expected_poses = 0;  ///< frames the estimate should have; 0: as many as it has usable poses
 };
 
-[[nodiscard]] inline const char* invalid_field(const AbsoluteErrorOptions& options) noexcept {
-  if (!(options.association.max_difference_s > 0)) return "association.max_difference_s";
-  return is_finite(options.association.offset_s) ? nullptr : "association.offset_s";
+[[nodiscard]] inline OptionPath invalid_field(const AbsoluteErrorOptions& options) noexcept {
+  return nested("association", invalid_field(options.association));
 }
 
 struct AbsoluteErrorResult {
@@ -60,11 +59,11 @@ struct RelativeErrorOptions {
   std::size_t expected_poses = 0;       ///< as in AbsoluteErrorOptions
 };
 
-[[nodiscard]] inline const char* invalid_field(const RelativeErrorOptions& options) noexcept {
-  if (!(options.delta > 0) || !is_finite(options.delta)) return "delta";
+[[nodiscard]] inline OptionPath invalid_field(const RelativeErrorOptions& options) noexcept {
+  if (!detail::positive(options.delta)) return "delta";
   if (!is_finite(options.offset_s)) return "offset_s";
-  if (!(options.scale > 0) || !is_finite(options.scale)) return "scale";
-  return nullptr;
+  if (!detail::positive(options.scale)) return "scale";
+  return {};
 }
 
 struct RelativeErrorResult {
@@ -116,7 +115,7 @@ template <typename Scalar>
   AbsoluteErrorResult result;
   result.alignment = options.alignment;
   detail::clear_errors(workspace);
-  if (invalid_field(options) != nullptr) {
+  if (invalid_field(options)) {
     result.status = Status::invalid_input;
     return result;
   }
@@ -177,7 +176,7 @@ template <typename Scalar>
   result.delta = options.delta;
   result.unit = options.unit;
   detail::clear_errors(workspace);
-  if (invalid_field(options) != nullptr) {
+  if (invalid_field(options)) {
     result.status = Status::invalid_input;
     return result;
   }

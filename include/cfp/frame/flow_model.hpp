@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/frame/object_box.hpp"
 #include "cfp/geometry/camera.hpp"
@@ -30,9 +31,9 @@ struct FlowModelOptions {
   FundamentalRansacOptions ransac;
 };
 
-[[nodiscard]] inline const char* invalid_field(const FlowModelOptions& o) noexcept {
+[[nodiscard]] inline OptionPath invalid_field(const FlowModelOptions& o) noexcept {
   if (o.min_outside_pairs < 8) return "min_outside_pairs";
-  return invalid_field(o.ransac);
+  return nested("ransac", invalid_field(o.ransac));
 }
 
 enum class FlowModelKind : std::uint8_t {

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "cfp/core/numeric.hpp"
+#include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/frame/object_box.hpp"
 
@@ -18,8 +19,9 @@ struct HealthOptions {
       10;  ///< fewer effective observations than this are no base for a pose (ORB-SLAM2's 10), >= 0
 };
 
-[[nodiscard]] inline const char* invalid_field(const HealthOptions& o) noexcept {
-  return o.min_effective_points >= 0 && is_finite(o.min_effective_points) ? nullptr : "health.min_effective_points";
+[[nodiscard]] inline OptionPath invalid_field(const HealthOptions& o) noexcept {
+  if (!detail::non_negative(o.min_effective_points)) return "min_effective_points";
+  return {};
 }
 
 enum class WeightFallback : std::uint8_t {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cfp/clustering/depth_foreground.hpp"
+#include "cfp/core/options.hpp"
 #include "cfp/detection/box_tracker_types.hpp"
 #include "cfp/frame/flow_model.hpp"
 #include "cfp/frame/health.hpp"
@@ -126,28 +127,32 @@ enum class Variant : std::uint8_t {
   return base;
 }
 
-[[nodiscard]] inline const char* invalid_field(const FirstStageOptions& o) noexcept {
-  if (!(o.object_threshold > 0 && o.object_threshold < 1)) return "first.object_threshold";
-  if (const char* field = invalid_field(o.flow)) return field;
-  if (const char* field = invalid_field(o.object)) return field;
-  return invalid_field(o.foreground);
+[[nodiscard]] inline OptionPath invalid_field(const FirstStageOptions& o) noexcept {
+  if (!detail::inside_unit_interval(o.object_threshold)) return "object_threshold";
+  if (const OptionPath field = nested("flow", invalid_field(o.flow))) return field;
+  if (const OptionPath field = nested("object", invalid_field(o.object))) return field;
+  return nested("foreground", invalid_field(o.foreground));
 }
 
-[[nodiscard]] inline const char* invalid_field(const SecondStageOptions& o) noexcept {
-  if (!(o.object_threshold > 0 && o.object_threshold < 1)) return "second.object_threshold";
-  if (!(o.min_pose_inliers >= 0) || !is_finite(o.min_pose_inliers)) return "second.min_pose_inliers";
-  if (!(o.min_translation_m >= 0)) return "second.min_translation_m";
-  if (!(o.min_parallax >= 0)) return "second.min_parallax";
-  if (const char* field = invalid_field(o.projection)) return field;
-  if (const char* field = invalid_field(o.epipolar)) return field;
-  return invalid_field(o.map_point);
+[[nodiscard]] inline OptionPath invalid_field(const SecondStageOptions& o) noexcept {
+  if (!detail::inside_unit_interval(o.object_threshold)) return "object_threshold";
+  if (!detail::non_negative(o.min_pose_inliers)) return "min_pose_inliers";
+  if (!(o.min_translation_m >= 0)) return "min_translation_m";
+  if (!(o.min_parallax >= 0)) return "min_parallax";
+  if (const OptionPath field = nested("projection", invalid_field(o.projection))) return field;
+  if (const OptionPath field = nested("epipolar", invalid_field(o.epipolar))) return field;
+  return nested("map_point", invalid_field(o.map_point));
 }
 
-[[nodiscard]] inline const char* invalid_field(const PipelineOptions& o) noexcept {
-  if (const char* field = invalid_field(o.tracker)) return field;
-  if (const char* field = invalid_field(o.first)) return field;
-  if (const char* field = invalid_field(o.second)) return field;
-  return invalid_field(o.health);
+[[nodiscard]] inline OptionPath invalid_field(const PipelineOptions& o) noexcept {
+  if (const OptionPath field = nested("tracker", invalid_field(o.tracker))) return field;
+  if (const OptionPath field = nested("first", invalid_field(o.first))) return field;
+  if (const OptionPath field = nested("second", invalid_field(o.second))) return field;
+  if (const OptionPath field = nested("health", invalid_field(o.health))) return field;
+  if (o.use_boxes && o.classes.empty()) return "classes";
+  // One threshold of the paper, read by both stages.
+  if (o.second.object_threshold != o.first.object_threshold) return "second.object_threshold";
+  return {};
 }
 
 }  // namespace cfp

@@ -88,7 +88,7 @@ class StaticProbabilityPipeline {
   /// Options outside their ranges are the caller's error: see `validate`.
   explicit StaticProbabilityPipeline(const PipelineOptions& options = {})
       : options_(options), tracker_(options.tracker) {
-    CFP_ASSERT(invalid_field(options) == nullptr);
+    CFP_ASSERT(!invalid_field(options));
   }
 
   /// solve_pose(Stage, span<const Scalar> weight) -> PoseEstimate: the host's optimiser over its own observations,

@@ -104,9 +104,8 @@ template <typename Scalar>
 /// epipolar_distance of every correspondence; equal to the scalar function up to a few roundings. Vectorised; allocates
 /// nothing; the result of a pair does not depend on its place in the arrays.
 template <typename Scalar>
-void epipolar_distances(const Matrix3<Scalar>& F, const PointSpan<detail::non_deduced<Scalar>, 2>& prev,
-                        const PointSpan<detail::non_deduced<Scalar>, 2>& cur,
-                        span<detail::non_deduced<Scalar>> out) noexcept {
+void epipolar_distances(const Matrix3<Scalar>& F, const PointSpan<non_deduced<Scalar>, 2>& prev,
+                        const PointSpan<non_deduced<Scalar>, 2>& cur, span<non_deduced<Scalar>> out) noexcept {
   CFP_ASSERT(prev.size() == cur.size() && prev.size() == out.size());
   const Matrix3<Scalar> G = detail::unit_scale(F);
   const Scalar noise = detail::line_noise(G);

@@ -27,9 +27,8 @@ template <typename Scalar>
 
 /// transfer_distance of every correspondence. Allocates nothing.
 template <typename Scalar>
-void transfer_distances(const Matrix3<Scalar>& H, const PointSpan<detail::non_deduced<Scalar>, 2>& prev,
-                        const PointSpan<detail::non_deduced<Scalar>, 2>& cur,
-                        span<detail::non_deduced<Scalar>> out) noexcept {
+void transfer_distances(const Matrix3<Scalar>& H, const PointSpan<non_deduced<Scalar>, 2>& prev,
+                        const PointSpan<non_deduced<Scalar>, 2>& cur, span<non_deduced<Scalar>> out) noexcept {
   CFP_ASSERT(prev.size() == out.size() && cur.size() == out.size());
   for (std::size_t i = 0; i < out.size(); ++i) out[i] = transfer_distance<Scalar>(H, prev[i], cur[i]);
 }

@@ -33,8 +33,7 @@ template <typename Scalar>
 /// d_T = || pixel_cur - project(T_cur_prev * depth_prev * ray(pixel_prev)) ||, depth along z in metres.
 template <typename Camera, typename Scalar>
 [[nodiscard]] Scalar reprojection_distance(const Camera& camera, const SE3<Scalar>& T_cur_prev,
-                                           const Vector2<Scalar>& pixel_prev,
-                                           const detail::non_deduced<Scalar>& depth_prev,
+                                           const Vector2<Scalar>& pixel_prev, const non_deduced<Scalar>& depth_prev,
                                            const Vector2<Scalar>& pixel_cur) noexcept {
   using std::sqrt;
   Vector3<Scalar> ray = Vector3<Scalar>::Zero();
@@ -64,11 +63,9 @@ void reprojection_distances(const Camera& camera, const SE3<typename Camera::Sca
 /// The same for the pinhole camera, vectorised. Equal to the scalar function up to rounding; the result of a keypoint
 /// does not depend on its place in the arrays.
 template <typename Scalar>
-void reprojection_distances(const PinholeCamera<Scalar>& camera, const SE3<detail::non_deduced<Scalar>>& T_cur_prev,
-                            const PointSpan<detail::non_deduced<Scalar>, 2>& prev,
-                            span<const detail::non_deduced<Scalar>> depth_prev,
-                            const PointSpan<detail::non_deduced<Scalar>, 2>& cur,
-                            span<detail::non_deduced<Scalar>> out) noexcept {
+void reprojection_distances(const PinholeCamera<Scalar>& camera, const SE3<non_deduced<Scalar>>& T_cur_prev,
+                            const PointSpan<non_deduced<Scalar>, 2>& prev, span<const non_deduced<Scalar>> depth_prev,
+                            const PointSpan<non_deduced<Scalar>, 2>& cur, span<non_deduced<Scalar>> out) noexcept {
   CFP_ASSERT(prev.size() == out.size() && depth_prev.size() == out.size() && cur.size() == out.size());
   const Matrix3<Scalar> R = T_cur_prev.rotation;
   const Vector3<Scalar> t = T_cur_prev.translation;

@@ -19,6 +19,7 @@
 #include <Eigen/Core>
 
 #include "cfp/core/numeric.hpp"
+#include "cfp/core/options.hpp"
 #include "cfp/math/normal_equations.hpp"
 #include "cfp/optimization/solver_status.hpp"
 
@@ -46,17 +47,16 @@ struct LeastSquaresResult {
 inline namespace CFP_ISA {
 
 /// The first field outside its range, or nullptr.
-[[nodiscard]] inline const char* invalid_field(const LevenbergMarquardtOptions& options) noexcept {
-  const auto not_negative = [](double x) { return x >= 0 && is_finite(x); };
+[[nodiscard]] inline OptionPath invalid_field(const LevenbergMarquardtOptions& options) noexcept {
   if (!(options.max_iterations >= 0)) return "max_iterations";
-  if (!not_negative(options.initial_damping)) return "initial_damping";
-  if (!not_negative(options.min_damping)) return "min_damping";
-  if (!(options.rejected_damping > 0) || !is_finite(options.rejected_damping)) return "rejected_damping";
+  if (!detail::non_negative(options.initial_damping)) return "initial_damping";
+  if (!detail::non_negative(options.min_damping)) return "min_damping";
+  if (!detail::positive(options.rejected_damping)) return "rejected_damping";
   if (!(options.max_damping >= options.min_damping && options.max_damping > 0) || !is_finite(options.max_damping))
     return "max_damping";
-  if (!not_negative(options.min_relative_decrease)) return "min_relative_decrease";
-  if (!not_negative(options.min_absolute_decrease)) return "min_absolute_decrease";
-  return nullptr;
+  if (!detail::non_negative(options.min_relative_decrease)) return "min_relative_decrease";
+  if (!detail::non_negative(options.min_absolute_decrease)) return "min_absolute_decrease";
+  return {};
 }
 
 /// The damping factor lambda of (H + lambda D) h = -g, and the decision about each step.

@@ -14,6 +14,7 @@
 #include <limits>
 
 #include "cfp/core/numeric.hpp"
+#include "cfp/core/options.hpp"
 #include "cfp/simd/packet.hpp"
 
 namespace cfp {
@@ -133,9 +134,10 @@ struct RobustLoss {
 
 /// The first field of a loss outside its range, or nullptr.
 template <typename Scalar>
-[[nodiscard]] const char* invalid_field(const RobustLoss<Scalar>& loss) noexcept {
+[[nodiscard]] OptionPath invalid_field(const RobustLoss<Scalar>& loss) noexcept {
   if (!(static_cast<unsigned>(loss.type) <= static_cast<unsigned>(LossType::truncated))) return "type";
-  return loss.delta > Scalar(0) && is_finite(loss.delta) ? nullptr : "delta";
+  if (!(loss.delta > Scalar(0) && is_finite(loss.delta))) return "delta";
+  return {};
 }
 
 }  // namespace cfp

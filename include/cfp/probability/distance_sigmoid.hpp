@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 
 #include "cfp/core/numeric.hpp"
+#include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/status.hpp"
 #include "cfp/geometry/distance.hpp"
@@ -26,11 +27,11 @@ struct ConstraintOptions {
       10;  ///< fewer distances outside the boxes than this, and the constraint has nothing to say, >= 1
 };
 
-[[nodiscard]] inline const char* invalid_field(const ConstraintOptions& o) noexcept {
+[[nodiscard]] inline OptionPath invalid_field(const ConstraintOptions& o) noexcept {
   if (!(o.quantile > 0 && o.quantile <= 1)) return "quantile";
-  if (!(o.steepness > 0) || !is_finite(o.steepness)) return "steepness";
+  if (!detail::positive(o.steepness)) return "steepness";
   if (o.min_samples < 1) return "min_samples";
-  return nullptr;
+  return {};
 }
 
 /// The sigmoid of one frame, fitted to the keypoints outside all boxes of potentially moving objects.

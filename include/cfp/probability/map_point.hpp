@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "cfp/core/numeric.hpp"
+#include "cfp/core/options.hpp"
 
 namespace cfp {
 
@@ -30,12 +31,12 @@ struct MapPointOptions {
   WeightRule weight = WeightRule::product;  ///< how K and M give one weight (paper: "as weights")
 };
 
-[[nodiscard]] inline const char* invalid_field(const MapPointOptions& o) noexcept {
+[[nodiscard]] inline OptionPath invalid_field(const MapPointOptions& o) noexcept {
   if (!(o.rate > 0 && o.rate <= 1)) return "rate";
   if (!(o.evidence_limit > 0 && o.evidence_limit < 0.5)) return "evidence_limit";
   if (!(o.deletion_threshold >= 0 && o.deletion_threshold <= 1)) return "deletion_threshold";
   if (!(o.mismatch_threshold > 0 && o.mismatch_threshold <= 1)) return "mismatch_threshold";
-  return nullptr;
+  return {};
 }
 
 namespace detail {

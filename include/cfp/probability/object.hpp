@@ -10,6 +10,7 @@
 #include <cstdint>
 
 #include "cfp/core/numeric.hpp"
+#include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/status.hpp"
 #include "cfp/geometry/distance.hpp"
@@ -42,16 +43,16 @@ struct ObjectProbabilityOptions {
   double unknown_object_probability = 0.5;
 };
 
-[[nodiscard]] inline const char* invalid_field(const ObjectProbabilityOptions& o) noexcept {
-  if (!(o.degrees_of_freedom > 0) || !is_finite(o.degrees_of_freedom)) return "degrees_of_freedom";
+[[nodiscard]] inline OptionPath invalid_field(const ObjectProbabilityOptions& o) noexcept {
+  if (!detail::positive(o.degrees_of_freedom)) return "degrees_of_freedom";
   if (o.score == ObjectScore::normalized_density && o.degrees_of_freedom < 2) return "degrees_of_freedom";
-  if (!(o.sigma_px > 0) || !is_finite(o.sigma_px)) return "sigma_px";
+  if (!detail::positive(o.sigma_px)) return "sigma_px";
   if (!(o.positions[0] > 0 && o.positions[0] <= o.positions[1] && o.positions[1] <= o.positions[2] &&
         o.positions[2] <= 1))
     return "positions";
   if (o.min_pairs < 1) return "min_pairs";
   if (!(o.unknown_object_probability >= 0 && o.unknown_object_probability <= 1)) return "unknown_object_probability";
-  return nullptr;
+  return {};
 }
 
 /// The static probability of one object and where it comes from.

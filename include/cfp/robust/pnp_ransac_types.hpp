@@ -22,13 +22,13 @@ struct PnpRansacOptions {
   std::uint64_t seed = 0;                  ///< same input and seed, same bits
 };
 
-[[nodiscard]] inline const char* invalid_field(const PnpRansacOptions& options) noexcept {
+[[nodiscard]] inline OptionPath invalid_field(const PnpRansacOptions& options) noexcept {
   if (!(options.threshold_px > 0 && options.threshold_px < 1e4)) return "threshold_px";
-  if (!(options.confidence > 0 && options.confidence < 1)) return "confidence";
+  if (!detail::inside_unit_interval(options.confidence)) return "confidence";
   if (options.max_iterations < 1) return "max_iterations";
   if (options.min_iterations > options.max_iterations) return "min_iterations";
   if (options.min_inliers < 4) return "min_inliers";
-  return nullptr;
+  return {};
 }
 
 enum class PnpRansacReason : std::uint8_t {

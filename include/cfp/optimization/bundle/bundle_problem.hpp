@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstring>
 
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
@@ -50,22 +49,12 @@ struct BundleOptions {
 };
 
 /// The first field outside its range, or nullptr.
-[[nodiscard]] inline const char* invalid_field(const BundleOptions& options) noexcept {
-  constexpr const char* nested[] = {
-      "levenberg_marquardt.max_iterations",       "levenberg_marquardt.initial_damping",
-      "levenberg_marquardt.min_damping",          "levenberg_marquardt.rejected_damping",
-      "levenberg_marquardt.max_damping",          "levenberg_marquardt.min_relative_decrease",
-      "levenberg_marquardt.min_absolute_decrease"};
-  if (const char* field = invalid_field(options.levenberg_marquardt)) {
-    for (const char* name : nested) {
-      if (std::strcmp(std::strchr(name, '.') + 1, field) == 0) return name;
-    }
-    return "levenberg_marquardt";
-  }
-  if (invalid_field(RobustLoss<double>{options.loss, 1.0}) != nullptr) return "loss";
-  if (!(options.chi2_mono > 0) || !is_finite(options.chi2_mono)) return "chi2_mono";
-  if (!(options.chi2_stereo > 0) || !is_finite(options.chi2_stereo)) return "chi2_stereo";
-  return nullptr;
+[[nodiscard]] inline OptionPath invalid_field(const BundleOptions& options) noexcept {
+  if (const OptionPath field = nested("levenberg_marquardt", invalid_field(options.levenberg_marquardt))) return field;
+  if (invalid_field(RobustLoss<double>{options.loss, 1.0})) return "loss";
+  if (!detail::positive(options.chi2_mono)) return "chi2_mono";
+  if (!detail::positive(options.chi2_stereo)) return "chi2_stereo";
+  return {};
 }
 
 /// Every observation is counted once: used + zero_weight + invalid + behind = all.

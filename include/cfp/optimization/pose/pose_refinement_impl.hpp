@@ -241,7 +241,7 @@ PoseResult refine_pose_with(const PoseObservations<Input>& observations, const C
                             PoseWorkspace<scalar_of<P>>& workspace, span<char> inliers) {
   const std::size_t n = observations.points.size();
   const auto fits = [n](std::size_t size) { return size == 0 || size == n; };
-  CFP_ASSERT(invalid_field(options) == nullptr && observations.pixels.size() == n);
+  CFP_ASSERT(!invalid_field(options) && observations.pixels.size() == n);
   CFP_ASSERT(fits(observations.weights.size()) && fits(observations.sigmas.size()) &&
              fits(observations.inverse_sigmas_sq.size()));
   CFP_ASSERT(fits(observations.depths.size()) && fits(observations.u_right.size()) && fits(inliers.size()));

@@ -71,22 +71,25 @@ struct PoseOptions {
 }
 
 /// The first field outside its range, or nullptr.
-[[nodiscard]] inline const char* invalid_field(const PoseOptions& options) noexcept {
-  const auto positive = [](double x) { return x > 0 && is_finite(x); };
-  if (!positive(options.chi2_mono)) return "chi2_mono";
-  if (!positive(options.chi2_stereo)) return "chi2_stereo";
+[[nodiscard]] inline OptionPath invalid_field(const PoseRound& round) noexcept {
+  if (!(static_cast<unsigned>(round.loss) <= static_cast<unsigned>(LossType::truncated))) return "loss";
+  if (!detail::positive(round.scale)) return "scale";
+  if (!(round.max_iterations >= 1)) return "max_iterations";
+  if (!detail::positive(round.min_decrease)) return "min_decrease";
+  if (!detail::non_negative(round.min_mean_decrease)) return "min_mean_decrease";
+  return {};
+}
+
+[[nodiscard]] inline OptionPath invalid_field(const PoseOptions& options) noexcept {
+  if (!detail::positive(options.chi2_mono)) return "chi2_mono";
+  if (!detail::positive(options.chi2_stereo)) return "chi2_stereo";
   if (!(static_cast<unsigned>(options.convention) <= 1U)) return "convention";
   if (!(options.min_observations >= 3)) return "min_observations";
   if (!(options.round_count >= 1 && options.round_count <= PoseOptions::max_rounds)) return "round_count";
   for (std::size_t i = 0; i < options.round_count; ++i) {
-    const PoseRound& round = options.rounds[i];
-    if (!(static_cast<unsigned>(round.loss) <= static_cast<unsigned>(LossType::truncated))) return "rounds.loss";
-    if (!positive(round.scale)) return "rounds.scale";
-    if (!(round.max_iterations >= 1)) return "rounds.max_iterations";
-    if (!positive(round.min_decrease)) return "rounds.min_decrease";
-    if (!(round.min_mean_decrease >= 0) || !is_finite(round.min_mean_decrease)) return "rounds.min_mean_decrease";
+    if (const OptionPath field = nested("rounds", invalid_field(options.rounds[i]))) return field;
   }
-  return nullptr;
+  return {};
 }
 
 /// Why a refinement ended. The pose was changed for the first three only.
