@@ -78,8 +78,14 @@ void estimate_objects(const FirstStageInput<Scalar>& in, const Camera& camera, s
   if (in.fundamental != nullptr) {
     model.matrix = *in.fundamental;
   } else {
-    model = estimate_flow_model(previous, current, in.flow_current, in.boxes, undistorted_camera(camera), options.flow,
-                                work.flow);
+    work.is_foreground.assign(n, char(1));
+    for (std::size_t i = 0; i < n; ++i) {
+      for (const ObjectBox<Scalar>& b : in.boxes) {
+        if (contains(b.box, in.flow_current(i, 0), in.flow_current(i, 1))) work.is_foreground[i] = 0;
+      }
+    }
+    model = estimate_flow_model(previous, current, span<const char>(work.is_foreground), undistorted_camera(camera),
+                                options.flow, work.flow);
   }
   result.flow_model = model.kind;
   result.flow_support = model.support;

@@ -11,7 +11,6 @@
 
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
-#include "cfp/frame/object_box.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/homography.hpp"
@@ -65,41 +64,32 @@ struct FlowModelWorkspace {
   FundamentalRansacWorkspace ransac;
 };
 
-namespace detail {
-
-template <typename Scalar>
-[[nodiscard]] bool inside_any(span<const ObjectBox<Scalar>> boxes, Scalar x, Scalar y) noexcept {
-  return std::any_of(boxes.begin(), boxes.end(), [x, y](const ObjectBox<Scalar>& b) { return contains(b.box, x, y); });
-}
-
-}  // namespace detail
-
-/// The model of undistorted pairs, estimated from those whose current pixel (in the image of the boxes, `pixels`) lies
-/// outside all boxes when there are enough, else from all. The camera tells a rotation from a plane.
+/// The model of undistorted pairs, estimated from those that `outside` marks as outside all boxes when there are enough,
+/// else from all. The camera, that of the undistorted image, tells a rotation from a plane.
 template <typename Scalar>
 FlowModel<Scalar> estimate_flow_model(const PointSpan<Scalar, 2>& previous, const PointSpan<Scalar, 2>& current,
-                                      const PointSpan<Scalar, 2>& pixels, span<const ObjectBox<Scalar>> boxes,
+                                      span<const char> outside,
                                       const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
                                       FlowModelWorkspace<Scalar>& work) {
-  CFP_ASSERT(previous.size() == current.size() && pixels.size() == current.size());
+  CFP_ASSERT(previous.size() == current.size() && outside.size() == current.size());
   work.outside_previous.clear();
   work.outside_current.clear();
-  work.outside_previous.reserve(pixels.size());
-  work.outside_current.reserve(pixels.size());
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    if (detail::inside_any(boxes, pixels(i, 0), pixels(i, 1))) continue;
+  work.outside_previous.reserve(outside.size());
+  work.outside_current.reserve(outside.size());
+  for (std::size_t i = 0; i < outside.size(); ++i) {
+    if (outside[i] == 0) continue;
     work.outside_previous.push_back({previous(i, 0), previous(i, 1)});
     work.outside_current.push_back({current(i, 0), current(i, 1)});
   }
-  const bool outside = work.outside_current.size() >= options.min_outside_pairs;
-  const PointSpan<Scalar, 2> support_previous = outside ? PointSpan<Scalar, 2>(work.outside_previous) : previous;
-  const PointSpan<Scalar, 2> support_current = outside ? PointSpan<Scalar, 2>(work.outside_current) : current;
+  const bool enough = work.outside_current.size() >= options.min_outside_pairs;
+  const PointSpan<Scalar, 2> support_previous = enough ? PointSpan<Scalar, 2>(work.outside_previous) : previous;
+  const PointSpan<Scalar, 2> support_current = enough ? PointSpan<Scalar, 2>(work.outside_current) : current;
   const FundamentalResult<Scalar> estimate = fundamental_ransac(support_previous, support_current, span<const Scalar>(),
                                                                 span<char>(), options.ransac, work.ransac, &camera);
 
   FlowModel<Scalar> model;
   model.reason = estimate.reason;
-  model.support = outside ? FlowSupport::outside_pairs : FlowSupport::all_pairs;
+  model.support = enough ? FlowSupport::outside_pairs : FlowSupport::all_pairs;
   const bool rotation =
       estimate.reason == FundamentalReason::no_motion || estimate.reason == FundamentalReason::pure_rotation;
   if (estimate.has_fundamental()) {

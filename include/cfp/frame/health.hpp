@@ -9,7 +9,7 @@
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
-#include "cfp/frame/object_box.hpp"
+#include "cfp/frame/frame.hpp"
 
 namespace cfp {
 
@@ -62,6 +62,12 @@ template <typename Scalar>
   return health;
 }
 
+/// Whether a fallback raises the weight of a keypoint with this label to 1.
+[[nodiscard]] constexpr bool is_raised(KeypointLabel label, WeightFallback fallback) noexcept {
+  return fallback == WeightFallback::all ? label != KeypointLabel::invalid
+                                         : fallback == WeightFallback::background && label == KeypointLabel::background;
+}
+
 /// frame_health, and the fallback: while the effective observations are fewer than min_effective_points, the weights of
 /// the background keypoints are raised to 1, then those of all keypoints with a map point. The figures are those of the
 /// model's own weights; `fallback` says what was done. Allocates nothing.
@@ -69,20 +75,15 @@ template <typename Scalar>
 FrameHealth apply_fallback(span<const KeypointLabel> label, span<const Scalar> map_point_probability,
                            span<Scalar> weight, const HealthOptions& options) noexcept {
   FrameHealth health = frame_health(label, map_point_probability, span<const Scalar>(weight));
-  if (!options.use_fallback || health.effective_points >= options.min_effective_points) return health;
-  const auto raise = [&](auto&& applies) {
+  double effective_points = health.effective_points;
+  for (const WeightFallback fallback : {WeightFallback::background, WeightFallback::all}) {
+    if (!options.use_fallback || effective_points >= options.min_effective_points) break;
+    health.fallback = fallback;
     for (std::size_t i = 0; i < weight.size(); ++i) {
-      if (map_point_probability[i] >= Scalar(0) && label[i] != KeypointLabel::invalid && applies(label[i]))
-        weight[i] = Scalar(1);
+      if (map_point_probability[i] >= Scalar(0) && is_raised(label[i], fallback)) weight[i] = Scalar(1);
     }
-  };
-  raise([](KeypointLabel l) { return l == KeypointLabel::background; });
-  health.fallback = WeightFallback::background;
-  if (frame_health(label, map_point_probability, span<const Scalar>(weight)).effective_points >=
-      options.min_effective_points)
-    return health;
-  raise([](KeypointLabel) { return true; });
-  health.fallback = WeightFallback::all;
+    effective_points = frame_health(label, map_point_probability, span<const Scalar>(weight)).effective_points;
+  }
   return health;
 }
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "cfp/frame/frame.hpp"
 #include "cfp/geometry/box.hpp"
 
 namespace cfp {
@@ -18,18 +19,5 @@ struct ObjectBox {
   bool associated =
       true;  ///< continues a box of frame k-1 (paper IV-D: the foreground of one that does not is not trusted)
 };
-
-/// How a keypoint stands to the boxes.
-enum class KeypointLabel : std::uint8_t {
-  outside,     ///< in no box: K = 1, never changed
-  foreground,  ///< on the object of its ruling box
-  background,  ///< inside the ruling box, behind its object
-  invalid      ///< its pixel is not finite: K = 0
-};
-
-/// ruling_box of a keypoint in no box.
-inline constexpr std::int32_t no_box = -1;
-/// match of a keypoint without one.
-inline constexpr std::int32_t no_match = -1;
 
 }  // namespace cfp

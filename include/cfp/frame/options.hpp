@@ -10,6 +10,7 @@
 #include "cfp/core/options.hpp"
 #include "cfp/detection/box_tracker_types.hpp"
 #include "cfp/frame/flow_model.hpp"
+#include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/health.hpp"
 #include "cfp/probability/distance_sigmoid.hpp"
 #include "cfp/probability/map_point.hpp"
@@ -47,13 +48,6 @@ struct SecondStageOptions {
   MapPointOptions map_point;
 };
 
-/// A detector class whose objects can move.
-struct ObjectClass {
-  int class_id = 0;
-  bool non_rigid =
-      true;  ///< people and animals: separated from the background by depth; rigid: all inside is foreground
-};
-
 struct PipelineOptions {
   bool use_boxes = true;                           ///< false: detections are ignored, K = 1 everywhere (plain SLAM)
   std::vector<ObjectClass> classes = {{0, true}};  ///< boxes of other classes are ignored; 0 is the person of COCO
@@ -63,40 +57,8 @@ struct PipelineOptions {
   HealthOptions health;
 };
 
-/// The systems of the paper's Table IV, and plain SLAM.
-enum class Variant : std::uint8_t {
-  cfp,         ///< CFP-SLAM: everything
-  cfp_minus,   ///< CFP-SLAM-: without the object stage, every object is high dynamic
-  no_mdc,      ///< W/O-MDC: without missed-detection compensation
-  no_dbscan,   ///< W/O-DBS: without depth clustering, all in a box is foreground
-  no_ksp,      ///< W/O-KSP: foreground keypoints are removed, all others count fully
-  only_boxes,  ///< Only-YOLO: all keypoints in detected boxes are removed
-  plain        ///< no dynamic handling at all
-};
-
-/// The enumerator's name as the example programs spell it.
-[[nodiscard]] constexpr const char* to_string(Variant variant) noexcept {
-  switch (variant) {
-    case Variant::cfp:
-      return "cfp";
-    case Variant::cfp_minus:
-      return "cfp-minus";
-    case Variant::no_mdc:
-      return "no-mdc";
-    case Variant::no_dbscan:
-      return "no-dbscan";
-    case Variant::no_ksp:
-      return "no-ksp";
-    case Variant::only_boxes:
-      return "only-boxes";
-    case Variant::plain:
-      return "plain";
-  }
-  return "unknown";
-}
-
 /// The options of a variant: `base` with that variant's parts switched off, nothing else changed.
-[[nodiscard]] inline PipelineOptions variant_options(Variant variant, PipelineOptions base = {}) {
+[[nodiscard]] inline PipelineOptions variant_options(Variant variant, PipelineOptions base) {
   switch (variant) {
     case Variant::cfp:
       break;

@@ -12,14 +12,13 @@
 #include "cfp/core/span.hpp"
 #include "cfp/detection/box_tracker.hpp"
 #include "cfp/frame/first_stage.hpp"
+#include "cfp/frame/frame_state.hpp"
 #include "cfp/frame/health.hpp"
 #include "cfp/frame/object_box.hpp"
 #include "cfp/frame/options.hpp"
 #include "cfp/frame/second_stage.hpp"
 
 namespace cfp {
-
-enum class Stage : std::uint8_t { first, second };
 
 /// The parts of a frame, in their order. An observer is told at the end of each.
 enum class PipelineStep : std::uint8_t {
@@ -35,13 +34,6 @@ enum class PipelineStep : std::uint8_t {
 struct NoObserver {
   template <typename Result>
   void operator()(PipelineStep, const Result&) const noexcept {}
-};
-
-/// What the host's pose solver answers.
-struct PoseEstimate {
-  SE3<double> T_cur_prev;   ///< maps points of camera k-1 into camera k
-  std::size_t inliers = 0;  ///< N_BA
-  bool valid = false;       ///< false: the solver has no pose; the second stage is then left out
 };
 
 /// Frame k as the host has it. Empty arrays mean "none", except for keypoints.
@@ -71,7 +63,7 @@ struct FrameResult {
   span<const TrackedBox<Scalar>> boxes;   ///< of potentially moving classes: detected and compensated
   span<const ObjectProbability> objects;  ///< O, one per box
   PoseEstimate pose;                      ///< of the last stage that had one
-  Stage stage = Stage::first;             ///< the last stage that ran
+  Stage stage = Stage::coarse;             ///< the last stage that ran
   FirstStageResult first;
   SecondStageResult second;
   FrameHealth health;        ///< of the weights of that stage, fallback included
@@ -126,7 +118,7 @@ class StaticProbabilityPipeline {
     }
     for (std::size_t i = 0; i < n; ++i)
       weight_[i] = observation_weight(k_[i], m[i] >= Scalar(0) ? m[i] : Scalar(1), options_.second.map_point.weight);
-    solve(Stage::first, m, solve_pose, result);
+    solve(Stage::coarse, m, solve_pose, result);
     observe(PipelineStep::first_pose, result);
     if (result.pose.valid && has_previous_ && !frame.match.empty()) {
       const SecondStageInput<Scalar> second{
@@ -134,7 +126,7 @@ class StaticProbabilityPipeline {
           previous_keypoints_, previous_depths_, frame.match, result.pose.T_cur_prev, result.pose.inliers};
       result.second = second_stage(second, camera, {k_, m, weight_}, options_.second, second_work_);
       observe(PipelineStep::second_keypoints, result);
-      solve(Stage::second, m, solve_pose, result);
+      solve(Stage::fine, m, solve_pose, result);
       observe(PipelineStep::second_pose, result);
     }
     remember(frame);
@@ -186,7 +178,7 @@ class StaticProbabilityPipeline {
     result.stage = stage;
     result.health = apply_fallback(span<const KeypointLabel>(label_), m, span<Scalar>(weight_), options_.health);
     const PoseEstimate pose = solve_pose(stage, span<const Scalar>(weight_));
-    if (pose.valid || stage == Stage::first) result.pose = pose;
+    if (pose.valid || stage == Stage::coarse) result.pose = pose;
   }
 
   void remember(const FrameInput<Scalar>& frame) {

@@ -1,0 +1,140 @@
+/// @file descriptor_matching.hpp
+/// Keypoints of one frame matched with those of the one before by place and binary descriptor (ORB, BRIEF, BRISK): for
+/// the keypoints in boxes, which a host that matches map points only leaves alone.
+#pragma once
+
+#include <algorithm>
+#include <bitset>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+#include "cfp/core/numeric.hpp"
+#include "cfp/core/span.hpp"
+
+namespace cfp {
+
+/// A view of binary descriptors, one row of bytes each (the rows of an 8-bit cv::Mat).
+struct DescriptorSpan {
+  const std::uint8_t* data = nullptr;
+  std::size_t size = 0;       ///< descriptors
+  std::size_t bytes = 0;      ///< of one descriptor; 32 for ORB
+  std::size_t row_bytes = 0;  ///< from one descriptor to the next
+
+  [[nodiscard]] const std::uint8_t* row(std::size_t i) const noexcept { return data + i * row_bytes; }
+};
+
+struct DescriptorMatchOptions {
+  double radius_px = 40;  ///< around the predicted place; people move by some 20 px between two images at 30 Hz, > 0
+  int max_distance = 50;  ///< differing bits, >= 0 (ORB-SLAM2's TH_LOW for 256 bits)
+  double max_ratio = 0.9;  ///< nearest to second nearest descriptor, in (0, 1]; 1: no such test
+};
+
+[[nodiscard]] inline const char* invalid_field(const DescriptorMatchOptions& o) noexcept {
+  if (!(o.radius_px > 0) || !is_finite(o.radius_px)) return "radius_px";
+  if (o.max_distance < 0) return "max_distance";
+  return o.max_ratio > 0 && o.max_ratio <= 1 ? nullptr : "max_ratio";
+}
+
+/// Scratch memory, reused: after a call, calls of at most the same sizes allocate nothing.
+template <typename Scalar>
+struct DescriptorMatchWorkspace {
+  struct Candidate {
+    Scalar x, y;
+    std::int32_t index;
+  };
+  struct Holder {
+    std::int32_t keypoint;  // of the current frame, -1: none
+    int distance;
+  };
+  std::vector<Candidate> candidates;  // sorted by y
+  std::vector<Holder> holders;        // one per keypoint of the previous frame
+};
+
+inline namespace CFP_ISA {
+
+/// The number of bits in which two descriptors differ.
+[[nodiscard]] inline int hamming_distance(const std::uint8_t* a, const std::uint8_t* b, std::size_t bytes) noexcept {
+  std::size_t bits = 0;
+  for (std::size_t at = 0; at < bytes; at += sizeof(std::uint64_t)) {
+    std::uint64_t x = 0, y = 0;
+    const std::size_t count = (std::min)(sizeof(std::uint64_t), bytes - at);
+    std::memcpy(&x, a + at, count);
+    std::memcpy(&y, b + at, count);
+    bits += std::bitset<64>(x ^ y).count();
+  }
+  return static_cast<int>(bits);
+}
+
+/// Matches the keypoints `queries` of the current frame with those of the previous one: match[i] becomes the index of
+/// the previous keypoint, for every i of `queries` that finds one. `predicted` is where each previous keypoint is
+/// expected in the current image; one that is not finite, or that `match` names already, takes no part. A match lies
+/// within the radius, passes the distance and the ratio test, and each previous keypoint goes to the query whose
+/// descriptor is nearest (ties: the lower index). Returns how many were matched; 0 for descriptors of different sizes.
+/// O(queries x keypoints in a band of the image); allocates only when the workspace grows.
+template <typename Scalar>
+std::size_t match_descriptors(const PointSpan<Scalar, 2>& predicted, const DescriptorSpan& previous,
+                              const PointSpan<Scalar, 2>& keypoints, const DescriptorSpan& current,
+                              span<const std::int32_t> queries, const DescriptorMatchOptions& options,
+                              DescriptorMatchWorkspace<Scalar>& workspace, span<std::int32_t> match) {
+  using Candidate = typename DescriptorMatchWorkspace<Scalar>::Candidate;
+  CFP_ASSERT(match.size() == keypoints.size());
+  if (previous.bytes != current.bytes || current.bytes == 0) return 0;
+  if (previous.size != predicted.size() || current.size != keypoints.size()) return 0;
+
+  workspace.holders.assign(predicted.size(), {-1, 0});
+  for (std::size_t i = 0; i < match.size(); ++i) {
+    if (match[i] >= 0 && static_cast<std::size_t>(match[i]) < predicted.size())
+      workspace.holders[static_cast<std::size_t>(match[i])] = {static_cast<std::int32_t>(i), -1};
+  }
+  workspace.candidates.clear();
+  workspace.candidates.reserve(predicted.size());
+  for (std::size_t j = 0; j < predicted.size(); ++j) {
+    const Candidate candidate{predicted(j, 0), predicted(j, 1), static_cast<std::int32_t>(j)};
+    if (workspace.holders[j].keypoint < 0 && is_finite(candidate.x) && is_finite(candidate.y))
+      workspace.candidates.push_back(candidate);
+  }
+  std::sort(workspace.candidates.begin(), workspace.candidates.end(), [](const Candidate& a, const Candidate& b) {
+    return a.y < b.y || (a.y == b.y && a.index < b.index);
+  });
+
+  const Scalar radius = static_cast<Scalar>(options.radius_px);
+  for (const std::int32_t query : queries) {
+    const std::size_t i = static_cast<std::size_t>(query);
+    const Scalar x = keypoints(i, 0), y = keypoints(i, 1);
+    int best = options.max_distance + 1, second = static_cast<int>(8 * current.bytes);
+    std::int32_t nearest = -1;
+    auto at = std::lower_bound(workspace.candidates.begin(), workspace.candidates.end(), y - radius,
+                               [](const Candidate& candidate, Scalar limit) { return candidate.y < limit; });
+    for (; at != workspace.candidates.end() && at->y <= y + radius; ++at) {
+      const Scalar dx = at->x - x, dy = at->y - y;
+      if (!(dx * dx + dy * dy <= radius * radius)) continue;
+      const int distance = hamming_distance(previous.row(static_cast<std::size_t>(at->index)), current.row(i),
+                                            current.bytes);
+      if (distance < best) {
+        second = nearest >= 0 ? best : second;
+        best = distance;
+        nearest = at->index;
+      } else {
+        second = (std::min)(second, distance);
+      }
+    }
+    if (nearest < 0 || !(options.max_ratio >= 1 || best < options.max_ratio * second)) continue;
+    auto& holder = workspace.holders[static_cast<std::size_t>(nearest)];
+    if (holder.keypoint < 0 || best < holder.distance) holder = {query, best};
+  }
+
+  std::size_t matched = 0;
+  for (std::size_t j = 0; j < workspace.holders.size(); ++j) {
+    const auto& holder = workspace.holders[j];
+    if (holder.keypoint < 0 || match[static_cast<std::size_t>(holder.keypoint)] == static_cast<std::int32_t>(j))
+      continue;
+    match[static_cast<std::size_t>(holder.keypoint)] = static_cast<std::int32_t>(j);
+    ++matched;
+  }
+  return matched;
+}
+
+}  // namespace CFP_ISA
+}  // namespace cfp

@@ -1,0 +1,68 @@
+/// @file frame.hpp
+/// What a host hands over for one frame, and the words that the frame's steps share. Everything is a view of the host's
+/// own arrays; everything but the keypoints may be missing.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "cfp/core/span.hpp"
+#include "cfp/core/types.hpp"
+#include "cfp/detection/box_tracker_types.hpp"
+#include "cfp/frame/descriptor_matching.hpp"
+#include "cfp/frame/label_image.hpp"
+#include "cfp/math/se3.hpp"
+
+namespace cfp {
+
+/// How a keypoint stands to the objects of its frame.
+enum class KeypointLabel : std::uint8_t {
+  outside,     ///< on no object: K = 1, never changed
+  foreground,  ///< on the object of its box
+  background,  ///< inside its box, behind the object
+  invalid      ///< its pixel is not finite: K = 0, and no evidence for or against a map point
+};
+
+/// The box of a keypoint in none.
+inline constexpr std::int32_t no_box = -1;
+/// The match of a keypoint without one.
+inline constexpr std::int32_t no_match = -1;
+/// The object of a keypoint on none.
+inline constexpr std::int32_t no_object = -1;
+
+/// Optical-flow pairs: element i of both is the same point. Pixels.
+template <typename Scalar>
+struct FlowPairs {
+  PointSpan<Scalar, 2> previous;  ///< in frame k-1
+  PointSpan<Scalar, 2> current;   ///< in frame k
+};
+
+/// Frame k. All pixels are those of the image in which the objects were detected; the camera knows its distortion.
+template <typename Scalar>
+struct Frame {
+  double timestamp_s = 0;
+  PointSpan<Scalar, 2> keypoints;
+  /// One per keypoint, metres along z; not positive or not finite: no depth there. Empty: all of a box is foreground.
+  span<const Scalar> depths;
+  /// Of the object detector, all classes. Not set: it did not run on this frame. Set and empty: it saw nothing.
+  std::optional<span<const Detection<Scalar>>> detections;
+  FlowPairs<Scalar> flow;  ///< empty: the objects are unknown
+  /// For hosts that segment: per keypoint, the index of the detection it lies on, or no_object. Membership and
+  /// foreground then come from it, not from boxes and depths. Compensated boxes have no segmentation, and keep both.
+  span<const std::int32_t> object_of_keypoint;
+  LabelImage labels;           ///< the same as an image: label v belongs to detection v - 1
+  DescriptorSpan descriptors;  ///< binary, one per keypoint: `fine` then matches what lies in boxes by itself
+  span<const Scalar> map_point_probability;  ///< M per keypoint if matches are known by now, negative: no map point
+  std::optional<Matrix3<Scalar>> fundamental;   ///< F of the undistorted flow pairs, if the host has one
+  std::optional<Matrix3<Scalar>> image_motion;  ///< homography from the previous image, moves the predicted boxes
+};
+
+/// What the host's optimiser made of the coarse weights.
+struct PoseEstimate {
+  SE3<double> T_cur_prev;   ///< maps points of camera k-1 into camera k
+  std::size_t inliers = 0;  ///< N_BA: observations that the pose rests on
+  bool valid = false;
+};
+
+}  // namespace cfp

@@ -1,0 +1,143 @@
+/// @file frame_options.hpp
+/// Every choice of a frame's steps in one struct, and the paper's ablation as settings of it.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "cfp/clustering/depth_foreground.hpp"
+#include "cfp/detection/box_tracker_types.hpp"
+#include "cfp/frame/descriptor_matching.hpp"
+#include "cfp/frame/flow_model.hpp"
+#include "cfp/frame/health.hpp"
+#include "cfp/probability/distance_sigmoid.hpp"
+#include "cfp/probability/map_point.hpp"
+#include "cfp/probability/object.hpp"
+
+namespace cfp {
+
+/// A detector class whose objects can move.
+struct ObjectClass {
+  int class_id = 0;
+  bool non_rigid = true;  ///< people, animals: told from the background by depth; rigid: all inside is foreground
+};
+
+/// The paper's first stage: objects and depth (sections IV-B and IV-C).
+struct CoarseOptions {
+  bool use_object_probability = true;  ///< false: O of every object is unknown (the paper's CFP-SLAM-)
+  bool use_depth_foreground = true;    ///< false: all keypoints in a box are its foreground (W/O-DBS)
+  bool soft_background = true;  ///< false: background keypoints keep K = 1, as do all outside (W/O-KSP, Only-YOLO)
+  FlowModelOptions flow;
+  ObjectProbabilityOptions object;
+  ForegroundOptions foreground;
+};
+
+/// The paper's second stage: projection and epipolar constraint (section IV-D).
+struct FineOptions {
+  bool enabled = true;           ///< false: K of the coarse stage is final (W/O-KSP, Only-YOLO)
+  double min_pose_inliers = 10;  ///< Th_BA: least inliers a pose may rest on (ORB-SLAM2's 10), >= 0
+  /// t_Th in metres: |t| at or below it skips the epipolar constraint, >= 0. No source in the paper.
+  double min_translation_m = 0.005;
+  /// The same test on |t| over the median depth of the matched keypoints, >= 0; 0: off. Either test skips.
+  double min_parallax = 0;
+  /// Not in the paper, whose K forgets everything between frames: by construction of D_Th, every fifth static point
+  /// then fails either constraint. true: the K that is returned is posterior_probability of K with M before this frame
+  /// as its prior, for matched keypoints in boxes, and M where neither constraint is available. The update of M and the
+  /// weights go on with K itself, so that no evidence counts twice. For hosts that keep M from frame to frame; where M
+  /// is 1 for want of a history, it would drown the geometry.
+  bool map_point_prior = false;
+  ConstraintOptions projection;
+  ConstraintOptions epipolar;
+  DescriptorMatchOptions matching;  ///< of the keypoints in boxes that the host left unmatched
+};
+
+struct FrameOptions {
+  bool use_boxes = true;                           ///< false: detections are ignored, K = 1 everywhere (plain SLAM)
+  std::vector<ObjectClass> classes = {{0, true}};  ///< others are ignored; 0 is the person of COCO; not empty
+  double object_threshold = 0.9;                   ///< O_Th in (0, 1): objects at or below it are high dynamic
+  BoxTrackerOptions tracker;
+  CoarseOptions coarse;
+  FineOptions fine;
+  MapPointOptions map_point;
+  HealthOptions health;
+  double min_creation_probability = 0.3;  ///< keypoints with a smaller K should make no map point, in [0, 1]
+  double min_inlier_weight = 0.1;  ///< inliers of at most this weight should not count for the pose, in [0, 1)
+};
+
+[[nodiscard]] inline const char* invalid_field(const CoarseOptions& o) noexcept {
+  if (const char* field = invalid_field(o.flow)) return field;
+  if (const char* field = invalid_field(o.object)) return field;
+  return invalid_field(o.foreground);
+}
+
+[[nodiscard]] inline const char* invalid_field(const FineOptions& o) noexcept {
+  if (!(o.min_pose_inliers >= 0) || !is_finite(o.min_pose_inliers)) return "min_pose_inliers";
+  if (!(o.min_translation_m >= 0)) return "min_translation_m";
+  if (!(o.min_parallax >= 0)) return "min_parallax";
+  if (const char* field = invalid_field(o.projection)) return field;
+  if (const char* field = invalid_field(o.epipolar)) return field;
+  return invalid_field(o.matching);
+}
+
+[[nodiscard]] inline const char* invalid_field(const FrameOptions& o) noexcept {
+  if (o.use_boxes && o.classes.empty()) return "classes";
+  if (!(o.object_threshold > 0 && o.object_threshold < 1)) return "object_threshold";
+  if (!(o.min_creation_probability >= 0 && o.min_creation_probability <= 1)) return "min_creation_probability";
+  if (!(o.min_inlier_weight >= 0 && o.min_inlier_weight < 1)) return "min_inlier_weight";
+  if (const char* field = invalid_field(o.tracker)) return field;
+  if (const char* field = invalid_field(o.coarse)) return field;
+  if (const char* field = invalid_field(o.fine)) return field;
+  if (const char* field = invalid_field(o.map_point)) return field;
+  return invalid_field(o.health);
+}
+
+/// The systems of the paper's Table IV, and plain SLAM.
+enum class Variant : std::uint8_t {
+  cfp,         ///< CFP-SLAM: everything
+  cfp_minus,   ///< CFP-SLAM-: without the object stage, every object is high dynamic
+  no_mdc,      ///< W/O-MDC: without missed-detection compensation
+  no_dbscan,   ///< W/O-DBS: without depth clustering, all in a box is foreground
+  no_ksp,      ///< W/O-KSP: foreground keypoints are removed, all others count fully
+  only_boxes,  ///< Only-YOLO: all keypoints in detected boxes are removed
+  plain        ///< no dynamic handling at all
+};
+
+/// The enumerator's name as the example programs spell it.
+[[nodiscard]] constexpr const char* to_string(Variant variant) noexcept {
+  switch (variant) {
+    case Variant::cfp:
+      return "cfp";
+    case Variant::cfp_minus:
+      return "cfp-minus";
+    case Variant::no_mdc:
+      return "no-mdc";
+    case Variant::no_dbscan:
+      return "no-dbscan";
+    case Variant::no_ksp:
+      return "no-ksp";
+    case Variant::only_boxes:
+      return "only-boxes";
+    case Variant::plain:
+      return "plain";
+  }
+  return "unknown";
+}
+
+/// The options of a variant: `base` with that variant's parts switched off, nothing else changed. A variant without the
+/// object stage rests on unknown objects being high dynamic, and lowers unknown_object_probability to O_Th if need be.
+[[nodiscard]] inline FrameOptions variant_options(Variant variant, FrameOptions base = {}) {
+  if (variant == Variant::cfp_minus || variant == Variant::no_ksp || variant == Variant::only_boxes) {
+    double& unknown = base.coarse.object.unknown_object_probability;
+    unknown = (std::min)(unknown, base.object_threshold);
+    base.coarse.use_object_probability = false;
+    base.fine.enabled = base.fine.enabled && variant == Variant::cfp_minus;
+  }
+  if (variant == Variant::no_mdc || variant == Variant::only_boxes) base.tracker.max_coast = 0;
+  if (variant == Variant::no_dbscan || variant == Variant::only_boxes) base.coarse.use_depth_foreground = false;
+  if (variant == Variant::no_ksp) base.coarse.soft_background = false;
+  if (variant == Variant::plain) base.use_boxes = false;
+  return base;
+}
+
+}  // namespace cfp

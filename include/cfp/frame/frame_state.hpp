@@ -1,0 +1,145 @@
+/// @file frame_state.hpp
+/// Everything that is known of a frame between the steps, and of the frame before: the one place that the steps read
+/// and write. Per-keypoint arrays have the size and order of the frame's keypoints.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "cfp/clustering/depth_foreground.hpp"
+#include "cfp/core/status.hpp"
+#include "cfp/frame/flow_model.hpp"
+#include "cfp/frame/frame.hpp"
+#include "cfp/frame/health.hpp"
+#include "cfp/probability/object.hpp"
+
+namespace cfp {
+
+enum class Stage : std::uint8_t { coarse, fine };
+
+/// What a constraint was fitted to in this frame.
+struct ConstraintReport {
+  Status status = Status::not_enough_data;  ///< not_enough_data: it had nothing to say; degenerate: it is a step, or,
+                                            ///< with a confidence of 0, |t| was at or below t_Th
+  double threshold_px = 0;                  ///< D_Th
+  double confidence = 0;                    ///< C_s C_c
+};
+
+/// What a user must notice of a frame, step by step.
+struct FrameReport {
+  Stage stage = Stage::coarse;  ///< fine: the constraints were asked
+  // boxes
+  Status time = Status::ok;                   ///< invalid_input: the time stamp did not grow, and the boxes stayed
+  std::size_t frames_without_detections = 0;  ///< in a row, with the detector running: the commonest cause of no effect
+  std::size_t frames_since_detector = 0;      ///< on which the detector did not run
+  // objects
+  FlowModelKind flow_model = FlowModelKind::none;                    ///< what the flow pairs were judged by,
+  FlowSupport flow_support = FlowSupport::none;                      ///< what that rests on,
+  FundamentalReason flow_status = FundamentalReason::too_few_pairs;  ///< and how its estimation ended
+  std::size_t unknown_objects = 0;                                   ///< boxes whose O is not known
+  // keypoints
+  std::size_t outside = 0, foreground = 0, background = 0, invalid = 0;  ///< by label
+  std::size_t undecided_foregrounds = 0;  ///< boxes that the depths could not separate: all inside is foreground
+  // constraints
+  ConstraintReport projection, epipolar;
+  std::size_t matched_in_boxes = 0;      ///< keypoints that the descriptors matched
+  std::size_t unmatched_foreground = 0;  ///< foreground keypoints without a match in the frame before: K = 0
+  std::size_t constrained = 0;           ///< keypoints in boxes whose K the constraints have set
+  // map points and weights
+  std::size_t mismatched = 0;  ///< observations left out because K and M differ too much
+  std::size_t deletable = 0;   ///< map points whose M fell below the deletion threshold: is_deletable(M)
+  FrameHealth health;          ///< of the weights, fallback included
+};
+
+/// What the next frame has to know of a frame.
+template <typename Scalar>
+struct FrameMemory {
+  bool known = false;  ///< false: there was no such frame
+  double timestamp_s = 0;
+  std::vector<std::array<Scalar, 2>> keypoints;
+  std::vector<Scalar> depths;  ///< empty: none
+  std::vector<std::uint8_t> descriptors;  ///< one after the other; empty: none
+  std::size_t descriptor_bytes = 0;       ///< of each
+
+  [[nodiscard]] DescriptorSpan descriptor_view() const noexcept {
+    return {descriptors.data(), descriptors.empty() ? 0 : keypoints.size(), descriptor_bytes, descriptor_bytes};
+  }
+};
+
+/// Scratch memory of the steps.
+template <typename Scalar>
+struct FrameScratch {
+  FlowModelWorkspace<Scalar> flow;
+  ForegroundWorkspace<Scalar> foreground;
+  DescriptorMatchWorkspace<Scalar> matching;
+  std::vector<std::array<Scalar, 2>> points, undistorted_previous, undistorted_current;
+  std::vector<Scalar> depths, projection, epipolar, samples, scratch;
+  std::vector<std::int32_t> members;
+  std::vector<char> mask;
+};
+
+/// Reused from frame to frame: after the largest frame has been seen, the steps allocate nothing.
+template <typename Scalar>
+struct FrameState {
+  FrameMemory<Scalar> previous, current;
+  std::vector<TrackedBox<Scalar>> boxes;     ///< of objects that can move: detected and compensated
+  std::vector<ObjectProbability> objects;    ///< O, one per box
+  std::vector<KeypointLabel> label;          ///< per keypoint
+  std::vector<std::int32_t> box;             ///< per keypoint: the box that decides its K, or no_box
+  std::vector<std::int32_t> match;           ///< per keypoint: index in the frame before, or no_match
+  std::vector<Scalar> static_probability;    ///< per keypoint: K
+  std::vector<Scalar> posterior;             ///< per keypoint: K with M of before as its prior, from the fine stage
+  std::vector<Scalar> weight;                ///< per keypoint: what the pose is to use
+  FrameReport report;
+  FrameScratch<Scalar> scratch;
+
+  [[nodiscard]] std::size_t size() const noexcept { return current.keypoints.size(); }
+};
+
+inline namespace CFP_ISA {
+
+/// The first step: what was the current frame becomes the previous one, and the new frame is copied in; no keypoint is
+/// in a box yet. So nothing has to be done for a frame whose pose failed or threw.
+template <typename Scalar>
+void begin_frame(const Frame<Scalar>& frame, FrameState<Scalar>& state) {
+  const std::size_t n = frame.keypoints.size();
+  CFP_ASSERT(frame.depths.empty() || frame.depths.size() == n);
+  CFP_ASSERT(frame.descriptors.size == 0 || frame.descriptors.size == n);
+  std::swap(state.previous, state.current);
+  FrameMemory<Scalar>& current = state.current;
+  current.known = true;
+  current.timestamp_s = frame.timestamp_s;
+  current.depths.assign(frame.depths.begin(), frame.depths.end());
+  const std::size_t bytes = current.descriptor_bytes = frame.descriptors.bytes;
+  current.descriptors.resize(frame.descriptors.size * bytes);
+  for (std::size_t i = 0; i < frame.descriptors.size; ++i)
+    std::copy_n(frame.descriptors.row(i), bytes, current.descriptors.data() + i * bytes);
+
+  current.keypoints.resize(n);
+  state.static_probability.resize(n);
+  state.label.resize(n);
+  state.box.assign(n, no_box);
+  state.match.assign(n, no_match);
+  for (std::size_t i = 0; i < n; ++i) {
+    const Scalar x = frame.keypoints(i, 0), y = frame.keypoints(i, 1);
+    const bool valid = is_finite(x) && is_finite(y);
+    current.keypoints[i] = {x, y};
+    state.static_probability[i] = valid ? Scalar(1) : Scalar(0);
+    state.label[i] = valid ? KeypointLabel::outside : KeypointLabel::invalid;
+  }
+  state.posterior = state.static_probability;
+  state.weight = state.static_probability;
+  state.boxes.clear();
+  state.objects.clear();
+  FrameReport report;
+  report.frames_without_detections = state.report.frames_without_detections;
+  report.frames_since_detector = state.report.frames_since_detector;
+  state.report = report;
+}
+
+}  // namespace CFP_ISA
+}  // namespace cfp

@@ -1,0 +1,44 @@
+/// @file track_boxes.hpp
+/// The step from detections to the boxes of a frame (paper section IV-A): missed detections are compensated, and every
+/// box knows whether its object had one in the frame before.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+
+#include "cfp/detection/box_tracker.hpp"
+#include "cfp/frame/frame_options.hpp"
+#include "cfp/frame/frame_state.hpp"
+
+namespace cfp {
+inline namespace CFP_ISA {
+
+/// Sets state.boxes: what the tracker gives of the classes that can move. A frame whose detector did not run moves the
+/// tracks and misses nothing. A time stamp that did not grow, or is not finite, is reported, and the boxes stay.
+template <typename Scalar>
+void track_boxes(const Frame<Scalar>& frame, const FrameOptions& options, BoxTracker<Scalar>& tracker,
+                 FrameState<Scalar>& state) {
+  state.boxes.clear();
+  if (!options.use_boxes) return;
+  FrameReport& report = state.report;
+  // The difference of two clocks of 10^9 s fits a double to a fraction of a microsecond, a float not at all.
+  double dt = state.previous.known ? frame.timestamp_s - state.previous.timestamp_s : 0;
+  if (state.previous.known && !(dt > 0 && is_finite(dt))) {
+    report.time = Status::invalid_input;
+    dt = 0;
+  }
+  const Matrix3<Scalar>* const motion = frame.image_motion ? &*frame.image_motion : nullptr;
+  const bool ran = frame.detections.has_value();
+  const BoxTrackerResult<Scalar> tracked = ran ? tracker.update(*frame.detections, static_cast<Scalar>(dt), motion)
+                                               : tracker.skip(static_cast<Scalar>(dt), motion);
+  report.frames_since_detector = ran ? 0 : report.frames_since_detector + 1;
+  if (ran) report.frames_without_detections = frame.detections->empty() ? report.frames_without_detections + 1 : 0;
+  std::copy_if(tracked.boxes.begin(), tracked.boxes.end(), std::back_inserter(state.boxes),
+               [&](const TrackedBox<Scalar>& box) {
+                 return std::any_of(options.classes.begin(), options.classes.end(),
+                                    [&](const ObjectClass& c) { return c.class_id == box.class_id; });
+               });
+}
+
+}  // namespace CFP_ISA
+}  // namespace cfp
