@@ -157,7 +157,7 @@ void run(const std::filesystem::path& folder, const std::filesystem::path& out, 
   if (!detected.error.empty()) throw std::runtime_error(detected.error);
   std::filesystem::create_directories(out);
 
-  cfp::PipelineOptions options = cfp::variant_options(variant);
+  cfp::PipelineOptions options = cfp::variant_options(variant, cfp::PipelineOptions{});
   options.tracker.image_width = tum.width;
   options.tracker.image_height = tum.height;
   options.classes.clear();

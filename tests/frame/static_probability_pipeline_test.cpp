@@ -106,7 +106,7 @@ TEST_CASE("Without a pose or without matches the first stage stands", "[pipeline
 TEST_CASE("A missed detection is compensated, and with no-mdc it is not", "[pipeline]") {
   const DynamicScene<double> scene = make_dynamic_scene<double>({}, 34);
   for (const cfp::Variant variant : {cfp::Variant::cfp, cfp::Variant::no_mdc}) {
-    Host host(cfp::variant_options(variant));
+    Host host(cfp::variant_options(variant, cfp::PipelineOptions{}));
     host.frame(scene);
     const auto missed = host.frame(scene, false);
     CHECK(missed.boxes.size() == (variant == cfp::Variant::cfp ? 2U : 0U));
@@ -120,7 +120,7 @@ TEST_CASE("Each variant of the ablation does what its name says", "[pipeline]") 
   const DynamicScene<double> scene = make_dynamic_scene<double>(options, 35);
   const auto run = [&](cfp::Variant variant, const auto& check) {
     INFO(cfp::to_string(variant));
-    Host host(cfp::variant_options(variant));
+    Host host(cfp::variant_options(variant, cfp::PipelineOptions{}));
     check(host.frame(scene));
   };
   run(cfp::Variant::plain, [](const auto& r) {

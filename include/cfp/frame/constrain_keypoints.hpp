@@ -103,7 +103,7 @@ inline namespace CFP_ISA {
 /// before this frame, negative where there is no map point. When neither sigmoid has enough samples, the coarse K
 /// stays; a pose that is not finite has that effect. O(keypoints).
 template <typename Scalar, typename Camera>
-void constrain_keypoints(const PoseEstimate& pose, span<const detail::non_deduced<Scalar>> map_point_probability,
+void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar>> map_point_probability,
                          const Camera& camera, const FrameOptions& options, FrameState<Scalar>& state) {
   CFP_ASSERT(map_point_probability.size() == state.size());
   const std::size_t n = state.size();
@@ -154,9 +154,8 @@ void constrain_keypoints(const PoseEstimate& pose, span<const detail::non_deduce
     // nowhere is a rule.
     const bool silent = !keypoint.projection.available && !keypoint.epipolar.available &&
                         (keypoint.box_associated || !keypoint.foreground);
-    state.posterior[i] = keypoint.matched && m >= Scalar(0)
-                             ? posterior_probability(silent ? Scalar(0.5) : k, m, options.map_point)
-                             : k;
+    state.posterior[i] =
+        keypoint.matched && m >= Scalar(0) ? posterior_probability(silent ? Scalar(0.5) : k, m, options.map_point) : k;
     ++state.report.constrained;
   }
 }

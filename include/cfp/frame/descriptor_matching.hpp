@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "cfp/core/numeric.hpp"
+#include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 
 namespace cfp {
@@ -26,16 +27,10 @@ struct DescriptorSpan {
 };
 
 struct DescriptorMatchOptions {
-  double radius_px = 40;  ///< around the predicted place; people move by some 20 px between two images at 30 Hz, > 0
-  int max_distance = 50;  ///< differing bits, >= 0 (ORB-SLAM2's TH_LOW for 256 bits)
+  double radius_px = 40;   ///< around the predicted place; people move by some 20 px between two images at 30 Hz, > 0
+  int max_distance = 50;   ///< differing bits, >= 0 (ORB-SLAM2's TH_LOW for 256 bits)
   double max_ratio = 0.9;  ///< nearest to second nearest descriptor, in (0, 1]; 1: no such test
 };
-
-[[nodiscard]] inline const char* invalid_field(const DescriptorMatchOptions& o) noexcept {
-  if (!(o.radius_px > 0) || !is_finite(o.radius_px)) return "radius_px";
-  if (o.max_distance < 0) return "max_distance";
-  return o.max_ratio > 0 && o.max_ratio <= 1 ? nullptr : "max_ratio";
-}
 
 /// Scratch memory, reused: after a call, calls of at most the same sizes allocate nothing.
 template <typename Scalar>
@@ -53,6 +48,13 @@ struct DescriptorMatchWorkspace {
 };
 
 inline namespace CFP_ISA {
+
+[[nodiscard]] inline OptionPath invalid_field(const DescriptorMatchOptions& o) noexcept {
+  if (!detail::positive(o.radius_px)) return "radius_px";
+  if (o.max_distance < 0) return "max_distance";
+  if (!(o.max_ratio > 0 && o.max_ratio <= 1)) return "max_ratio";
+  return {};
+}
 
 /// The number of bits in which two descriptors differ.
 [[nodiscard]] inline int hamming_distance(const std::uint8_t* a, const std::uint8_t* b, std::size_t bytes) noexcept {
@@ -95,9 +97,8 @@ std::size_t match_descriptors(const PointSpan<Scalar, 2>& predicted, const Descr
     if (workspace.holders[j].keypoint < 0 && is_finite(candidate.x) && is_finite(candidate.y))
       workspace.candidates.push_back(candidate);
   }
-  std::sort(workspace.candidates.begin(), workspace.candidates.end(), [](const Candidate& a, const Candidate& b) {
-    return a.y < b.y || (a.y == b.y && a.index < b.index);
-  });
+  std::sort(workspace.candidates.begin(), workspace.candidates.end(),
+            [](const Candidate& a, const Candidate& b) { return a.y < b.y || (a.y == b.y && a.index < b.index); });
 
   const Scalar radius = static_cast<Scalar>(options.radius_px);
   for (const std::int32_t query : queries) {
@@ -110,8 +111,8 @@ std::size_t match_descriptors(const PointSpan<Scalar, 2>& predicted, const Descr
     for (; at != workspace.candidates.end() && at->y <= y + radius; ++at) {
       const Scalar dx = at->x - x, dy = at->y - y;
       if (!(dx * dx + dy * dy <= radius * radius)) continue;
-      const int distance = hamming_distance(previous.row(static_cast<std::size_t>(at->index)), current.row(i),
-                                            current.bytes);
+      const int distance =
+          hamming_distance(previous.row(static_cast<std::size_t>(at->index)), current.row(i), current.bytes);
       if (distance < best) {
         second = nearest >= 0 ? best : second;
         best = distance;

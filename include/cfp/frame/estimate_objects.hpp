@@ -32,14 +32,13 @@ template <typename Scalar>
   const PointSpan<Scalar, 2>& pixels = frame.flow.current;
   state.scratch.mask.resize(pixels.size());
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    const bool inside =
-        std::any_of(state.boxes.begin(), state.boxes.end(), [&](const TrackedBox<Scalar>& box) {
-          return lies_on(box, frame.labels, pixels(i, 0), pixels(i, 1));
-        });
+    const bool inside = std::any_of(state.boxes.begin(), state.boxes.end(), [&](const TrackedBox<Scalar>& box) {
+      return lies_on(box, frame.labels, pixels(i, 0), pixels(i, 1));
+    });
     state.scratch.mask[i] = inside ? char(0) : char(1);
   }
-  return estimate_flow_model(undistorted_flow.previous, undistorted_flow.current,
-                             span<const char>(state.scratch.mask), camera, options, state.scratch.flow);
+  return estimate_flow_model(undistorted_flow.previous, undistorted_flow.current, span<const char>(state.scratch.mask),
+                             camera, options, state.scratch.flow);
 }
 
 }  // namespace CFP_ISA

@@ -30,11 +30,6 @@ struct FlowModelOptions {
   FundamentalRansacOptions ransac;
 };
 
-[[nodiscard]] inline OptionPath invalid_field(const FlowModelOptions& o) noexcept {
-  if (o.min_outside_pairs < 8) return "min_outside_pairs";
-  return nested("ransac", invalid_field(o.ransac));
-}
-
 enum class FlowModelKind : std::uint8_t {
   none,         ///< neither could be had: every object is unknown
   fundamental,  ///< distances from epipolar lines
@@ -64,13 +59,19 @@ struct FlowModelWorkspace {
   FundamentalRansacWorkspace ransac;
 };
 
-/// The model of undistorted pairs, estimated from those that `outside` marks as outside all boxes when there are enough,
-/// else from all. The camera, that of the undistorted image, tells a rotation from a plane.
+inline namespace CFP_ISA {
+
+[[nodiscard]] inline OptionPath invalid_field(const FlowModelOptions& o) noexcept {
+  if (o.min_outside_pairs < 8) return "min_outside_pairs";
+  return nested("ransac", invalid_field(o.ransac));
+}
+
+/// The model of undistorted pairs, estimated from those that `outside` marks as outside all boxes when there are
+/// enough, else from all. The camera, that of the undistorted image, tells a rotation from a plane.
 template <typename Scalar>
 FlowModel<Scalar> estimate_flow_model(const PointSpan<Scalar, 2>& previous, const PointSpan<Scalar, 2>& current,
-                                      span<const char> outside,
-                                      const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
-                                      FlowModelWorkspace<Scalar>& work) {
+                                      span<const char> outside, const PinholeCamera<Scalar>& camera,
+                                      const FlowModelOptions& options, FlowModelWorkspace<Scalar>& work) {
   CFP_ASSERT(previous.size() == current.size() && outside.size() == current.size());
   work.outside_previous.clear();
   work.outside_current.clear();
@@ -116,4 +117,5 @@ void flow_distances(const FlowModel<Scalar>& model, const PointSpan<Scalar, 2>& 
   }
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

@@ -53,7 +53,7 @@ struct Frame {
   span<const std::int32_t> object_of_keypoint;
   LabelImage labels;           ///< the same as an image: label v belongs to detection v - 1
   DescriptorSpan descriptors;  ///< binary, one per keypoint: `fine` then matches what lies in boxes by itself
-  span<const Scalar> map_point_probability;  ///< M per keypoint if matches are known by now, negative: no map point
+  span<const Scalar> map_point_probability;     ///< M per keypoint if matches are known by now, negative: no map point
   std::optional<Matrix3<Scalar>> fundamental;   ///< F of the undistorted flow pairs, if the host has one
   std::optional<Matrix3<Scalar>> image_motion;  ///< homography from the previous image, moves the predicted boxes
 };

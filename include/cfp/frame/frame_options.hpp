@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cfp/clustering/depth_foreground.hpp"
+#include "cfp/core/options.hpp"
 #include "cfp/detection/box_tracker_types.hpp"
 #include "cfp/frame/descriptor_matching.hpp"
 #include "cfp/frame/flow_model.hpp"
@@ -62,35 +63,8 @@ struct FrameOptions {
   MapPointOptions map_point;
   HealthOptions health;
   double min_creation_probability = 0.3;  ///< keypoints with a smaller K should make no map point, in [0, 1]
-  double min_inlier_weight = 0.1;  ///< inliers of at most this weight should not count for the pose, in [0, 1)
+  double min_inlier_weight = 0.1;         ///< inliers of at most this weight should not count for the pose, in [0, 1)
 };
-
-[[nodiscard]] inline const char* invalid_field(const CoarseOptions& o) noexcept {
-  if (const char* field = invalid_field(o.flow)) return field;
-  if (const char* field = invalid_field(o.object)) return field;
-  return invalid_field(o.foreground);
-}
-
-[[nodiscard]] inline const char* invalid_field(const FineOptions& o) noexcept {
-  if (!(o.min_pose_inliers >= 0) || !is_finite(o.min_pose_inliers)) return "min_pose_inliers";
-  if (!(o.min_translation_m >= 0)) return "min_translation_m";
-  if (!(o.min_parallax >= 0)) return "min_parallax";
-  if (const char* field = invalid_field(o.projection)) return field;
-  if (const char* field = invalid_field(o.epipolar)) return field;
-  return invalid_field(o.matching);
-}
-
-[[nodiscard]] inline const char* invalid_field(const FrameOptions& o) noexcept {
-  if (o.use_boxes && o.classes.empty()) return "classes";
-  if (!(o.object_threshold > 0 && o.object_threshold < 1)) return "object_threshold";
-  if (!(o.min_creation_probability >= 0 && o.min_creation_probability <= 1)) return "min_creation_probability";
-  if (!(o.min_inlier_weight >= 0 && o.min_inlier_weight < 1)) return "min_inlier_weight";
-  if (const char* field = invalid_field(o.tracker)) return field;
-  if (const char* field = invalid_field(o.coarse)) return field;
-  if (const char* field = invalid_field(o.fine)) return field;
-  if (const char* field = invalid_field(o.map_point)) return field;
-  return invalid_field(o.health);
-}
 
 /// The systems of the paper's Table IV, and plain SLAM.
 enum class Variant : std::uint8_t {
@@ -102,6 +76,35 @@ enum class Variant : std::uint8_t {
   only_boxes,  ///< Only-YOLO: all keypoints in detected boxes are removed
   plain        ///< no dynamic handling at all
 };
+
+inline namespace CFP_ISA {
+
+[[nodiscard]] inline OptionPath invalid_field(const CoarseOptions& o) noexcept {
+  if (const OptionPath field = nested("flow", invalid_field(o.flow))) return field;
+  if (const OptionPath field = nested("object", invalid_field(o.object))) return field;
+  return nested("foreground", invalid_field(o.foreground));
+}
+
+[[nodiscard]] inline OptionPath invalid_field(const FineOptions& o) noexcept {
+  if (!detail::non_negative(o.min_pose_inliers)) return "min_pose_inliers";
+  if (!(o.min_translation_m >= 0)) return "min_translation_m";
+  if (!(o.min_parallax >= 0)) return "min_parallax";
+  if (const OptionPath field = nested("projection", invalid_field(o.projection))) return field;
+  if (const OptionPath field = nested("epipolar", invalid_field(o.epipolar))) return field;
+  return nested("matching", invalid_field(o.matching));
+}
+
+[[nodiscard]] inline OptionPath invalid_field(const FrameOptions& o) noexcept {
+  if (o.use_boxes && o.classes.empty()) return "classes";
+  if (!detail::inside_unit_interval(o.object_threshold)) return "object_threshold";
+  if (!(o.min_creation_probability >= 0 && o.min_creation_probability <= 1)) return "min_creation_probability";
+  if (!(o.min_inlier_weight >= 0 && o.min_inlier_weight < 1)) return "min_inlier_weight";
+  if (const OptionPath field = nested("tracker", invalid_field(o.tracker))) return field;
+  if (const OptionPath field = nested("coarse", invalid_field(o.coarse))) return field;
+  if (const OptionPath field = nested("fine", invalid_field(o.fine))) return field;
+  if (const OptionPath field = nested("map_point", invalid_field(o.map_point))) return field;
+  return nested("health", invalid_field(o.health));
+}
 
 /// The enumerator's name as the example programs spell it.
 [[nodiscard]] constexpr const char* to_string(Variant variant) noexcept {
@@ -140,4 +143,5 @@ enum class Variant : std::uint8_t {
   return base;
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

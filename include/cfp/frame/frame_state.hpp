@@ -19,7 +19,7 @@
 
 namespace cfp {
 
-enum class Stage : std::uint8_t { coarse, fine };
+enum class Stage : std::uint8_t { coarse, fine, first = coarse, second = fine };
 
 /// What a constraint was fitted to in this frame.
 struct ConstraintReport {
@@ -61,7 +61,7 @@ struct FrameMemory {
   bool known = false;  ///< false: there was no such frame
   double timestamp_s = 0;
   std::vector<std::array<Scalar, 2>> keypoints;
-  std::vector<Scalar> depths;  ///< empty: none
+  std::vector<Scalar> depths;             ///< empty: none
   std::vector<std::uint8_t> descriptors;  ///< one after the other; empty: none
   std::size_t descriptor_bytes = 0;       ///< of each
 
@@ -86,14 +86,14 @@ struct FrameScratch {
 template <typename Scalar>
 struct FrameState {
   FrameMemory<Scalar> previous, current;
-  std::vector<TrackedBox<Scalar>> boxes;     ///< of objects that can move: detected and compensated
-  std::vector<ObjectProbability> objects;    ///< O, one per box
-  std::vector<KeypointLabel> label;          ///< per keypoint
-  std::vector<std::int32_t> box;             ///< per keypoint: the box that decides its K, or no_box
-  std::vector<std::int32_t> match;           ///< per keypoint: index in the frame before, or no_match
-  std::vector<Scalar> static_probability;    ///< per keypoint: K
-  std::vector<Scalar> posterior;             ///< per keypoint: K with M of before as its prior, from the fine stage
-  std::vector<Scalar> weight;                ///< per keypoint: what the pose is to use
+  std::vector<TrackedBox<Scalar>> boxes;   ///< of objects that can move: detected and compensated
+  std::vector<ObjectProbability> objects;  ///< O, one per box
+  std::vector<KeypointLabel> label;        ///< per keypoint
+  std::vector<std::int32_t> box;           ///< per keypoint: the box that decides its K, or no_box
+  std::vector<std::int32_t> match;         ///< per keypoint: index in the frame before, or no_match
+  std::vector<Scalar> static_probability;  ///< per keypoint: K
+  std::vector<Scalar> posterior;           ///< per keypoint: K with M of before as its prior, from the fine stage
+  std::vector<Scalar> weight;              ///< per keypoint: what the pose is to use
   FrameReport report;
   FrameScratch<Scalar> scratch;
 

@@ -1,6 +1,6 @@
 /// @file health.hpp
 /// Whether the weights of a frame can carry a pose, and what to do when they cannot: with the probabilities on, a scene
-/// that needs none of them must not get worse (MODEL.md section 6).
+/// that needs none of them must not get worse.
 #pragma once
 
 #include <cstddef>
@@ -19,11 +19,6 @@ struct HealthOptions {
       10;  ///< fewer effective observations than this are no base for a pose (ORB-SLAM2's 10), >= 0
 };
 
-[[nodiscard]] inline OptionPath invalid_field(const HealthOptions& o) noexcept {
-  if (!detail::non_negative(o.min_effective_points)) return "min_effective_points";
-  return {};
-}
-
 enum class WeightFallback : std::uint8_t {
   none,        ///< the weights are the model's
   background,  ///< background keypoints inside boxes count as static
@@ -37,6 +32,13 @@ struct FrameHealth {
   double box_share = 0;          ///< share of the weight that lies inside boxes, in [0, 1]
   WeightFallback fallback = WeightFallback::none;
 };
+
+inline namespace CFP_ISA {
+
+[[nodiscard]] inline OptionPath invalid_field(const HealthOptions& o) noexcept {
+  if (!detail::non_negative(o.min_effective_points)) return "min_effective_points";
+  return {};
+}
 
 /// The figures of one frame. Observations are the keypoints with M >= 0 (a map point); weights outside [0, 1] are
 /// clamped.
@@ -87,4 +89,5 @@ FrameHealth apply_fallback(span<const KeypointLabel> label, span<const Scalar> m
   return health;
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

@@ -65,10 +65,9 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     const bool segmented = detail::collect_members(frame, state.boxes[b], state);
     scratch.mask.assign(scratch.members.size(), char(1));
-    const bool non_rigid =
-        std::any_of(options.classes.begin(), options.classes.end(), [&](const ObjectClass& c) {
-          return c.class_id == state.boxes[b].class_id && c.non_rigid;
-        });
+    const bool non_rigid = std::any_of(options.classes.begin(), options.classes.end(), [&](const ObjectClass& c) {
+      return c.class_id == state.boxes[b].class_id && c.non_rigid;
+    });
     if (!segmented && non_rigid && options.coarse.use_depth_foreground &&
         !detail::separate_foreground(options.coarse, state))
       ++state.report.undecided_foregrounds;

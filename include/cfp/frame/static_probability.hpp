@@ -2,10 +2,9 @@
 /// CFP-SLAM for a host that keeps its own features, map, optimiser and order of things: two calls per frame, each of
 /// which gives the weights for the host's next pose optimisation.
 ///
-///   const auto coarse = probability.coarse(frame);                        // boxes, objects, depth: the paper's stage 1
-///   pose = optimise(coarse.weight);
-///   const auto fine = probability.fine({T_cur_prev, inliers}, match, m);  // constraints of that pose: stage 2
-///   pose = optimise(fine.weight);
+///   const auto coarse = probability.coarse(frame);                        // boxes, objects, depth: the paper's stage
+///   1 pose = optimise(coarse.weight); const auto fine = probability.fine({T_cur_prev, inliers}, match, m);  //
+///   constraints of that pose: stage 2 pose = optimise(fine.weight);
 ///
 /// Who wants another order calls the steps themselves: begin_frame, track_boxes, estimate_objects, label_keypoints,
 /// match_in_boxes, constrain_keypoints, update_map_points, weigh_keypoints.
@@ -49,7 +48,7 @@ class StaticProbability {
   /// Options outside their ranges are the caller's error: see `validate`.
   explicit StaticProbability(const Camera& camera, const FrameOptions& options = {})
       : camera_(camera), options_(options), tracker_(options.tracker) {
-    CFP_ASSERT(invalid_field(options) == nullptr);
+    CFP_ASSERT(!invalid_field(options));
   }
 
   /// Stage 1, once per frame, first of all. Without frame.map_point_probability every keypoint counts as an observation

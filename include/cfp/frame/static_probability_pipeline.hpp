@@ -63,7 +63,7 @@ struct FrameResult {
   span<const TrackedBox<Scalar>> boxes;   ///< of potentially moving classes: detected and compensated
   span<const ObjectProbability> objects;  ///< O, one per box
   PoseEstimate pose;                      ///< of the last stage that had one
-  Stage stage = Stage::coarse;             ///< the last stage that ran
+  Stage stage = Stage::coarse;            ///< the last stage that ran
   FirstStageResult first;
   SecondStageResult second;
   FrameHealth health;        ///< of the weights of that stage, fallback included

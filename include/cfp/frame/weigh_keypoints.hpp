@@ -16,18 +16,18 @@ inline namespace CFP_ISA {
 /// M of the map point that keypoint i observes, after this frame. No map point (M negative or NaN) stays none, and a
 /// keypoint without a pixel says nothing.
 template <typename Scalar>
-[[nodiscard]] Scalar updated_map_point(std::size_t i, detail::non_deduced<Scalar> map_point_probability,
+[[nodiscard]] Scalar updated_map_point(std::size_t i, non_deduced<Scalar> map_point_probability,
                                        const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
   if (!(map_point_probability >= Scalar(0)) || state.label[i] == KeypointLabel::invalid) return map_point_probability;
   return updated_map_point(map_point_probability, state.static_probability[i], options.map_point);
 }
 
 /// The weight of keypoint i for a map point of probability M, before any fallback: K without a map point (M negative or
-/// NaN), K and M by MapPointOptions::weight with one. In the fine stage a mismatch (K and M too far apart) gets 0; in the
-/// coarse stage K is too rough for that, and a foreground point's 0 says nothing of its match.
+/// NaN), K and M by MapPointOptions::weight with one. In the fine stage a mismatch (K and M too far apart) gets 0; in
+/// the coarse stage K is too rough for that, and a foreground point's 0 says nothing of its match.
 template <typename Scalar>
-[[nodiscard]] Scalar model_weight(std::size_t i, detail::non_deduced<Scalar> map_point_probability,
-                                  const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
+[[nodiscard]] Scalar model_weight(std::size_t i, non_deduced<Scalar> map_point_probability, const FrameOptions& options,
+                                  const FrameState<Scalar>& state) noexcept {
   const Scalar k = state.static_probability[i];
   if (!(map_point_probability >= Scalar(0))) return k;
   if (state.report.stage == Stage::fine && is_mismatch(k, map_point_probability, options.map_point)) return Scalar(0);
@@ -36,7 +36,7 @@ template <typename Scalar>
 
 /// The weight of keypoint i for a map point of probability M, the frame's fallback included.
 template <typename Scalar>
-[[nodiscard]] Scalar keypoint_weight(std::size_t i, detail::non_deduced<Scalar> map_point_probability,
+[[nodiscard]] Scalar keypoint_weight(std::size_t i, non_deduced<Scalar> map_point_probability,
                                      const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
   return map_point_probability >= Scalar(0) && is_raised(state.label[i], state.report.health.fallback)
              ? Scalar(1)
@@ -46,7 +46,7 @@ template <typename Scalar>
 /// M of every map point after this frame, in place.
 template <typename Scalar>
 void update_map_points(const FrameOptions& options, FrameState<Scalar>& state,
-                       span<detail::non_deduced<Scalar>> map_point_probability) noexcept {
+                       span<non_deduced<Scalar>> map_point_probability) noexcept {
   CFP_ASSERT(map_point_probability.size() == state.size());
   for (std::size_t i = 0; i < state.size(); ++i) {
     Scalar& m = map_point_probability[i];
@@ -57,7 +57,7 @@ void update_map_points(const FrameOptions& options, FrameState<Scalar>& state,
 
 /// Sets the weight of every keypoint, and with too few effective observations raises them (apply_fallback).
 template <typename Scalar>
-void weigh_keypoints(span<const detail::non_deduced<Scalar>> map_point_probability, const FrameOptions& options,
+void weigh_keypoints(span<const non_deduced<Scalar>> map_point_probability, const FrameOptions& options,
                      FrameState<Scalar>& state) noexcept {
   CFP_ASSERT(map_point_probability.size() == state.size());
   state.report.mismatched = 0;
