@@ -54,7 +54,7 @@ void solve(benchmark::State& state, double gate) {
   std::size_t k = 0;
   double cost = 0;
   for (auto _ : state) {
-    cost += cfp::solve_assignment(cfp::CostMatrix(all[k], rows, cols), gate, columns, workspace).cost;
+    cost += cfp::solve_assignment(cfp::CostMatrix(all[k], rows, cols), gate, workspace, columns).cost;
     k = (k + 1) % all.size();
   }
   state.counters["cost"] = cost / static_cast<double>(state.iterations());

@@ -9,8 +9,8 @@
 
 #include "cfp/core/random.hpp"
 #include "cfp/detection/box_tracker.hpp"
-#include "cfp/detection/ekf.hpp"
 #include "support/call_times.hpp"
+#include "support/dense_box_filter.hpp"
 
 #ifdef CFP_HAVE_OPENCV
 #include <opencv2/video/tracking.hpp>
@@ -58,40 +58,20 @@ void cfp_split(benchmark::State& state) {
   const cfp::BoxMotionOptions options;
   cfp::BoxFilter<Scalar> filter = cfp::make_box_filter(cfp::Box<Scalar>{260, 120, 340, 360}, options);
   run(state, [&](const cfp::Box<double>& b) {
-    cfp::predict(filter, Scalar(dt), options);
-    cfp::update(filter, cfp::Box<Scalar>{Scalar(b.x1), Scalar(b.y1), Scalar(b.x2), Scalar(b.y2)}, options);
+    cfp::predict_box(filter, Scalar(dt), options);
+    cfp::correct_box(filter, cfp::Box<Scalar>{Scalar(b.x1), Scalar(b.y1), Scalar(b.x2), Scalar(b.y2)}, options);
     return static_cast<double>(filter.box().x1);
   });
 }
 
 template <typename Scalar>
 void cfp_dense_ekf(benchmark::State& state) {
-  using Vector8 = Eigen::Matrix<Scalar, 8, 1>;
-  using Matrix8 = Eigen::Matrix<Scalar, 8, 8>;
-  cfp::EkfState<Scalar, 8> ekf;
-  ekf.mean << 300, 240, std::log(Scalar(80)), std::log(Scalar(240)), 0, 0, 0, 0;
-  ekf.covariance.diagonal() << 5, 46, Scalar(0.0032), Scalar(0.0032), 6400, 57600, Scalar(0.04), Scalar(0.04);
+  const cfp::BoxMotionOptions options;
+  cfp_test::DenseBoxFilter<Scalar> filter(cfp::make_box_filter(cfp::Box<Scalar>{260, 120, 340, 360}, options));
   run(state, [&](const cfp::Box<double>& b) {
-    Matrix8 Q = Matrix8::Zero();
-    const Scalar w = std::exp(ekf.mean[2]), h = std::exp(ekf.mean[3]), d = Scalar(dt);
-    const Scalar q[4] = {Scalar(2.25) * w * w, Scalar(2.25) * h * h, Scalar(0.04), Scalar(0.04)};
-    for (int i = 0; i < 4; ++i) {
-      Q(i, i) = q[i] * d * d * d / 3;
-      Q(i, i + 4) = Q(i + 4, i) = q[i] * d * d / 2;
-      Q(i + 4, i + 4) = q[i] * d;
-    }
-    const auto motion = [&](const Vector8& m, Matrix8& F) -> Vector8 {
-      F.setIdentity();
-      F.template topRightCorner<4, 4>().diagonal().setConstant(d);
-      return F * m;
-    };
-    if (!cfp::ekf_predict(ekf, motion, Q)) state.SkipWithError("not finite");
-    const Scalar sx = Scalar(0.0016) * w * w, sy = Scalar(0.0016) * h * h;
-    const Eigen::Matrix<Scalar, 4, 4> R = Eigen::Matrix<Scalar, 4, 1>(sx, sx, sy, sy).asDiagonal();
-    const Eigen::Matrix<Scalar, 4, 1> z{Scalar(b.x1), Scalar(b.x2), Scalar(b.y1), Scalar(b.y2)};
-    cfp::ekf_update(
-        ekf, z, [](const Vector8& m, Eigen::Matrix<Scalar, 4, 8>& H) { return cfp::box_edges(m, H); }, R);
-    return static_cast<double>(ekf.mean[0] - std::exp(ekf.mean[2]) / 2);
+    const cfp::Box<Scalar> seen{Scalar(b.x1), Scalar(b.y1), Scalar(b.x2), Scalar(b.y2)};
+    if (!filter.predict(Scalar(dt), options) || !filter.correct(seen, options)) state.SkipWithError("not finite");
+    return static_cast<double>(filter.state.mean[0] - std::exp(filter.state.mean[2]) / 2);
   });
 }
 
@@ -159,7 +139,7 @@ void cfp_frame(benchmark::State& state) {
   std::int64_t ids = 0;
   cfp_benchmark::CallTimes times(state);
   const auto next = [&] {
-    const auto result = tracker.update(frames[k], Scalar(dt));
+    const auto result = tracker.track(frames[k], Scalar(dt));
     compensated += result.compensated;
     for (const auto& box : result.boxes) ids = (std::max)(ids, box.id);
     k = (k + 1) % frames.size();

@@ -49,7 +49,7 @@ int main(int argc, char** argv) {
   std::size_t compensated = 0;
   for (std::size_t k = 0; k < file.frames.size(); ++k) {
     const cfp_examples::DetectionFrame& frame = file.frames[k];
-    const cfp::BoxTrackerResult<double> result = tracker.update(frame.detections, frame.timestamp - before);
+    const cfp::BoxTrackerResult<double> result = tracker.track(frame.detections, frame.timestamp - before);
     before = frame.timestamp;
     compensated += result.compensated;
     std::printf("frame %zu at %.3f s\n", k, frame.timestamp);

@@ -197,12 +197,12 @@ struct Figures {
 /// Indices of the boxes that belong to each truth box at IoU >= 0.5.
 template <typename Boxes>
 std::vector<int> match(const std::vector<Truth>& truth, const Boxes& boxes) {
-  std::vector<cfp::ClassBox<double>> left, right;
-  for (const Truth& t : truth) left.push_back({t.box, 0});
-  for (const auto& b : boxes) right.push_back({b.box, 0});
+  std::vector<cfp::Detection<double>> left, right;
+  for (const Truth& t : truth) left.push_back({t.box, 0, 1});
+  for (const auto& b : boxes) right.push_back({b.box, 0, 1});
   std::vector<int> partner(left.size());
   cfp::BoxAssociationWorkspace workspace;
-  cfp::associate_boxes<double>(left, right, 0.4999999, partner, workspace);
+  cfp::associate_boxes(left, right, 0.4999999, workspace, partner);
   return partner;
 }
 
@@ -232,8 +232,8 @@ Figures run(const Sequence& sequence, cfp::BoxTrackerOptions options) {
   };
   for (std::size_t k = 0; k < sequence.frames.size(); ++k) {
     const Frame& frame = sequence.frames[k];
-    const auto result = tracker.update(frame.detections, k == 0 ? 0.0 : sequence.dt_s,
-                                       sequence.use_motion ? &frame.image_motion : nullptr);
+    const auto result = tracker.track(frame.detections, k == 0 ? 0.0 : sequence.dt_s,
+                                      sequence.use_motion ? &frame.image_motion : nullptr);
     const std::vector<int> detected = match(frame.truth, frame.detections);
     const std::vector<int> tracked = match(frame.truth, result.boxes);
     figures.frames += 1;
@@ -301,7 +301,7 @@ std::vector<Variant> variants() {
   vary("max_coast", [](O& o, double v) { o.max_coast = static_cast<int>(v); }, {0, 3, 6, 9, 12});
   vary("confirm_hits", [](O& o, double v) { o.confirm_hits = static_cast<int>(v); }, {1, 2, 3, 5});
   vary("min_iou", [](O& o, double v) { o.min_iou = v; }, {0, 0.1, 0.2, 0.3, 0.4, 0.5});
-  vary("birth_score", [](O& o, double v) { o.birth_score = v; }, {0.6, 0.7, 0.9});
+  vary("birth_threshold", [](O& o, double v) { o.birth_threshold = v; }, {0.6, 0.7, 0.9});
   vary("min_score", [](O& o, double v) { o.min_score = v; }, {0.6, 0.7, 0.9});
   vary("edge_noise", [](O& o, double v) { o.motion.edge_noise = v; }, {0.01, 0.02, 0.04, 0.08, 0.15});
   vary("centre_acceleration", [](O& o, double v) { o.motion.centre_acceleration = v; }, {0.25, 0.5, 1, 1.5, 2, 4});

@@ -23,6 +23,7 @@
 #include "cfp/detection/box_tracker.hpp"
 #include "cfp/detection/box_tracker_types.hpp"
 #include "cfp/detection/ekf.hpp"
+#include "cfp/detection/rate_filter.hpp"
 #include "cfp/evaluation/alignment.hpp"
 #include "cfp/evaluation/calibration.hpp"
 #include "cfp/evaluation/error_statistics.hpp"

@@ -82,8 +82,6 @@ static void instantiate_geometry() noexcept {
 // ---- detection ----
 template struct cfp::CostMatrix<float>;
 template struct cfp::CostMatrix<double>;
-template struct cfp::ClassBox<float>;
-template struct cfp::ClassBox<double>;
 template struct cfp::RateFilter<float>;
 template struct cfp::RateFilter<double>;
 template struct cfp::BoxFilter<float>;
@@ -98,8 +96,8 @@ template class cfp::BoxTracker<float>;
 template class cfp::BoxTracker<double>;
 template <typename Scalar>
 static void instantiate_detection() noexcept {
-  use(&cfp::associate_boxes<Scalar>);
-  use(&cfp::box_edges<Scalar>);
+  using Detections = cfp::span<const cfp::Detection<Scalar>>;
+  use(&cfp::associate_boxes<Detections, Detections>);
 }
 
 // ---- clustering ----

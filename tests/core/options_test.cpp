@@ -50,7 +50,7 @@ TEST_CASE("Every option of the pipeline is refused by its full, unique name", "[
       {"tracker.motion.initial_size_rate", [&](auto& o) { o.tracker.motion.initial_size_rate = nan; }},
       {"tracker.min_iou", [&](auto& o) { o.tracker.min_iou = nan; }},
       {"tracker.min_score", [&](auto& o) { o.tracker.min_score = nan; }},
-      {"tracker.birth_score", [&](auto& o) { o.tracker.birth_score = nan; }},
+      {"tracker.birth_threshold", [&](auto& o) { o.tracker.birth_threshold = nan; }},
       {"tracker.confirm_hits", [](auto& o) { o.tracker.confirm_hits = 0; }},
       {"tracker.max_coast", [](auto& o) { o.tracker.max_coast = -1; }},
       {"tracker.coast_per_hit", [&](auto& o) { o.tracker.coast_per_hit = nan; }},

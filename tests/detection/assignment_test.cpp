@@ -63,7 +63,7 @@ TEMPLATE_TEST_CASE("The assignment is optimal: brute force up to 6 x 7, all gate
       const cfp::CostMatrix costs(values, rows, cols);
       for (const double gate : {inf, 1e300, 2.0, 0.5, 0.1, -0.5, -inf}) {
         std::vector<int> columns(rows, 77);
-        const cfp::AssignmentResult result = cfp::solve_assignment(costs, gate, columns, workspace);
+        const cfp::AssignmentResult result = cfp::solve_assignment(costs, gate, workspace, columns);
         const cfp_test::BestAssignment best = cfp_test::brute_force_assignment(costs, gate);
         CAPTURE(static_cast<int>(kind), repetition, rows, cols, gate);
         REQUIRE(result.status == cfp::Status::ok);
@@ -107,7 +107,7 @@ TEST_CASE("The optimum is scipy's", "[detection]") {
     REQUIRE(values.size() == rows * cols);
     std::vector<int> columns(rows);
     const cfp::AssignmentResult result =
-        cfp::solve_assignment(cfp::CostMatrix(values, rows, cols), gate, columns, workspace);
+        cfp::solve_assignment(cfp::CostMatrix(values, rows, cols), gate, workspace, columns);
     const double left_out = static_cast<double>((std::min)(rows, cols) - result.pairs);
     CAPTURE(problems, rows, cols, gate);
     CHECK_THAT(result.cost + (left_out > 0 ? gate * left_out : 0.0), WithinAbs(numbers[3], 1e-12));
@@ -126,7 +126,7 @@ TEST_CASE("Large assignments carry a proof: the duality gap vanishes", "[detecti
       const cfp::CostMatrix costs(values, rows, cols);
       for (const double gate : {inf, 0.7, 0.02}) {
         std::vector<int> columns(rows);
-        const cfp::AssignmentResult result = cfp::solve_assignment(costs, gate, columns, workspace);
+        const cfp::AssignmentResult result = cfp::solve_assignment(costs, gate, workspace, columns);
         CAPTURE(rows, cols, static_cast<int>(kind), gate);
         CHECK(std::abs(cfp::assignment_gap(costs, gate, columns, workspace.column_saving)) < 1e-9);
         if (kind == Kind::uniform && gate == inf) CHECK(result.pairs == (std::min)(rows, cols));
@@ -140,7 +140,7 @@ TEST_CASE("The verifier refuses what is not optimal or not an assignment", "[det
   const cfp::CostMatrix costs(values, 2, 3);
   cfp::AssignmentWorkspace workspace;
   std::array<int, 2> columns{};
-  cfp::solve_assignment(costs, 1.0, columns, workspace);
+  cfp::solve_assignment(costs, 1.0, workspace, columns);
   CHECK(columns == std::array<int, 2>{0, 1});  // 0.1 + 0.8 equals 0.2 + 0.9 - 0.2
   CHECK(cfp::assignment_gap(costs, 1.0, columns, workspace.column_saving) < 1e-15);
   const auto gap = [&](int a, int b) {
@@ -165,11 +165,11 @@ TEST_CASE("The gate is the price of a pair left out", "[detection]") {
   const cfp::CostMatrix costs(values, 2, 2);
   cfp::AssignmentWorkspace workspace;
   std::array<int, 2> columns{};
-  cfp::solve_assignment(costs, 1.0, columns, workspace);
+  cfp::solve_assignment(costs, 1.0, workspace, columns);
   CHECK(columns == std::array<int, 2>{0, -1});
-  cfp::solve_assignment(costs, 2.0, columns, workspace);
+  cfp::solve_assignment(costs, 2.0, workspace, columns);
   CHECK(columns == std::array<int, 2>{1, 0});
-  cfp::solve_assignment(costs, 0.1, columns, workspace);  // a pair at the gate is not taken
+  cfp::solve_assignment(costs, 0.1, workspace, columns);  // a pair at the gate is not taken
   CHECK(columns == std::array<int, 2>{-1, -1});
 }
 
@@ -185,7 +185,7 @@ TEST_CASE("Hostile costs end: NaN, infinities, extremes, empty", "[detection]") 
     std::vector<int> columns(rows);
     const double gate = extremes[random.index(13)];
     const cfp::CostMatrix costs(values, rows, cols);
-    const cfp::AssignmentResult result = cfp::solve_assignment(costs, gate, columns, workspace);
+    const cfp::AssignmentResult result = cfp::solve_assignment(costs, gate, workspace, columns);
     REQUIRE(result.status == (gate == gate ? cfp::Status::ok : cfp::Status::invalid_input));
     for (std::size_t i = 0; i < rows; ++i) {
       if (columns[i] == cfp::unassigned) continue;
@@ -195,7 +195,7 @@ TEST_CASE("Hostile costs end: NaN, infinities, extremes, empty", "[detection]") 
     if (gate == gate) REQUIRE(cfp::assignment_gap(costs, gate, columns, workspace.column_saving) < 1e186);
     REQUIRE(cfp::is_finite(result.cost));
     const std::size_t most = cfp_test::brute_force_assignment(costs, inf).pairs;
-    cfp::solve_assignment(costs, inf, columns, workspace);
+    cfp::solve_assignment(costs, inf, workspace, columns);
     REQUIRE(static_cast<std::size_t>(std::count_if(columns.begin(), columns.end(), [](int j) { return j >= 0; })) ==
             most);
   }
@@ -206,7 +206,7 @@ TEST_CASE("Empty matrices need no memory", "[detection]") {
     cfp::AssignmentWorkspace fresh;
     std::vector<int> columns(rows, 5);
     const cfp::AssignmentResult result =
-        cfp::solve_assignment(cfp::CostMatrix(std::vector<double>{}, rows, cols), 1.0, columns, fresh);
+        cfp::solve_assignment(cfp::CostMatrix(std::vector<double>{}, rows, cols), 1.0, fresh, columns);
     CHECK(result.status == cfp::Status::ok);
     CHECK(columns == std::vector<int>(rows, cfp::unassigned));
     CHECK(cfp::assignment_gap(cfp::CostMatrix(std::vector<double>{}, rows, cols), 1.0, columns, fresh.column_saving) ==
@@ -219,13 +219,13 @@ TEST_CASE("Equal input gives equal assignments, and warm calls allocate nothing"
   const std::vector<double> values = random_costs<double>(random, 30 * 40, Kind::integer_ties);
   cfp::AssignmentWorkspace warm, fresh;
   std::vector<int> first(40), second(40), third(30);
-  cfp::solve_assignment(cfp::CostMatrix(values, 40, 30), 2.5, first, warm);
-  cfp::solve_assignment(cfp::CostMatrix(values, 30, 40), 2.5, third, warm);
+  cfp::solve_assignment(cfp::CostMatrix(values, 40, 30), 2.5, warm, first);
+  cfp::solve_assignment(cfp::CostMatrix(values, 30, 40), 2.5, warm, third);
   CHECK(cfp_test::allocations_in([&] {
-          cfp::solve_assignment(cfp::CostMatrix(values, 40, 30), 2.5, second, warm);
-          cfp::solve_assignment(cfp::CostMatrix(values, 30, 40), inf, third, warm);
+          cfp::solve_assignment(cfp::CostMatrix(values, 40, 30), 2.5, warm, second);
+          cfp::solve_assignment(cfp::CostMatrix(values, 30, 40), inf, warm, third);
         }) == 0);
   CHECK(first == second);
-  cfp::solve_assignment(cfp::CostMatrix(values, 40, 30), 2.5, second, fresh);
+  cfp::solve_assignment(cfp::CostMatrix(values, 40, 30), 2.5, fresh, second);
   CHECK(first == second);
 }

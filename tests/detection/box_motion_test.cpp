@@ -1,65 +1,18 @@
 #include "cfp/detection/box_motion.hpp"
 
-#include <array>
 #include <cmath>
 #include <limits>
 #include <string>
 #include <type_traits>
 
 #include "cfp/core/random.hpp"
-#include "cfp/detection/ekf.hpp"
 #include "cfp/math/so3.hpp"
 #include "support/catch.hpp"
+#include "support/dense_box_filter.hpp"
 
 namespace {
 
-/// The 8-state EKF of the same model, written with general matrices.
-template <typename Scalar>
-struct DenseBoxFilter {
-  using Vector8 = Eigen::Matrix<Scalar, 8, 1>;
-  using Matrix8 = Eigen::Matrix<Scalar, 8, 8>;
-  cfp::EkfState<Scalar, 8> state;
-
-  explicit DenseBoxFilter(const cfp::BoxFilter<Scalar>& f) {
-    state.covariance.setZero();
-    const std::array<cfp::RateFilter<Scalar>, 4> parts{f.u, f.v, f.log_width, f.log_height};
-    for (int i = 0; i < 4; ++i) {
-      const auto& p = parts[static_cast<std::size_t>(i)];
-      state.mean[i] = p.value;
-      state.mean[i + 4] = p.rate;
-      state.covariance(i, i) = p.var_value;
-      state.covariance(i, i + 4) = state.covariance(i + 4, i) = p.covariance;
-      state.covariance(i + 4, i + 4) = p.var_rate;
-    }
-  }
-  void predict(Scalar dt, const cfp::BoxMotionOptions& o) {
-    Matrix8 Q = Matrix8::Zero();
-    const Scalar w = std::exp(state.mean[2]), h = std::exp(state.mean[3]);
-    const std::array<Scalar, 4> q{Scalar(o.centre_acceleration) * w, Scalar(o.centre_acceleration) * h,
-                                  Scalar(o.size_acceleration), Scalar(o.size_acceleration)};
-    for (int i = 0; i < 4; ++i) {
-      const Scalar d = q[static_cast<std::size_t>(i)] * q[static_cast<std::size_t>(i)];
-      Q(i, i) = d * dt * dt * dt / 3;
-      Q(i, i + 4) = Q(i + 4, i) = d * dt * dt / 2;
-      Q(i + 4, i + 4) = d * dt;
-    }
-    const auto motion = [&](const Vector8& m, Matrix8& F) -> Vector8 {
-      F.setIdentity();
-      F.template topRightCorner<4, 4>() = dt * Eigen::Matrix<Scalar, 4, 4>::Identity();
-      return F * m;
-    };
-    REQUIRE(cfp::ekf_predict(state, motion, Q));
-  }
-  void update(const cfp::Box<Scalar>& b, const cfp::BoxMotionOptions& o) {
-    const Scalar sx = Scalar(o.edge_noise) * std::exp(state.mean[2]),
-                 sy = Scalar(o.edge_noise) * std::exp(state.mean[3]);
-    const Eigen::Matrix<Scalar, 4, 4> R = Eigen::Matrix<Scalar, 4, 1>(sx * sx, sx * sx, sy * sy, sy * sy).asDiagonal();
-    const Eigen::Matrix<Scalar, 4, 1> z(b.x1, b.x2, b.y1, b.y2);
-    REQUIRE(cfp::ekf_update(
-                state, z, [](const Vector8& m, Eigen::Matrix<Scalar, 4, 8>& H) { return cfp::box_edges(m, H); }, R)
-                .status == cfp::Status::ok);
-  }
-};
+using cfp_test::DenseBoxFilter;
 
 template <typename Scalar>
 void require_equal(const cfp::BoxFilter<Scalar>& split, const DenseBoxFilter<Scalar>& dense, double tolerance) {
@@ -97,15 +50,15 @@ TEMPLATE_TEST_CASE("Four two-state filters are the eight-state EKF on edges", "[
     DenseBoxFilter<TestType> dense(split);
     for (int k = 0; k < 40; ++k) {
       const TestType dt = TestType(random.uniform(0.01, 0.1));
-      cfp::predict(split, dt, options);
-      dense.predict(dt, options);
+      cfp::predict_box(split, dt, options);
+      REQUIRE(dense.predict(dt, options));
       require_equal(split, dense, tolerance);
       if (random.uniform() < 0.3) continue;
       const double s = 0.05 * start.width();
       const cfp::Box<double> seen{start.x1 + 3 * k + s * random.normal(), start.y1 + s * random.normal(),
                                   start.x2 + 3 * k + s * random.normal(), start.y2 + s * random.normal()};
-      cfp::update(split, cast(seen), options);
-      dense.update(cast(seen), options);
+      cfp::correct_box(split, cast(seen), options);
+      REQUIRE(dense.correct(cast(seen), options));
       require_equal(split, dense, tolerance);
     }
   }
@@ -117,13 +70,13 @@ TEST_CASE("The Jacobian of the edges agrees with central differences", "[detecti
     Eigen::Matrix<double, 8, 1> state;
     state << random.uniform(0, 640), random.uniform(0, 480), random.uniform(1, 6), random.uniform(1, 6), 1, 2, 3, 4;
     Eigen::Matrix<double, 4, 8> H, unused;
-    const Eigen::Vector4d edges = cfp::box_edges(state, H);
+    const Eigen::Vector4d edges = cfp_test::box_edges(state, H);
     CHECK_THAT(edges[1] - edges[0], WithinAbs(std::exp(state[2]), 1e-10));
     for (int i = 0; i < 8; ++i) {
       Eigen::Matrix<double, 8, 1> plus = state, minus = state;
       plus[i] += 1e-6;
       minus[i] -= 1e-6;
-      const Eigen::Vector4d slope = (cfp::box_edges(plus, unused) - cfp::box_edges(minus, unused)) / 2e-6;
+      const Eigen::Vector4d slope = (cfp_test::box_edges(plus, unused) - cfp_test::box_edges(minus, unused)) / 2e-6;
       CHECK((slope - H.col(i)).norm() < 1e-5);
     }
   }
@@ -149,14 +102,14 @@ TEMPLATE_TEST_CASE("Sizes stay positive and everything finite for any number of 
     cfp::BoxFilter<TestType> filter = cfp::make_box_filter(cfp::Box<TestType>{10, 20, 60, 200}, options);
     filter.log_width.rate = filter.log_height.rate = filter.u.rate = rate;
     for (int k = 0; k < 10000; ++k) {
-      cfp::predict(filter, k % 100 == 0 ? TestType(1e30) : TestType(0.1), options);
+      cfp::predict_box(filter, k % 100 == 0 ? TestType(1e30) : TestType(0.1), options);
       const cfp::Box<TestType> box = filter.box();
       REQUIRE((cfp::is_finite(box.x1) && cfp::is_finite(box.x2) && cfp::is_finite(box.y1) && cfp::is_finite(box.y2)));
       REQUIRE(std::exp(filter.log_width.value) >= TestType(0.99));
       REQUIRE(std::exp(filter.log_width.value) <= TestType(1.01e5));
       REQUIRE((filter.u.var_value >= 0 && filter.u.var_rate >= 0 && cfp::is_finite(filter.u.covariance)));
     }
-    cfp::update(filter, cfp::Box<TestType>{10, 20, 60, 200}, options);
+    cfp::correct_box(filter, cfp::Box<TestType>{10, 20, 60, 200}, options);
     CHECK(cfp::is_finite(filter.u.value));
   }
 }
@@ -168,7 +121,7 @@ TEST_CASE("An image motion moves the box as the homography moves its points", "[
   H(0, 2) = 7;
   H(1, 2) = -3;
   cfp::BoxFilter<double> filter = cfp::make_box_filter(box, options);
-  REQUIRE(cfp::warp(filter, H));
+  REQUIRE(cfp::warp_box(filter, H));
   CHECK_THAT(filter.box().x1, WithinAbs(107, 1e-9));
   CHECK_THAT(filter.box().y2, WithinAbs(297, 1e-9));
 
@@ -176,7 +129,7 @@ TEST_CASE("An image motion moves the box as the homography moves its points", "[
   H(2, 2) = 1;
   filter = cfp::make_box_filter(box, options);
   filter.u.rate = 5;
-  REQUIRE(cfp::warp(filter, cfp::Matrix3<double>(-3 * H)));
+  REQUIRE(cfp::warp_box(filter, cfp::Matrix3<double>(-3 * H)));
   CHECK_THAT(filter.box().x1, WithinAbs(200, 1e-9));
   CHECK_THAT(filter.box().y2, WithinAbs(600, 1e-9));
   CHECK_THAT(filter.u.rate, WithinAbs(10, 1e-12));
@@ -185,14 +138,15 @@ TEST_CASE("An image motion moves the box as the homography moves its points", "[
   // Rolling to and fro by a degree for ten seconds: w^2 gains (sin 1deg)^2 h^2 each time, a third in all; bounding the
   // rotated corners would have made the box 17 times as wide.
   filter = cfp::make_box_filter(box, options);
-  for (int k = 0; k < 300; ++k) REQUIRE(cfp::warp(filter, cfp::so3_exp<double>({0, 0, k % 2 == 0 ? 0.0175 : -0.0175})));
+  for (int k = 0; k < 300; ++k)
+    REQUIRE(cfp::warp_box(filter, cfp::so3_exp<double>({0, 0, k % 2 == 0 ? 0.0175 : -0.0175})));
   CHECK(filter.box().width() < 1.5 * box.width());
   CHECK_THAT(filter.u.value, WithinAbs(130, 1e-6));
 
   for (const double bad :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e300, 0.0}) {
     cfp::BoxFilter<double> kept = filter;
-    CHECK_FALSE(cfp::warp(kept, cfp::Matrix3<double>(cfp::Matrix3<double>::Constant(bad))));
+    CHECK_FALSE(cfp::warp_box(kept, cfp::Matrix3<double>(cfp::Matrix3<double>::Constant(bad))));
     CHECK(kept.u.value == filter.u.value);
   }
 }

@@ -39,7 +39,7 @@ TEST_CASE("Properties of the assignment", "[properties]") {
     const cfp::CostMatrix costs(values, rows, cols);
     cfp::AssignmentWorkspace workspace;
     std::vector<int> columns(rows);
-    const cfp::AssignmentResult result = cfp::solve_assignment(costs, gate, columns, workspace);
+    const cfp::AssignmentResult result = cfp::solve_assignment(costs, gate, workspace, columns);
     const cfp_test::BestAssignment best = cfp_test::brute_force_assignment(costs, gate);
     if (std::isinf(gate)) {
       RC_ASSERT(result.pairs == best.pairs);
@@ -73,10 +73,10 @@ TEST_CASE("Properties of the assignment", "[properties]") {
     const auto objective = [&](const cfp::AssignmentResult& r) {
       return r.cost - (std::isinf(gate) ? 1e3 : gate) * static_cast<double>(r.pairs);
     };
-    const double a = objective(cfp::solve_assignment(cfp::CostMatrix(values, rows, cols), gate, columns, workspace));
-    const double b = objective(cfp::solve_assignment(cfp::CostMatrix(permuted, rows, cols), gate, columns, workspace));
+    const double a = objective(cfp::solve_assignment(cfp::CostMatrix(values, rows, cols), gate, workspace, columns));
+    const double b = objective(cfp::solve_assignment(cfp::CostMatrix(permuted, rows, cols), gate, workspace, columns));
     const double c =
-        objective(cfp::solve_assignment(cfp::CostMatrix(transposed, cols, rows), gate, flipped, workspace));
+        objective(cfp::solve_assignment(cfp::CostMatrix(transposed, cols, rows), gate, workspace, flipped));
     RC_ASSERT(std::abs(a - b) < 1e-9);
     RC_ASSERT(std::abs(a - c) < 1e-9);
   });
@@ -89,7 +89,7 @@ TEST_CASE("Properties of the assignment", "[properties]") {
     const cfp::CostMatrix costs(values, rows, cols);
     cfp::AssignmentWorkspace workspace;
     std::vector<int> columns(rows);
-    const cfp::AssignmentResult result = cfp::solve_assignment(costs, gate, columns, workspace);
+    const cfp::AssignmentResult result = cfp::solve_assignment(costs, gate, workspace, columns);
     RC_ASSERT(result.status == (gate == gate ? cfp::Status::ok : cfp::Status::invalid_input));
     RC_ASSERT(std::isfinite(result.cost));
     std::vector<int> used(cols, 0);

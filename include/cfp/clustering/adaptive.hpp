@@ -140,8 +140,8 @@ inline namespace CFP_ISA {
 /// share with the nearest end stands. Fewer than three depths, or an eps that overflows: `fixed`. O(n). Allocates only
 /// when the workspace grows. Source: ours; paper IV-C leaves it open.
 template <typename Scalar>
-[[nodiscard]] DbscanOptions adaptive_options(span<const non_deduced<Scalar>> depths,
-                                             const AdaptiveOptions& options, DbscanWorkspace<Scalar>& workspace) {
+[[nodiscard]] DbscanOptions adaptive_options(span<const non_deduced<Scalar>> depths, const AdaptiveOptions& options,
+                                             DbscanWorkspace<Scalar>& workspace) {
   CFP_ASSERT(std::is_sorted(depths.begin(), depths.end()));
   const std::size_t n = depths.size();
   if (n < 3 || options.rule == AdaptiveRule::fixed) return options.fixed;

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <type_traits>
 #include <vector>
 
 #include "cfp/clustering/dbscan.hpp"
@@ -120,7 +119,7 @@ inline namespace CFP_ISA {
 template <typename Values>
 [[nodiscard]] DbscanVerdict verify_dbscan(const Values& values, const DbscanOptions& options, span<const int> labels,
                                           const DbscanVerifierOptions& strictness = {}) {
-  using Scalar = std::decay_t<decltype(*values.data())>;
+  using Scalar = range_value_t<Values>;
   if (labels.size() != values.size()) return {DbscanFault::label_count, 0};
   const detail::DbscanOracle<Scalar> oracle(values, options);
   DbscanVerdict verdict;

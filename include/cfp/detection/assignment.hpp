@@ -45,7 +45,7 @@ struct AssignmentResult {
   double cost = 0;  ///< sum of the costs of the pairs
 };
 
-/// Scratch memory, reused; grows to the largest problem seen. After a call `row_saving` and `column_saving` are the
+/// Grows to the largest problem seen, then allocates nothing. After a call `row_saving` and `column_saving` are the
 /// dual solution, with which `assignment_gap` proves the optimum.
 struct AssignmentWorkspace {
   std::vector<double> row_saving;     ///< a_i >= 0, one per row
@@ -56,9 +56,11 @@ struct AssignmentWorkspace {
     double distance, offset;
   };
   std::vector<double> costs, price, open_price, distance;
-  std::vector<std::ptrdiff_t> column_of_row, row_of_column, queue;
+  std::vector<std::ptrdiff_t> column_of_row, row_of_column, cheapest;
   std::vector<Visit> visits;
 };
+
+inline namespace CFP_ISA {
 
 /// Fills column_of_row (size rows) with the optimal column of each row, or `unassigned`. Exact up to the rounding of
 /// double.
@@ -67,13 +69,13 @@ struct AssignmentWorkspace {
 /// Ties: equal input gives equal output; among equally cheap partners the free one, then the one of the lower index is
 /// tried first. Allocates only while the workspace grows.
 ///
-/// Source: shortest augmenting paths with prices, started by auction-like row bids (augmenting row reduction) as in R.
-/// Jonker and A. Volgenant, "A shortest augmenting path algorithm for dense and sparse linear assignment problems",
-/// Computing 38, 1987. Departure: every row owns a dummy column of cost max_cost, which makes the problem rectangular
-/// and gated by itself. The paper says "Hungarian algorithm" and neither cost nor gate.
+/// Source: shortest augmenting paths with prices, R. Jonker and A. Volgenant, "A shortest augmenting path algorithm for
+/// dense and sparse linear assignment problems", Computing 38, 1987. Departure: every row owns a dummy column of cost
+/// max_cost, which makes the problem rectangular and gated by itself. The paper says "Hungarian algorithm" and neither
+/// cost nor gate.
 template <typename Scalar>
-AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_cost, span<int> column_of_row,
-                                  AssignmentWorkspace& workspace);
+AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_cost, AssignmentWorkspace& workspace,
+                                  span<int> column_of_row);
 
 /// How far an assignment may be from the optimum: its objective minus a lower bound that holds by duality for any
 /// `column_saving` (negative or NaN entries count as 0). 0, up to rounding, proves the optimum; the savings that
@@ -83,6 +85,7 @@ template <typename Scalar>
 [[nodiscard]] double assignment_gap(const CostMatrix<Scalar>& costs, double max_cost, span<const int> column_of_row,
                                     span<const double> column_saving) noexcept;
 
+}  // namespace CFP_ISA
 }  // namespace cfp
 
 #include "cfp/detection/assignment_impl.hpp"

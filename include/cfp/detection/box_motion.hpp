@@ -3,8 +3,7 @@
 /// width and height positive however long a box is predicted. The paper (IV-A) names an EKF and leaves state, noise and
 /// time open.
 ///
-/// Motion over dt seconds: x <- x + dt x', white noise on the acceleration of spectral density q^2:
-///   Q = q^2 [dt^3/3, dt^2/2; dt^2/2, dt], so one step of 2 dt equals two steps of dt.
+/// Motion: constant rates, white noise on the accelerations (rate_filter.hpp).
 /// Measurement: the four edges, h = (u - w/2, u + w/2, v - h/2, v + h/2) with w = exp(log width): not linear, hence an
 /// EKF. The noise of an edge is proportional to the box, s_x = edge_noise * w for the vertical edges and s_y =
 /// edge_noise * h for the horizontal ones, w and h of the prediction.
@@ -19,12 +18,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-
-#include <Eigen/Core>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
+#include "cfp/core/span.hpp"
+#include "cfp/core/types.hpp"
+#include "cfp/detection/rate_filter.hpp"
 #include "cfp/geometry/box.hpp"
 
 namespace cfp {
@@ -47,59 +46,96 @@ struct BoxMotionOptions {
   return {};
 }
 
-/// One of the four filters: a value, its rate per second, and their covariance.
-template <typename Scalar>
-struct RateFilter {
-  Scalar value{}, rate{};
-  Scalar var_value{}, covariance{}, var_rate{};
-
-  /// Constant rate over dt >= 0 seconds; q: square root of the spectral density of the acceleration.
-  constexpr void predict(Scalar dt_s, Scalar q) noexcept {
-    const Scalar noise = q * q * dt_s;
-    value += dt_s * rate;
-    var_value += dt_s * (Scalar(2) * covariance + dt_s * (var_rate + noise / Scalar(3)));
-    covariance += dt_s * (var_rate + noise / Scalar(2));
-    var_rate += noise;
-  }
-  /// Update with an innovation whose measurement matrix is (1, 0). Joseph's form, written out.
-  constexpr void update(Scalar innovation, Scalar variance) noexcept {
-    const Scalar s = var_value + variance;
-    if (!(s > Scalar(0)) || !is_finite(innovation) || !is_finite(s)) return;
-    const Scalar k = var_value / s, k_rate = covariance / s, rest = variance / s;  // rest = 1 - k, without cancellation
-    value += k * innovation;
-    rate += k_rate * innovation;
-    var_rate = var_rate - Scalar(2) * k_rate * covariance + k_rate * k_rate * s;
-    covariance *= rest;
-    var_value *= rest;
-    if (!(var_rate > Scalar(0))) var_rate = Scalar(0);
-  }
-};
-
 /// The box filter in its split form.
 template <typename Scalar>
 struct BoxFilter {
   RateFilter<Scalar> u, v, log_width, log_height;
 
-  [[nodiscard]] Box<Scalar> box() const noexcept {
+  [[nodiscard]] CFP_INLINE Box<Scalar> box() const noexcept {
     using std::exp;
     const Scalar w = Scalar(0.5) * exp(log_width.value), h = Scalar(0.5) * exp(log_height.value);
     return {u.value - w, v.value - h, u.value + w, v.value + h};
   }
 };
 
+namespace detail {
+inline namespace CFP_ISA {
+
+inline constexpr double box_farthest_px = 1e7;  // centres and velocities are kept below, far outside any image
+inline constexpr double box_largest_px = 1e5;   // sizes lie between 1 px and this
+inline constexpr double box_largest_log = 11.512925464970229;  // log of the line above
+
+// Keeps a value in its range, where it stops at the border, and its rate and covariance finite.
+template <typename Scalar>
+void confine(RateFilter<Scalar>& f, Scalar low, Scalar high, Scalar largest_rate) noexcept {
+  const auto bounded = [](Scalar x, Scalar least, Scalar most) { return (std::min)(most, (std::max)(least, x)); };
+  f.rate = f.value >= low && f.value <= high ? bounded(f.rate, -largest_rate, largest_rate) : Scalar(0);
+  f.value = bounded(f.value, low, high);
+  const Scalar limit = Scalar(box_farthest_px * box_farthest_px);
+  if (f.var_value <= limit && f.var_rate <= limit && is_finite(f.covariance)) return;
+  f.var_value = (std::min)(limit, f.var_value);  // NaN becomes the limit
+  f.var_rate = (std::min)(limit, f.var_rate);
+  f.covariance = Scalar(0);
+}
+
+template <typename Scalar>
+void confine(BoxFilter<Scalar>& filter) noexcept {
+  const Scalar far = Scalar(box_farthest_px);
+  confine(filter.u, -far, far, far);
+  confine(filter.v, -far, far, far);
+  confine(filter.log_width, Scalar(0), Scalar(box_largest_log), Scalar(1e3));
+  confine(filter.log_height, Scalar(0), Scalar(box_largest_log), Scalar(1e3));
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
+
+inline namespace CFP_ISA {
+
 /// A filter at rest on a detected box, which has to be proper (is_proper) with edges below 1e6 px in magnitude.
 template <typename Scalar>
-[[nodiscard]] BoxFilter<Scalar> make_box_filter(const Box<Scalar>& box, const BoxMotionOptions& options) noexcept;
+[[nodiscard]] BoxFilter<Scalar> make_box_filter(const Box<Scalar>& box, const BoxMotionOptions& options) noexcept {
+  using std::log;
+  const Scalar w = box.width(), h = box.height(), zero(0);
+  const Scalar noise = Scalar(options.edge_noise) * Scalar(options.edge_noise);
+  const Scalar rate_u = Scalar(options.initial_centre_rate) * w, rate_v = Scalar(options.initial_centre_rate) * h;
+  const Scalar size_rate = Scalar(options.initial_size_rate);
+  BoxFilter<Scalar> filter;
+  filter.u = {Scalar(0.5) * (box.x1 + box.x2), zero, noise * w * w / Scalar(2), zero, rate_u * rate_u};
+  filter.v = {Scalar(0.5) * (box.y1 + box.y2), zero, noise * h * h / Scalar(2), zero, rate_v * rate_v};
+  filter.log_width = {Scalar(log(w)), zero, Scalar(2) * noise, zero, size_rate * size_rate};
+  filter.log_height = {Scalar(log(h)), zero, Scalar(2) * noise, zero, size_rate * size_rate};
+  detail::confine(filter);
+  return filter;
+}
 
 /// Moves the filter dt seconds ahead (finite, >= 0). Sizes stay within [1, 1e5] px, where their rate becomes 0 (so they
 /// are positive after any number of predictions), and the centre within +-1e7 px: nothing overflows. Equal to the EKF
 /// up to there.
 template <typename Scalar>
-void predict(BoxFilter<Scalar>& filter, Scalar dt_s, const BoxMotionOptions& options) noexcept;
+void predict_box(BoxFilter<Scalar>& filter, non_deduced<Scalar> dt_s, const BoxMotionOptions& options) noexcept {
+  using std::exp;
+  const Scalar q = Scalar(options.centre_acceleration), q_size = Scalar(options.size_acceleration);
+  filter.u.predict(dt_s, q * exp(filter.log_width.value));
+  filter.v.predict(dt_s, q * exp(filter.log_height.value));
+  filter.log_width.predict(dt_s, q_size);
+  filter.log_height.predict(dt_s, q_size);
+  detail::confine(filter);
+}
 
 /// Takes in a detected box (proper, else ignored).
 template <typename Scalar>
-void update(BoxFilter<Scalar>& filter, const Box<Scalar>& measured, const BoxMotionOptions& options) noexcept;
+void correct_box(BoxFilter<Scalar>& filter, const Box<Scalar>& measured, const BoxMotionOptions& options) noexcept {
+  using std::exp;
+  if (!is_proper(measured)) return;
+  const Scalar w = exp(filter.log_width.value), h = exp(filter.log_height.value);
+  const Scalar noise = Scalar(options.edge_noise) * Scalar(options.edge_noise);
+  filter.u.correct(Scalar(0.5) * (measured.x1 + measured.x2) - filter.u.value, noise * w * w / Scalar(2));
+  filter.v.correct(Scalar(0.5) * (measured.y1 + measured.y2) - filter.v.value, noise * h * h / Scalar(2));
+  filter.log_width.correct((measured.width() - w) / w, Scalar(2) * noise);
+  filter.log_height.correct((measured.height() - h) / h, Scalar(2) * noise);
+  detail::confine(filter);
+}
 
 /// Where an image motion takes the filter: `H` (homography; affine when its last row is 0 0 1) maps pixels of the frame
 /// before to this one. With J its Jacobian at the centre: centre by H, velocity by J, and sizes to the bounding box of
@@ -108,24 +144,34 @@ void update(BoxFilter<Scalar>& filter, const Box<Scalar>& measured, const BoxMot
 /// the split form needs. Returns false, and leaves the filter, when H is not finite, the centre falls behind the
 /// camera, or a size leaves the limits.
 template <typename Scalar>
-[[nodiscard]] bool warp(BoxFilter<Scalar>& filter, const Eigen::Matrix<Scalar, 3, 3>& H) noexcept;
-
-/// The measurement of the 8-state form (u, v, log width, log height, then their rates): edges (x1, x2, y1, y2) and
-/// Jacobian.
-template <typename Scalar>
-[[nodiscard]] Eigen::Matrix<Scalar, 4, 1> box_edges(const Eigen::Matrix<Scalar, 8, 1>& state,
-                                                    Eigen::Matrix<Scalar, 4, 8>& H) noexcept {
+[[nodiscard]] bool warp_box(BoxFilter<Scalar>& filter, const Matrix3<Scalar>& H) noexcept {
   using std::exp;
-  const Scalar w = Scalar(0.5) * exp(state[2]), h = Scalar(0.5) * exp(state[3]);
-  H.setZero();
-  H(0, 0) = H(1, 0) = H(2, 1) = H(3, 1) = Scalar(1);
-  H(0, 2) = -w;
-  H(1, 2) = w;
-  H(2, 3) = -h;
-  H(3, 3) = h;
-  return {state[0] - w, state[0] + w, state[1] - h, state[1] + h};
+  using std::log;
+  using std::sqrt;
+  const Scalar u = filter.u.value, v = filter.v.value;
+  const Scalar s = H(2, 0) * u + H(2, 1) * v + H(2, 2);
+  if (!H.allFinite() || !(s * H(2, 2) > Scalar(0)) || !is_finite(s)) return false;
+  const Scalar x = (H(0, 0) * u + H(0, 1) * v + H(0, 2)) / s, y = (H(1, 0) * u + H(1, 1) * v + H(1, 2)) / s;
+  const Scalar a = (H(0, 0) - x * H(2, 0)) / s, b = (H(0, 1) - x * H(2, 1)) / s;
+  const Scalar c = (H(1, 0) - y * H(2, 0)) / s, d = (H(1, 1) - y * H(2, 1)) / s;
+  const Scalar w = exp(filter.log_width.value), h = exp(filter.log_height.value);
+  const Scalar width = sqrt(a * a * w * w + b * b * h * h), height = sqrt(c * c * w * w + d * d * h * h);
+  const Scalar far = Scalar(detail::box_farthest_px), largest = Scalar(detail::box_largest_px);
+  const auto within = [](Scalar value, Scalar low, Scalar high) { return value >= low && value <= high; };
+  if (!within(x, -far, far) || !within(y, -far, far)) return false;
+  if (!within(width, Scalar(1), largest) || !within(height, Scalar(1), largest)) return false;
+  const RateFilter<Scalar> fu = filter.u, fv = filter.v;
+  const auto mix = [&](Scalar p, Scalar q, Scalar value) {
+    return RateFilter<Scalar>{value, p * fu.rate + q * fv.rate, p * p * fu.var_value + q * q * fv.var_value,
+                              p * p * fu.covariance + q * q * fv.covariance, p * p * fu.var_rate + q * q * fv.var_rate};
+  };
+  filter.u = mix(a, b, x);
+  filter.v = mix(c, d, y);
+  filter.log_width.value = log(width);
+  filter.log_height.value = log(height);
+  detail::confine(filter);
+  return true;
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp
-
-#include "cfp/detection/box_motion_impl.hpp"

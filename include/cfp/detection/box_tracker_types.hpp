@@ -44,7 +44,7 @@ struct BoxTrackerOptions {
   BoxMotionOptions motion;
   double min_iou = 0.3;       ///< gate of the association: a pair needs more than this IoU, in [0, 1)
   double min_score = -1e300;  ///< detections below are ignored
-  double birth_score =
+  double birth_threshold =
       -1e300;            ///< detections below extend a track but start none (and are not output when they extend none)
   int confirm_hits = 2;  ///< detections before a track may be compensated, >= 1
   int max_coast = 6;     ///< missed frames in a row that are compensated, >= 0 (the paper's figure shows six)
@@ -59,7 +59,7 @@ struct BoxTrackerOptions {
   if (const OptionPath field = nested("motion", invalid_field(o.motion))) return field;
   if (!(o.min_iou >= 0 && o.min_iou < 1)) return "min_iou";
   if (!is_finite(o.min_score)) return "min_score";
-  if (!is_finite(o.birth_score)) return "birth_score";
+  if (!is_finite(o.birth_threshold)) return "birth_threshold";
   if (!(o.confirm_hits >= 1)) return "confirm_hits";
   if (!(o.max_coast >= 0)) return "max_coast";
   if (!(o.coast_per_hit > 0)) return "coast_per_hit";
@@ -76,7 +76,7 @@ struct BoxTrackerResult {
   Status status = Status::ok;            ///< invalid_input: dt was negative or not finite, and counted as 0
   span<const TrackedBox<Scalar>> boxes;  ///< oldest track first
   std::size_t skipped = 0;               ///< detections that were improper, too large (1e6 px) or without a score
-  std::size_t ignored = 0;               ///< detections below min_score, or below birth_score without a track
+  std::size_t ignored = 0;               ///< detections below min_score, or below birth_threshold without a track
   std::size_t compensated = 0;           ///< boxes among the output that the detector missed
   std::size_t unwarped = 0;              ///< predictions that the image motion could not be applied to
 };

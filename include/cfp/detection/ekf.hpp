@@ -1,9 +1,10 @@
 /// @file ekf.hpp
-/// A small extended Kalman filter with fixed sizes: the reference of the box filter (paper IV-A names an EKF and
-/// neither state nor noise), and useful by itself. Nothing allocates.
+/// A small extended Kalman filter with fixed sizes (paper IV-A names an EKF and neither state nor noise). Nothing
+/// allocates.
 #pragma once
 
-#include <Eigen/Cholesky>
+#include <cmath>
+
 #include <Eigen/Core>
 
 #include "cfp/core/numeric.hpp"
@@ -25,6 +26,28 @@ struct EkfUpdate {
       0;  ///< r' S^-1 r of the innovation r; chi-squared with m degrees of freedom when the model holds
 };
 
+namespace detail {
+inline namespace CFP_ISA {
+
+// S = L L' in place, L in the lower triangle. False unless every pivot stands out of the rounding of the diagonal.
+template <typename Scalar, int m>
+[[nodiscard]] bool factor_innovation(Eigen::Matrix<Scalar, m, m>& S) noexcept {
+  using std::sqrt;
+  const Scalar least = Scalar(Tolerance<Scalar>::degenerate) * S.diagonal().maxCoeff();
+  for (int j = 0; j < m; ++j) {
+    const Scalar pivot = S(j, j) - S.row(j).head(j).squaredNorm();
+    if (!(pivot > least) || !(pivot > Scalar(0))) return false;
+    S(j, j) = sqrt(pivot);
+    for (int i = j + 1; i < m; ++i) S(i, j) = (S(i, j) - S.row(i).head(j).dot(S.row(j).head(j))) / S(j, j);
+  }
+  return true;
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
+
+inline namespace CFP_ISA {
+
 /// Prediction: mean <- f(mean), P <- F P F' + Q, symmetrised. `motion(mean, F)` returns f(mean) and writes its Jacobian
 /// F at the mean (n x n). Returns false, and leaves the state as it was, when the result is not finite.
 template <typename Scalar, int n, typename Motion, typename Noise>
@@ -41,10 +64,10 @@ template <typename Scalar, int n, typename Motion, typename Noise>
   return true;
 }
 
-/// Update with a measurement z of m numbers: r = z - h(mean), S = H P H' + R, K = P H' S^-1 (an LDLT solve, never an
-/// inverse), mean <- mean + K r, P <- (I - K H) P (I - K H)' + K R K' (Joseph's form, symmetrised: P stays positive
-/// semi-definite). `measure(mean, H)` returns h(mean) and writes its Jacobian H (m x n). On any status but ok the state
-/// is left as it was.
+/// Update with a measurement z of m numbers: r = z - h(mean), S = H P H' + R = L L', K = P H' S^-1 (by two triangular
+/// solves, never an inverse), mean <- mean + K r, P <- (I - K H) P (I - K H)' + K R K' (Joseph's form, symmetrised: P
+/// stays positive semi-definite). `measure(mean, H)` returns h(mean) and writes its Jacobian H (m x n). On any status
+/// but ok the state is left as it was.
 template <typename Scalar, int n, int m, typename Measure, typename Noise>
 EkfUpdate ekf_update(EkfState<Scalar, n>& state, const Eigen::Matrix<Scalar, m, 1>& z, Measure&& measure,
                      const Eigen::MatrixBase<Noise>& R) noexcept {
@@ -53,22 +76,22 @@ EkfUpdate ekf_update(EkfState<Scalar, n>& state, const Eigen::Matrix<Scalar, m, 
   const Eigen::Matrix<Scalar, n, 1> before = state.mean;
   const Square P = state.covariance;
   const Eigen::Matrix<Scalar, m, 1> r = z - measure(before, H);
-  const Eigen::Matrix<Scalar, m, n> HP = H * P;
-  const Eigen::Matrix<Scalar, m, m> S = HP * H.transpose() + R;
+  Eigen::Matrix<Scalar, m, n> K_transposed = H * P;
+  Eigen::Matrix<Scalar, m, m> S = K_transposed * H.transpose() + R;
   if (!r.allFinite() || !S.allFinite()) return {Status::invalid_input, 0};
-  const Eigen::LDLT<Eigen::Matrix<Scalar, m, m>> solver(S);
-  const auto& pivots = solver.vectorD();
-  if (solver.info() != Eigen::Success ||
-      !(pivots.minCoeff() > Scalar(Tolerance<Scalar>::degenerate) * pivots.maxCoeff()))
-    return {Status::degenerate, 0};
-  const Eigen::Matrix<Scalar, n, m> K = solver.solve(HP).transpose();
+  if (!detail::factor_innovation(S)) return {Status::degenerate, 0};
+  const auto L = S.template triangularView<Eigen::Lower>();
+  L.solveInPlace(K_transposed);
+  S.transpose().template triangularView<Eigen::Upper>().solveInPlace(K_transposed);
+  const Eigen::Matrix<Scalar, n, m> K = K_transposed.transpose();
   const Eigen::Matrix<Scalar, n, 1> mean = before + K * r;
   const Square A = Square::Identity() - K * H;
   const Square joseph = A * P * A.transpose() + K * R * K.transpose();
   if (!mean.allFinite() || !joseph.allFinite()) return {Status::invalid_input, 0};
   state.mean = mean;
   state.covariance = Scalar(0.5) * (joseph + joseph.transpose());
-  return {Status::ok, static_cast<double>(r.dot(solver.solve(r)))};
+  return {Status::ok, static_cast<double>(L.solve(r).squaredNorm())};
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

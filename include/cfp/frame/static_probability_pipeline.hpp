@@ -157,7 +157,7 @@ class StaticProbabilityPipeline {
       // The difference of two clocks of 10^9 s fits a double to a fraction of a microsecond, a float not at all.
       const double dt = has_previous_ ? frame.timestamp_s - previous_timestamp_s_ : 0.0;
       const BoxTrackerResult<Scalar> tracked =
-          tracker_.update(frame.detections, static_cast<Scalar>(dt), frame.image_motion);
+          tracker_.track(frame.detections, static_cast<Scalar>(dt), frame.image_motion);
       result.time = tracked.status;
       frames_without_detections_ = frame.detections.empty() ? frames_without_detections_ + 1 : 0;
       result.frames_without_detections = frames_without_detections_;
