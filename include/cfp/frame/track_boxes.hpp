@@ -29,8 +29,8 @@ void track_boxes(const Frame<Scalar>& frame, const FrameOptions& options, BoxTra
   }
   const Matrix3<Scalar>* const motion = frame.image_motion ? &*frame.image_motion : nullptr;
   const bool ran = frame.detections.has_value();
-  const BoxTrackerResult<Scalar> tracked = ran ? tracker.update(*frame.detections, static_cast<Scalar>(dt), motion)
-                                               : tracker.skip(static_cast<Scalar>(dt), motion);
+  const BoxTrackerResult<Scalar> tracked = ran ? tracker.track(*frame.detections, static_cast<Scalar>(dt), motion)
+                                               : tracker.coast(static_cast<Scalar>(dt), motion);
   report.frames_since_detector = ran ? 0 : report.frames_since_detector + 1;
   if (ran) report.frames_without_detections = frame.detections->empty() ? report.frames_without_detections + 1 : 0;
   std::copy_if(tracked.boxes.begin(), tracked.boxes.end(), std::back_inserter(state.boxes),
