@@ -3,13 +3,16 @@
 #include <limits>
 #include <vector>
 
+#include <Eigen/LU>
+#include <Eigen/SVD>
+
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
 #include "support/two_view_scene.hpp"
 
 using cfp::Matrix3;
+using cfp::PointPairs;
 using cfp::PointSpan;
-using cfp::span;
 using cfp::Status;
 using cfp::Vector2;
 using cfp_test::make_two_view_scene;
@@ -20,6 +23,10 @@ template <typename Scalar>
 double difference(const Matrix3<Scalar>& A, const Matrix3<double>& B) {
   const Matrix3<double> a = A.template cast<double>().normalized(), b = B.normalized();
   return (std::min)((a - b).norm(), (a + b).norm());
+}
+
+PointSpan<double, 2> first_seven(const std::vector<std::array<double, 2>>& points) {
+  return {points.front().data(), 7};
 }
 
 cfp_test::TwoViewOptions clean(std::size_t pairs) {
@@ -35,7 +42,7 @@ TEMPLATE_TEST_CASE("Eight points recover the exact F", "[geometry]", float, doub
   for (int trial = 0; trial < 100; ++trial) {
     const auto scene = make_two_view_scene<TestType>(random, clean(trial % 2 == 0 ? 8 : 60));
     Matrix3<TestType> F;
-    REQUIRE(cfp::fundamental_8point<TestType>(scene.prev, scene.cur, {}, F) == Status::ok);
+    REQUIRE(cfp::fundamental_8point(PointPairs{scene.prev, scene.cur}, F) == Status::ok);
     // Float pixels carry 3e-5 px of rounding, which eight points alone may amplify.
     for (std::size_t i = 0; i < scene.prev.size(); ++i) {
       const double distance = double(
@@ -57,7 +64,7 @@ TEMPLATE_TEST_CASE("Seven points give the true F among their solutions", "[geome
   for (int trial = 0; trial < trials; ++trial) {
     const auto scene = make_two_view_scene<TestType>(random, clean(7));
     std::array<Matrix3<TestType>, 3> solutions;
-    const int count = cfp::fundamental_7point<TestType>(scene.prev, scene.cur, solutions);
+    const int count = cfp::fundamental_7point(PointPairs{scene.prev, scene.cur}, solutions);
     REQUIRE((count == 1 || count == 3));
     double best = 1;
     for (int k = 0; k < count; ++k) {
@@ -90,11 +97,10 @@ TEST_CASE("Pure translations along an axis, with coefficients that vanish, are s
       scene.cur[i] = {u.x(), u.y()};
     }
     Matrix3<double> F;
-    REQUIRE(cfp::fundamental_8point<double>(scene.prev, scene.cur, {}, F) == Status::ok);
+    REQUIRE(cfp::fundamental_8point(PointPairs{scene.prev, scene.cur}, F) == Status::ok);
     CHECK(difference<double>(F, F_true) < 1e-8);
     std::array<Matrix3<double>, 3> solutions;
-    const int count = cfp::fundamental_7point<double>(PointSpan<double, 2>(scene.prev.front().data(), 7),
-                                                      PointSpan<double, 2>(scene.cur.front().data(), 7), solutions);
+    const int count = cfp::fundamental_7point(PointPairs{first_seven(scene.prev), first_seven(scene.cur)}, solutions);
     double best = 1;
     for (int k = 0; k < count; ++k) best = (std::min)(best, difference<double>(solutions[std::size_t(k)], F_true));
     CHECK(best < 1e-8);
@@ -107,13 +113,13 @@ TEST_CASE("Swapping the images transposes F; moving and scaling the pixels maps 
   options.noise_px = 0.5;
   const auto scene = make_two_view_scene<double>(random, options);
   Matrix3<double> F, swapped, moved;
-  REQUIRE(cfp::fundamental_8point<double>(scene.prev, scene.cur, {}, F) == Status::ok);
-  REQUIRE(cfp::fundamental_8point<double>(scene.cur, scene.prev, {}, swapped) == Status::ok);
+  REQUIRE(cfp::fundamental_8point(PointPairs{scene.prev, scene.cur}, F) == Status::ok);
+  REQUIRE(cfp::fundamental_8point(PointPairs{scene.cur, scene.prev}, swapped) == Status::ok);
   CHECK(difference<double>(swapped.transpose(), F) < 1e-9);
   auto prev = scene.prev, cur = scene.cur;
   for (auto& x : prev) x = {3 * x[0] + 100, 3 * x[1] - 50};
   for (auto& x : cur) x = {3 * x[0] - 20, 3 * x[1] + 70};
-  REQUIRE(cfp::fundamental_8point<double>(prev, cur, {}, moved) == Status::ok);
+  REQUIRE(cfp::fundamental_8point(PointPairs{prev, cur}, moved) == Status::ok);
   Matrix3<double> S_prev, S_cur;
   S_prev << 3, 0, 100, 0, 3, -50, 0, 0, 1;
   S_cur << 3, 0, -20, 0, 3, 70, 0, 0, 1;
@@ -129,18 +135,18 @@ TEST_CASE("A weight of zero is absence, an integer weight is repetition", "[geom
   auto prev = scene.prev, cur = scene.cur;
   prev.resize(30), cur.resize(30);
   Matrix3<double> F, expected;
-  REQUIRE(cfp::fundamental_8point<double>(prev, cur, {}, expected) == Status::ok);
+  REQUIRE(cfp::fundamental_8point(PointPairs{prev, cur}, expected) == Status::ok);
   for (std::size_t i = 30; i < 40; ++i) weights[i] = i % 2 == 0 ? 0.0 : -1.0;
   weights[39] = std::numeric_limits<double>::quiet_NaN();
   scene.prev[38][0] = std::numeric_limits<double>::infinity(), weights[38] = 1;
-  REQUIRE(cfp::fundamental_8point<double>(scene.prev, scene.cur, weights, F) == Status::ok);
+  REQUIRE(cfp::fundamental_8point(PointPairs{scene.prev, scene.cur, weights}, F) == Status::ok);
   CHECK(F == expected);
   weights.assign(30, 1.0);
   weights[4] = 3;
   for (int k = 0; k < 2; ++k) prev.push_back(prev[4]), cur.push_back(cur[4]);
-  REQUIRE(cfp::fundamental_8point<double>(prev, cur, {}, expected) == Status::ok);
+  REQUIRE(cfp::fundamental_8point(PointPairs{prev, cur}, expected) == Status::ok);
   prev.resize(30), cur.resize(30);
-  REQUIRE(cfp::fundamental_8point<double>(prev, cur, weights, F) == Status::ok);
+  REQUIRE(cfp::fundamental_8point(PointPairs{prev, cur, weights}, F) == Status::ok);
   CHECK(difference<double>(F, expected) < 1e-10);
 }
 
@@ -150,25 +156,23 @@ TEST_CASE("Pairs that do not determine F are reported", "[geometry]") {
   auto options = clean(40);
   options.shape = cfp_test::SceneShape::plane;
   auto plane = make_two_view_scene<double>(random, options);
-  CHECK(cfp::fundamental_8point<double>(plane.prev, plane.cur, {}, F) == Status::degenerate);
+  CHECK(cfp::fundamental_8point(PointPairs{plane.prev, plane.cur}, F) == Status::degenerate);
   CHECK(F.isZero());
   options = clean(40);
   options.translation_m = 0;
   auto rotation = make_two_view_scene<double>(random, options);
-  CHECK(cfp::fundamental_8point<double>(rotation.prev, rotation.cur, {}, F) == Status::degenerate);
+  CHECK(cfp::fundamental_8point(PointPairs{rotation.prev, rotation.cur}, F) == Status::degenerate);
   std::array<Matrix3<double>, 3> solutions;
-  CHECK(cfp::fundamental_7point<double>(PointSpan<double, 2>(plane.prev.front().data(), 7),
-                                        PointSpan<double, 2>(plane.cur.front().data(), 7), solutions) == 0);
+  CHECK(cfp::fundamental_7point(PointPairs{first_seven(plane.prev), first_seven(plane.cur)}, solutions) == 0);
   std::vector<std::array<double, 2>> equal(20, {3.0, 4.0});
-  CHECK(cfp::fundamental_8point<double>(equal, equal, {}, F) == Status::degenerate);
+  CHECK(cfp::fundamental_8point(PointPairs{equal, equal}, F) == Status::degenerate);
   const std::vector<std::array<double, 2>> few(7, {3.0, 4.0});
-  CHECK(cfp::fundamental_8point<double>(few, few, {}, F) == Status::not_enough_data);
-  CHECK(cfp::fundamental_7point<double>(few, few, solutions) == 0);
-  CHECK(cfp::fundamental_8point<double>(PointSpan<double, 2>(), PointSpan<double, 2>(), {}, F) ==
-        Status::not_enough_data);
+  CHECK(cfp::fundamental_8point(PointPairs{few, few}, F) == Status::not_enough_data);
+  CHECK(cfp::fundamental_7point(PointPairs{few, few}, solutions) == 0);
+  CHECK(cfp::fundamental_8point(PointPairs<double>{}, F) == Status::not_enough_data);
   for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e300}) {
     std::vector<std::array<double, 2>> hostile(20, {bad, 1.0});
-    CHECK(cfp::fundamental_8point<double>(hostile, hostile, {}, F) == Status::not_enough_data);
+    CHECK(cfp::fundamental_8point(PointPairs{hostile, hostile}, F) == Status::not_enough_data);
     CHECK(F.isZero());
   }
   CHECK(cfp::nearest_fundamental<double>(Matrix3<double>::Constant(std::numeric_limits<double>::infinity())).isZero());
@@ -181,8 +185,7 @@ TEST_CASE("The solvers allocate nothing", "[geometry]") {
   Matrix3<double> F;
   std::array<Matrix3<double>, 3> solutions;
   CHECK(cfp_test::allocations_in([&] {
-          (void)cfp::fundamental_8point<double>(scene.prev, scene.cur, {}, F);
-          (void)cfp::fundamental_7point<double>(PointSpan<double, 2>(scene.prev.front().data(), 7),
-                                                PointSpan<double, 2>(scene.cur.front().data(), 7), solutions);
+          (void)cfp::fundamental_8point(PointPairs{scene.prev, scene.cur}, F);
+          (void)cfp::fundamental_7point(PointPairs{first_seven(scene.prev), first_seven(scene.cur)}, solutions);
         }) == 0);
 }

@@ -6,69 +6,56 @@
 /// "Multiple View Geometry", ch. 11.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 
-#include "cfp/core/numeric.hpp"
-#include "cfp/core/span.hpp"
 #include "cfp/core/status.hpp"
+#include "cfp/core/types.hpp"
 #include "cfp/geometry/fundamental_impl.hpp"
-#include "cfp/math/so3.hpp"
+#include "cfp/geometry/point_pairs.hpp"
+#include "cfp/math/matrix3.hpp"
 
 namespace cfp {
+inline namespace CFP_ISA {
 
 /// The matrix of rank at most 2 nearest to F (Frobenius), scaled to unit norm; zero for an F that is zero or not
 /// finite.
 template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> nearest_fundamental(const Matrix3<Scalar>& F) noexcept {
-  const Scalar largest = F.cwiseAbs().maxCoeff();
-  if (!(largest > Scalar(0)) || !F.allFinite()) return Matrix3<Scalar>::Zero();
-  const Eigen::JacobiSVD<Matrix3<Scalar>> svd(F / largest, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Vector3<Scalar> sigma = svd.singularValues();
-  sigma.z() = Scalar(0);
-  return svd.matrixU() * sigma.normalized().asDiagonal() * svd.matrixV().transpose();
+  if (!F.allFinite() || F.isZero(0)) return Matrix3<Scalar>::Zero();
+  const SVD3<Scalar> f = svd(F);
+  const Vector3<Scalar> sigma = f.sigma / f.sigma[0];
+  return (f.U.template leftCols<2>() * sigma.template head<2>().normalized().asDiagonal() *
+          f.V.template leftCols<2>().transpose());
 }
 
 /// Normalised eight-point algorithm: the F that minimises sum w (x_cur^T F x_prev)^2 in coordinates centred and scaled
-/// per image (weighted centroid, mean distance sqrt 2), then made rank 2 there. weights: empty (ones) or one per pair;
-/// a pair whose weight is not positive and finite, or whose coordinates are not finite and below 1e5 px, counts as
-/// absent. Works in double. not_enough_data below eight pairs, degenerate when they determine no unique F (all on one
-/// plane or line, pure rotation, equal points; noise hides this from any linear solver); F is then zero. Allocates
-/// nothing; O(n).
+/// per image (weighted centroid, mean distance sqrt 2), then made rank 2 there. Works in double. not_enough_data below
+/// eight pairs, degenerate when they determine no unique F (all on one plane or line, pure rotation, equal points;
+/// noise hides this from any linear solver); F is then zero. Allocates nothing; O(n).
 template <typename Scalar>
-Status fundamental_8point(PointSpan<Scalar, 2> prev, PointSpan<Scalar, 2> cur, span<const Scalar> weights,
-                          Matrix3<Scalar>& F) noexcept {
-  CFP_ASSERT(prev.size() == cur.size() && (weights.empty() || weights.size() == prev.size()));
+[[nodiscard]] Status fundamental_8point(const PointPairs<Scalar>& pairs, Matrix3<Scalar>& F) noexcept {
   F.setZero();
-  detail::PixelScaling scale_prev, scale_cur;
-  const std::size_t used = detail::scale_pixels<Scalar>(prev, cur, weights, scale_prev, scale_cur);
-  if (used < 8) return Status::not_enough_data;
-  if (!scale_prev.valid() || !scale_cur.valid()) return Status::degenerate;
+  const detail::PairScaling scaling = detail::scale_pairs(pairs);
+  if (scaling.used < 8) return Status::not_enough_data;
+  if (!scaling.valid()) return Status::degenerate;
 
-  Eigen::Matrix<double, 9, 9> M = Eigen::Matrix<double, 9, 9>::Zero();
-  for (std::size_t i = 0; i < prev.size(); ++i) {
-    const double w = detail::pair_weight<Scalar>(prev, cur, weights, i);
-    if (!(w > 0)) continue;
-    const Vector3<double> p = scale_prev(prev(i, 0), prev(i, 1)), q = scale_cur(cur(i, 0), cur(i, 1));
+  using Matrix9 = Eigen::Matrix<double, 9, 9>;
+  Matrix9 M = Matrix9::Zero(), V = Matrix9::Identity();
+  const auto add = [&](std::size_t, const Vector2<double>& previous, const Vector2<double>& current, double weight) {
+    const Vector3<double> p = scaled(scaling.previous, previous), q = scaled(scaling.current, current);
     Eigen::Matrix<double, 9, 1> row;
-    row.head<3>() = q.x() * p;
-    row.segment<3>(3) = q.y() * p;
-    row.tail<3>() = p;
-    const Eigen::Matrix<double, 9, 1> weighted = w / scale_prev.largest_weight * row;
-    for (int c = 0; c < 9; ++c) M.col(c).noalias() += row[c] * weighted;
-  }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> eigen(M);
-  if (eigen.info() != Eigen::Success || !(eigen.eigenvalues()[1] > 1e-13 * eigen.eigenvalues()[8]))
-    return Status::degenerate;
-  const Matrix3<double> scaled =
-      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(eigen.eigenvectors().col(0).data());
-  F = detail::unscaled(nearest_fundamental<double>(scaled), scale_prev, scale_cur).template cast<Scalar>();
+    for (int k = 0; k < 3; ++k) row.segment<3>(3 * k) = q[k] * p;
+    M += weight / scaling.largest_weight * row * row.transpose();
+  };
+  detail::for_each_pair(pairs, add);
+  detail::orthogonalize_columns(M, V);
+  if (!(M.col(7).norm() > 1e-13 * M.col(0).norm())) return Status::degenerate;
+  const Matrix3<double> found = V.col(8).reshaped<Eigen::RowMajor>(3, 3);
+  F = detail::unscaled_fundamental(nearest_fundamental(found), scaling).template cast<Scalar>();
   return Status::ok;
 }
 
@@ -76,26 +63,23 @@ Status fundamental_8point(PointSpan<Scalar, 2> prev, PointSpan<Scalar, 2> cur, s
 /// count. 0, with solutions untouched, when the seven do not determine finitely many (six or more on a plane, repeated
 /// or non-finite points). Works in double. Allocates nothing; about a microsecond.
 template <typename Scalar>
-[[nodiscard]] int fundamental_7point(PointSpan<Scalar, 2> prev, PointSpan<Scalar, 2> cur,
+[[nodiscard]] int fundamental_7point(const PointPairs<Scalar>& pairs,
                                      std::array<Matrix3<Scalar>, 3>& solutions) noexcept {
-  CFP_ASSERT(prev.size() == 7 && cur.size() == 7);
-  detail::PixelScaling scale_prev, scale_cur;
-  if (detail::scale_pixels<Scalar>(prev, cur, {}, scale_prev, scale_cur) < 7 || !scale_prev.valid() ||
-      !scale_cur.valid())
-    return 0;
-  double p[7][2], q[7][2];
-  for (std::size_t i = 0; i < 7; ++i) {
-    for (int c = 0; c < 2; ++c) {
-      p[i][c] = scale_prev(prev(i, 0), prev(i, 1))[c];
-      q[i][c] = scale_cur(cur(i, 0), cur(i, 1))[c];
-    }
-  }
-  Matrix3<double> scaled[3];
-  const int count = detail::solve_seven_point(p, q, scaled);
-  for (int i = 0; i < count; ++i) {
-    solutions[static_cast<std::size_t>(i)] = detail::unscaled(scaled[i], scale_prev, scale_cur).template cast<Scalar>();
-  }
+  CFP_ASSERT(pairs.previous.size() == 7);
+  const detail::PairScaling scaling = detail::scale_pairs(pairs);
+  if (scaling.used < 7 || !scaling.valid()) return 0;
+  std::array<Vector2<double>, 7> p, q;
+  detail::for_each_pair(pairs,
+                        [&](std::size_t i, const Vector2<double>& previous, const Vector2<double>& current, double) {
+                          p[i] = scaled(scaling.previous, previous).template head<2>();
+                          q[i] = scaled(scaling.current, current).template head<2>();
+                        });
+  std::array<Matrix3<double>, 3> found;
+  const int count = detail::solve_seven_point(p, q, found);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i)
+    solutions[i] = detail::unscaled_fundamental(found[i], scaling).template cast<Scalar>();
   return count;
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

@@ -1,95 +1,96 @@
 /// @file fundamental_pairs_impl.hpp
 /// Pairs of fundamental_ransac.hpp as structure of arrays, and what is computed of all of them at once under an F: MSAC
-/// score and distances. Not an interface.
+/// score, distances, normal equations. Not an interface.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <vector>
 
 #include <Eigen/Core>
 
-#include "cfp/core/span.hpp"
-#include "cfp/geometry/fundamental_impl.hpp"
-#include "cfp/math/so3.hpp"
+#include "cfp/core/types.hpp"
+#include "cfp/geometry/point_pairs.hpp"
+#include "cfp/math/matrix3.hpp"
+#include "cfp/math/normal_equations.hpp"
+#include "cfp/robust/ransac.hpp"
 #include "cfp/simd/packet.hpp"
 
 namespace cfp::detail {
 
-// The arrays of all pairs in one precision.
+// Previous x, y, current x, y, weight of the pairs present, centred per image and scaled by one common factor, so that
+// distances are pixels times `factor`.
+struct PairArrays : RansacColumns<5> {
+  static constexpr std::size_t enough = 256;  // pairs, to refine a candidate
+
+  PairScaling scaling;
+  double factor = 0;           // 0: the points of an image coincide, nothing else is set
+  std::vector<float> thinned;  // evenly chosen ones of the pairs
+};
+
+inline namespace CFP_ISA {
+
+// The arrays in one precision.
 template <typename T>
 struct PairColumns {
-  const T *px, *py, *qx, *qy, *weight;
+  const T* row[5];
   std::size_t size;
 };
 
-// The pairs present, centred per image and scaled by one common factor, so that distances are pixels times `factor`.
-// Arrays are padded with weight 0 to whole packets.
-struct PairArrays {
-  static constexpr std::size_t padding = 64;
-  static constexpr std::size_t coordinates = 5;  // previous x, y, current x, y, weight
-  static constexpr std::size_t enough = 256;     // pairs, for a candidate
+template <typename T>
+[[nodiscard]] PairColumns<T> pair_columns(const T* first, std::size_t length, std::size_t size) noexcept {
+  return {{first, first + length, first + 2 * length, first + 3 * length, first + 4 * length}, size};
+}
+[[nodiscard]] inline PairColumns<double> exact_columns(const PairArrays& pairs) noexcept {
+  return pair_columns(pairs.exact.data(), pairs.capacity, pairs.size);
+}
+[[nodiscard]] inline PairColumns<float> fast_columns(const PairArrays& pairs) noexcept {
+  return pair_columns(pairs.fast.data(), pairs.capacity, pairs.size);
+}
+[[nodiscard]] inline PairColumns<float> thinned_columns(const PairArrays& pairs) noexcept {
+  constexpr std::size_t enough = PairArrays::enough;
+  return pairs.size > enough ? pair_columns(pairs.thinned.data(), enough, enough) : fast_columns(pairs);
+}
 
-  std::size_t size = 0, capacity = 0;
-  double total_weight = 0, factor = 0;
-  PixelScaling scale_prev, scale_cur;
-  std::vector<std::uint32_t> index;  // position in the caller's arrays
-  std::vector<double> exact;         // `coordinates` arrays of `capacity`
-  std::vector<float> fast;           // the same rounded, for scoring
-  std::vector<float> thinned;        // evenly chosen ones of them, enough to refine a candidate
+template <typename T>
+[[nodiscard]] Vector3<T> previous_point(const PairArrays& pairs, std::size_t i) noexcept {
+  return {pairs.row(0)[i], pairs.row(1)[i], T(1)};
+}
+template <typename T>
+[[nodiscard]] Vector3<T> current_point(const PairArrays& pairs, std::size_t i) noexcept {
+  return {pairs.row(2)[i], pairs.row(3)[i], T(1)};
+}
 
-  [[nodiscard]] const double* array(std::size_t c) const noexcept { return exact.data() + c * capacity; }
-  [[nodiscard]] span<const double> weights() const noexcept { return {array(4), size}; }
-  [[nodiscard]] PairColumns<double> exact_columns() const noexcept { return columns(exact.data(), capacity, size); }
-  [[nodiscard]] PairColumns<float> fast_columns() const noexcept { return columns(fast.data(), capacity, size); }
-  [[nodiscard]] PairColumns<float> thinned_columns() const noexcept {
-    return size > enough ? columns(thinned.data(), enough, enough) : fast_columns();
-  }
+template <typename Scalar>
+void load_pairs(const PointPairs<Scalar>& input, PairArrays& pairs) {
+  pairs.scaling = scale_pairs(input);
+  pairs.factor = 0;
+  pairs.begin(input.previous.size());
+  pairs.size = pairs.scaling.used;
+  pairs.thinned.resize(5 * PairArrays::enough);
+  if (pairs.size == 0 || !pairs.scaling.valid()) return;
+  pairs.size = 0;
+  pairs.factor = std::sqrt(pairs.scaling.previous.factor * pairs.scaling.current.factor);
+  pairs.scaling.previous.factor = pairs.scaling.current.factor = pairs.factor;
+  for_each_pair(input, [&](std::size_t i, const Vector2<double>& previous, const Vector2<double>& current, double w) {
+    const Vector3<double> p = scaled(pairs.scaling.previous, previous), q = scaled(pairs.scaling.current, current);
+    pairs.push(i, {p.x(), p.y(), q.x(), q.y(), w});
+  });
+  finish(pairs);
+  constexpr std::size_t enough = PairArrays::enough;
+  for (std::size_t k = 0; k < 5 * enough && pairs.size > enough; ++k)
+    pairs.thinned[k] = pairs.fast_row(k / enough)[k % enough * pairs.size / enough];
+}
 
-  // When the points of an image coincide, only `size` is set and `factor` is 0.
-  template <typename Scalar>
-  void load(const PointSpan<Scalar, 2>& prev, const PointSpan<Scalar, 2>& cur, const span<const Scalar>& weight) {
-    size = scale_pixels(prev, cur, weight, scale_prev, scale_cur);
-    total_weight = 0;
-    capacity = (prev.size() + padding - 1) / padding * padding;
-    index.resize(prev.size());
-    exact.resize(coordinates * capacity);
-    fast.resize(coordinates * capacity);
-    factor = 0;
-    if (size == 0 || !scale_prev.valid() || !scale_cur.valid()) return;
-    size = 0;
-    factor = std::sqrt(scale_prev.factor * scale_cur.factor);
-    scale_prev.factor = scale_cur.factor = factor;
-    double* out[coordinates];
-    for (std::size_t c = 0; c < coordinates; ++c) out[c] = exact.data() + c * capacity;
-    for (std::size_t i = 0; i < prev.size(); ++i) {
-      const double w = pair_weight(prev, cur, weight, i) / scale_prev.largest_weight;
-      if (!(w > 0)) continue;
-      const Vector3<double> p = scale_prev(prev(i, 0), prev(i, 1)), q = scale_cur(cur(i, 0), cur(i, 1));
-      out[0][size] = p.x(), out[1][size] = p.y(), out[2][size] = q.x(), out[3][size] = q.y(), out[4][size] = w;
-      index[size++] = static_cast<std::uint32_t>(i);
-      total_weight += w;
-    }
-    for (std::size_t c = 0; c < coordinates; ++c) std::fill(out[c] + size, out[c] + capacity, 0.0);
-    std::transform(exact.begin(), exact.end(), fast.begin(), [](double x) { return static_cast<float>(x); });
-    thinned.resize(coordinates * enough);
-    for (std::size_t i = 0; i < enough && size > enough; ++i) {
-      for (std::size_t c = 0; c < coordinates; ++c) thinned[c * enough + i] = fast[c * capacity + i * size / enough];
-    }
-  }
-
-  [[nodiscard]] Matrix3<double> to_pixels(const Matrix3<double>& F) const noexcept {
-    return unscaled(F, scale_prev, scale_cur);
-  }
-
- private:
-  template <typename T>
-  [[nodiscard]] static PairColumns<T> columns(const T* first, std::size_t length, std::size_t size) noexcept {
-    return {first, first + length, first + 2 * length, first + 3 * length, first + 4 * length, size};
-  }
-};
+// The epipole of the current image, F^T e = 0, unnormalised: F's columns span the plane across it.
+template <typename T>
+[[nodiscard]] Vector3<T> epipole_of(const Matrix3<T>& F) noexcept {
+  const Matrix3<T> candidates = cofactors(F);
+  Eigen::Index best = 0;
+  candidates.colwise().squaredNorm().maxCoeff(&best);
+  return candidates.col(best);
+}
 
 // Of a packet of pairs: the directions l = F p and m = F^T q of the epipolar lines, e = q^T F p and n^2; the Sampson
 // distance is e / n.
@@ -99,10 +100,10 @@ struct SampsonPacket {
   P p0, p1, q0, q1, l0, l1, m0, m1, e, n2;
 
   SampsonPacket(const PairColumns<T>& in, std::size_t i, const Matrix3<T>& F) noexcept
-      : p0(cfp::load<P>(in.px + i)),
-        p1(cfp::load<P>(in.py + i)),
-        q0(cfp::load<P>(in.qx + i)),
-        q1(cfp::load<P>(in.qy + i)) {
+      : p0(cfp::load<P>(in.row[0] + i)),
+        p1(cfp::load<P>(in.row[1] + i)),
+        q0(cfp::load<P>(in.row[2] + i)),
+        q1(cfp::load<P>(in.row[3] + i)) {
     const auto line = [](const P& x, const P& y, T a, T b, T c) {
       return multiply_add(P(a), x, multiply_add(P(b), y, P(c)));
     };
@@ -117,19 +118,20 @@ struct SampsonPacket {
 
 // Sum over the pairs of w min(d^2 / limit, 1), d the Sampson distance of scaled pixels and limit its squared threshold.
 // Gives up with a value above `bound` as soon as the sum exceeds it.
-[[nodiscard]] inline double msac_cost(const PairColumns<float>& in, const Matrix3<double>& F, double limit,
-                                      double bound) noexcept {
-  using P = Packet<float>;
-  const Matrix3<float> f = F.cast<float>();
-  const P most(static_cast<float>(limit)), tiny(1e-30F);
+template <typename T>
+[[nodiscard]] double msac_cost(const PairColumns<T>& in, const Matrix3<double>& F, double limit,
+                               double bound) noexcept {
+  using P = Packet<T>;
+  const Matrix3<T> f = F.template cast<T>();
+  const P most(static_cast<T>(limit)), tiny(T(1e-30));
   const double stop = bound * limit;
   double sum = 0;
-  for (std::size_t block = 0; block < in.size; block += PairArrays::padding) {
-    P cost(0.0F);
-    for (std::size_t i = block; i < block + PairArrays::padding; i += static_cast<std::size_t>(lanes_of<P>)) {
-      const SampsonPacket<float> pair(in, i, f);
+  for (std::size_t block = 0; block < in.size; block += PairArrays::block) {
+    P cost(T(0));
+    for (std::size_t i = block; i < block + PairArrays::block; i += static_cast<std::size_t>(lanes_of<P>)) {
+      const SampsonPacket<T> pair(in, i, f);
       const P d2 = pair.e * pair.e / (pair.n2 + tiny);
-      cost = multiply_add(cfp::load<P>(in.weight + i), select(d2 < most, d2, most), cost);
+      cost = multiply_add(cfp::load<P>(in.row[4] + i), select(d2 < most, d2, most), cost);
     }
     sum += static_cast<double>(reduce_add(cost));
     if (!(sum < stop)) break;
@@ -137,39 +139,65 @@ struct SampsonPacket {
   return sum / limit;
 }
 
-// Squared Sampson distances of all pairs, scaled pixels; NaN where there is none, so that no comparison takes such a
-// pair for an inlier.
-inline void sampson_distances_sq(const PairArrays& pairs, const Matrix3<double>& F, std::vector<double>& out) {
-  using P = Packet<double>;
-  out.resize(pairs.capacity);
-  const PairColumns<double> in = pairs.exact_columns();
-  for (std::size_t i = 0; i < pairs.size; i += static_cast<std::size_t>(lanes_of<P>)) {
-    const SampsonPacket<double> pair(in, i, F);
+// Squared Sampson distances of all pairs, scaled pixels, into `out` of the arrays' capacity; NaN where there is none,
+// so that no comparison takes such a pair for an inlier.
+template <typename T>
+void sampson_distances_sq(const PairColumns<T>& in, const Matrix3<T>& F, std::vector<T>& out) noexcept {
+  using P = Packet<T>;
+  CFP_ASSERT(out.size() >= (in.size + PairArrays::block - 1) / PairArrays::block * PairArrays::block);
+  for (std::size_t i = 0; i < in.size; i += static_cast<std::size_t>(lanes_of<P>)) {
+    const SampsonPacket<T> pair(in, i, F);
     store(out.data() + i, pair.e * pair.e / pair.n2);
   }
 }
 
-// The epipole of the current image, F^T e = 0, unnormalised: F's columns span the plane across it.
-[[nodiscard]] inline Vector3<double> epipole_of(const Matrix3<double>& F) noexcept {
-  Vector3<double> epipole = F.col(0).cross(F.col(1));
-  for (int c = 0; c < 2; ++c) {
-    const Vector3<double> other = F.col(c).cross(F.col(2));
-    if (other.squaredNorm() > epipole.squaredNorm()) epipole = other;
+// Normal equations over the nine entries (row-major) of F of sum w rho(d^2 / scale), and that sum; rho(x) = x / (1 +
+// x), the loss of Geman and McClure: bounded like MSAC's, but smooth, so that pairs near the threshold count by
+// degrees. With d = e / n and k = e / n^2, d(d)/dF_ij = (q_i p_j - k (l_i p_j [i < 2] + m_j q_i [j < 2])) / n. The
+// gradient is exact; H leaves out the k terms, a thousandth of the others for pairs that count, and so is made of 36
+// moments.
+template <typename T>
+[[nodiscard]] double sampson_system(const PairColumns<T>& in, const Matrix3<double>& F, double scale,
+                                    NormalEquations<9>& out) noexcept {
+  using P = Packet<T>;
+  const Matrix3<T> f = F.template cast<T>();
+  const P zero(T(0)), one(T(1)), tiny(T(1e-30)), inverse_scale(T(1 / scale));
+  P moments[6][6], g[9], cost = zero;
+  for (auto& row : moments) {
+    for (P& m : row) m = zero;
   }
-  return epipole;
+  for (P& h : g) h = zero;
+  for (std::size_t i = 0; i < in.size; i += static_cast<std::size_t>(lanes_of<P>)) {
+    const SampsonPacket<T> pair(in, i, f);
+    const P inverse_n2 = reciprocal(pair.n2 + tiny);
+    const P k = pair.e * inverse_n2;
+    const P x = pair.e * k * inverse_scale;
+    const P s = reciprocal(x + one);
+    const P ws = cfp::load<P>(in.row[4] + i) * s;
+    cost = multiply_add(ws, x, cost);
+    const P weight = ws * s * inverse_n2, we = weight * pair.e;
+    const P p[2] = {pair.p0, pair.p1}, wq[2] = {weight * pair.q0, weight * pair.q1}, m[2] = {k * pair.m0, k * pair.m1};
+    const P qq[6] = {wq[0] * pair.q0, wq[0] * pair.q1, wq[0], wq[1] * pair.q1, wq[1], weight};
+    const P pp[5] = {p[0] * p[0], p[0] * p[1], p[0], p[1] * p[1], p[1]};
+    for (int r = 0; r < 6; ++r) {
+      for (int c = 0; c < 5; ++c) moments[r][c] = multiply_add(qq[r], pp[c], moments[r][c]);
+      moments[r][5] += qq[r];
+    }
+    const P a[3] = {we * (pair.q0 - k * pair.l0), we * (pair.q1 - k * pair.l1), we},
+            b[3] = {we * pair.q0, we * pair.q1, we};
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 2; ++c) g[3 * r + c] += a[r] * p[c] - b[r] * m[c];
+      g[3 * r + 2] += a[r];
+    }
+  }
+  constexpr int symmetric[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+  for (int r = 0; r < 9; ++r) {
+    out.g[r] = static_cast<double>(reduce_add(g[r])) / scale;
+    for (int c = 0; c < 9; ++c)
+      out.H(r, c) = static_cast<double>(reduce_add(moments[symmetric[r / 3][c / 3]][symmetric[r % 3][c % 3]])) / scale;
+  }
+  return static_cast<double>(reduce_add(cost));
 }
 
-// Both points of every pair of a sample must lie on the same side of the cameras: Chum, Werner, Matas: "Epipolar
-// geometry estimation via RANSAC benefits from the oriented epipolar constraint", ICPR 2004.
-[[nodiscard]] inline bool is_oriented(const Matrix3<double>& F, const double (&p)[7][2],
-                                      const double (&q)[7][2]) noexcept {
-  const Vector3<double> epipole = epipole_of(F);
-  int positive = 0;
-  for (int i = 0; i < 7; ++i) {
-    const Vector3<double> line = F * Vector3<double>(p[i][0], p[i][1], 1);
-    positive += epipole.cross(Vector3<double>(q[i][0], q[i][1], 1)).dot(line) > 0 ? 1 : 0;
-  }
-  return positive == 0 || positive == 7;
-}
-
+}  // namespace CFP_ISA
 }  // namespace cfp::detail

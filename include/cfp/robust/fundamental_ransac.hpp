@@ -11,106 +11,122 @@
 
 #include "cfp/core/span.hpp"
 #include "cfp/geometry/camera.hpp"
+#include "cfp/geometry/point_pairs.hpp"
 #include "cfp/robust/fundamental_degeneracy_impl.hpp"
-#include "cfp/robust/fundamental_ransac_impl.hpp"
-#include "cfp/robust/fundamental_ransac_types.hpp"
-#include "cfp/robust/sampling.hpp"
+#include "cfp/robust/fundamental_search_impl.hpp"
+#include "cfp/robust/ransac.hpp"
 
 namespace cfp {
+
+/// The threshold is a Sampson distance: 1 px is 2 sigma for sigma = 0.5 px per coordinate. At least 8 inliers: any
+/// seven pairs have an F.
+struct FundamentalRansacOptions : RansacOptions {};
+
+template <typename Scalar>
+struct FundamentalResult : RansacReport {
+  Matrix3<Scalar> F = Matrix3<Scalar>::Zero();           ///< unit norm, rank 2; zero unless found()
+  Matrix3<Scalar> homography = Matrix3<Scalar>::Zero();  ///< previous to current pixels, det > 0, unit norm; set for
+                                                         ///< no_motion, pure_rotation, planar, homography
+};
 
 /// Scratch memory of fundamental_ransac: keep one per thread. After a call with n pairs, calls with up to n allocate
 /// nothing.
 struct FundamentalRansacWorkspace {
   detail::PairArrays pairs;
-  MinimalSampler sampler;
+  SamplingWorkspace sampling;
   std::vector<std::uint32_t> list;
   std::vector<double> distances_sq;
 };
 
-/// Robust F of pairs (prev[i], cur[i]). weights: empty (ones) or one per pair; only ratios matter. They multiply the
+inline namespace CFP_ISA {
+
+[[nodiscard]] inline const char* invalid_field(const FundamentalRansacOptions& options) noexcept {
+  return invalid_field(options, 8);
+}
+
+}  // CFP_ISA
+
+namespace detail {
+inline namespace CFP_ISA {
+
+template <typename Scalar>
+[[nodiscard]] FundamentalResult<Scalar> fundamental_ransac(const PointPairs<Scalar>& input, const Matrix3<double>* K,
+                                                           const FundamentalRansacOptions& options,
+                                                           FundamentalRansacWorkspace& workspace,
+                                                           span<char> inlier_mask) {
+  CFP_ASSERT(inlier_mask.empty() || inlier_mask.size() == input.previous.size());
+  std::fill(inlier_mask.begin(), inlier_mask.end(), char(0));
+  FundamentalResult<Scalar> result;
+  PairArrays& pairs = workspace.pairs;
+  load_pairs(input, pairs);
+  result.used = pairs.size;
+  if (pairs.size < options.min_inliers || pairs.size < 8) return result;
+  result.status = RansacStatus::degenerate;
+  if (!(pairs.factor > 0)) return result;
+  workspace.list.reserve(pairs.size);
+  workspace.distances_sq.resize(pairs.capacity);
+  const double threshold = options.threshold_px * pairs.factor;
+  FundamentalSearch<double> search{pairs, threshold * threshold, workspace.list, workspace.distances_sq,
+                                   Random(options.seed, "fundamental_ransac")};
+
+  RansacSearch<Matrix3<double>> found =
+      lo_ransac(search, !input.weights.empty(), options, search.random, workspace.sampling);
+  result.iterations = found.iterations;
+  result.status = RansacStatus::no_consensus;
+  if (!(found.best.cost < pairs.total_weight)) return result;
+  Matrix3<double>&F = found.best.model, H;
+  HomographyCheck<double> plane{search};
+  const bool has_homography = plane.dominant_homography(F, 0.5, H);
+  if (has_homography) plane.complete_from_plane(H, found.best);
+  search.polish(F, found.confident ? 1 : 4);
+  if (has_homography && !plane.has_parallax(H)) {
+    result.status = plane.classify(K, H);
+    const auto is_inlier = [&](std::size_t i) { return transfer_sq(pairs, H, i) <= plane.transfer_limit(); };
+    report_inliers(pairs, is_inlier, options.min_inliers, inlier_mask, result);
+    if (result.status == RansacStatus::no_consensus) return result;
+    const Matrix3<double> pixels = unscaling_matrix(pairs.scaling.current) * H * scaling_matrix(pairs.scaling.previous);
+    result.homography = ((determinant(pixels) < 0 ? -1.0 : 1.0) * pixels.normalized()).template cast<Scalar>();
+    return result;
+  }
+  result.status = found.confident ? RansacStatus::ok : RansacStatus::iteration_limit;
+  const auto is_inlier = [&](std::size_t i) { return search.distances_sq[i] <= search.limit; };
+  report_inliers(pairs, is_inlier, options.min_inliers, inlier_mask, result);
+  if (result.found()) result.F = unscaled_fundamental(F, pairs.scaling).template cast<Scalar>();
+  return result;
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
+
+inline namespace CFP_ISA {
+
+/// Robust F of pairs: `fundamental_ransac(PointPairs{previous, current}, options, workspace)`. Weights multiply the
 /// score, sum w min(d^2 / T^2, 1), and the refinement's loss, and steer the sampling; the inlier test sees the Sampson
-/// distance alone. A pair whose weight is not positive and finite, or whose coordinates are not finite and below 1e5
-/// px, counts as absent. inlier_mask: empty or one per pair, 1 = inlier. camera: intrinsics, only to tell a rotation
-/// from a plane. Works in double, scores in float.
+/// distance alone. inlier_mask: empty or one per pair, 1 = inlier. Works in double, scores in float.
 ///
 /// A homography that holds most inliers is looked for first: with parallax beside it the F is completed from both,
-/// without it there is no F and `reason` says why. The result is refined under a Geman-McClure loss of 2.25 standard
+/// without it there is no F and `status` says why. The result is refined under a Geman-McClure loss of 2.25 standard
 /// deviations of the noise that the pairs themselves show, from several starts, as a short baseline gives the cost
 /// several minima. Cost per sample about 1 us plus 0.3 us per 200 pairs, and some 100 us at the end. Sources: Chum,
 /// Matas, Kittler: "Locally optimized RANSAC", DAGM 2003; Torr and Zisserman: "MLESAC", CVIU 2000, for the score;
 /// DEGENSAC (see fundamental_degeneracy_impl.hpp).
 template <typename Scalar>
-FundamentalResult<Scalar> fundamental_ransac(PointSpan<Scalar, 2> prev, PointSpan<Scalar, 2> cur,
-                                             span<const Scalar> weights, span<char> inlier_mask,
-                                             const FundamentalRansacOptions& options,
-                                             FundamentalRansacWorkspace& workspace,
-                                             const PinholeCamera<Scalar>* camera = nullptr) {
-  CFP_ASSERT(prev.size() == cur.size() && (weights.empty() || weights.size() == prev.size()) &&
-             (inlier_mask.empty() || inlier_mask.size() == prev.size()));
-  std::fill(inlier_mask.begin(), inlier_mask.end(), char(0));
-  FundamentalResult<Scalar> result;
-  detail::PairArrays& pairs = workspace.pairs;
-  pairs.load(prev, cur, weights);
-  result.pairs = pairs.size;
-  if (pairs.size < options.min_inliers || pairs.size < 8) return result;
-  if (!(pairs.factor > 0)) {
-    result.reason = FundamentalReason::coincident;
-    return result;
-  }
-  workspace.list.reserve(pairs.size);
-  workspace.sampler.reset(pairs.size, weights.empty() ? span<const double>() : pairs.weights(), 7, options.sampling,
-                          options.max_iterations);
-  const double threshold = options.threshold_px * pairs.factor;
-  detail::FundamentalSearch search{pairs,
-                                   options,
-                                   workspace.sampler,
-                                   workspace.list,
-                                   workspace.distances_sq,
-                                   threshold * threshold,
-                                   Random(options.seed, "fundamental_ransac")};
-
-  detail::FundamentalCandidate best = search.run();
-  result.iterations = search.iterations;
-  if (!(best.cost < pairs.total_weight)) {
-    result.reason = FundamentalReason::no_consensus;
-    return result;
-  }
-  Matrix3<double> H;
-  detail::HomographyCheck plane{search};
-  const bool has_homography = plane.dominant_homography(best.F, 0.5, H);
-  if (has_homography) plane.complete_from_plane(H, best);
-  search.polish(best.F);
-  const bool explained_by_homography = has_homography && !plane.has_parallax(H);
-  if (explained_by_homography) {
-    PinholeCamera<double> intrinsics;
-    if (camera != nullptr)
-      intrinsics = {double(camera->fx), double(camera->fy), double(camera->cx), double(camera->cy)};
-    result.reason = plane.classify(camera != nullptr ? &intrinsics : nullptr, H);
-  } else {
-    result.reason = search.confident ? FundamentalReason::ok : FundamentalReason::iteration_limit;
-  }
-  const double limit = explained_by_homography ? plane.transfer_limit() : search.limit;
-  double weight = 0;
-  for (std::size_t i = 0; i < pairs.size; ++i) {
-    const double distance_sq = explained_by_homography ? detail::transfer_sq(pairs, H, i) : search.distances_sq[i];
-    if (!(distance_sq <= limit)) continue;
-    ++result.inliers;
-    weight += pairs.weights()[i];
-    if (!inlier_mask.empty()) inlier_mask[pairs.index[i]] = 1;
-  }
-  result.inlier_share = (std::min)(weight / pairs.total_weight, 1.0);
-  if (result.inliers < options.min_inliers) {
-    std::fill(inlier_mask.begin(), inlier_mask.end(), char(0));
-    result.inliers = 0;
-    result.inlier_share = 0;
-    result.reason = FundamentalReason::no_consensus;
-  } else if (explained_by_homography) {
-    const Matrix3<double> pixels = pairs.scale_cur.matrix().inverse() * H * pairs.scale_prev.matrix();
-    result.homography = ((pixels.determinant() < 0 ? -1.0 : 1.0) * pixels.normalized()).template cast<Scalar>();
-  } else {
-    result.F = pairs.to_pixels(best.F).template cast<Scalar>();
-  }
-  return result;
+[[nodiscard]] FundamentalResult<Scalar> fundamental_ransac(const PointPairs<Scalar>& pairs,
+                                                           const FundamentalRansacOptions& options,
+                                                           FundamentalRansacWorkspace& workspace,
+                                                           span<char> inlier_mask = {}) {
+  return detail::fundamental_ransac<Scalar>(pairs, nullptr, options, workspace, inlier_mask);
+}
+/// The camera's intrinsics tell a rotation from a plane where there is no F; nothing else depends on them.
+template <typename Scalar>
+[[nodiscard]] FundamentalResult<Scalar> fundamental_ransac(const PointPairs<Scalar>& pairs,
+                                                           const PinholeCamera<Scalar>& camera,
+                                                           const FundamentalRansacOptions& options,
+                                                           FundamentalRansacWorkspace& workspace,
+                                                           span<char> inlier_mask = {}) {
+  const Matrix3<double> K = camera.matrix().template cast<double>();
+  return detail::fundamental_ransac<Scalar>(pairs, &K, options, workspace, inlier_mask);
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

@@ -1,7 +1,7 @@
 /// @file pnp_ransac.hpp
-/// Camera pose of 3-D/2-D matches with mismatches and without a start: seeded LO-RANSAC over P3P samples that follow
-/// the weights (map-point and keypoint static probabilities), MSAC score in pixels, any camera. Its pose starts the
-/// weighted refinement.
+/// Camera pose of 3-D/2-D observations with mismatches and without a start: seeded LO-RANSAC over P3P samples that
+/// follow the weights (map-point and keypoint static probabilities), MSAC score in pixels, any camera. Its pose starts
+/// the weighted refinement.
 #pragma once
 
 #include <algorithm>
@@ -10,71 +10,83 @@
 #include "cfp/core/span.hpp"
 #include "cfp/math/se3.hpp"
 #include "cfp/robust/pnp_ransac_impl.hpp"
-#include "cfp/robust/pnp_ransac_types.hpp"
-#include "cfp/robust/sampling.hpp"
+#include "cfp/robust/ransac.hpp"
 
 namespace cfp {
 
-/// Scratch memory of pnp_ransac: keep one per thread. After a call with n matches, calls with up to n allocate nothing.
-struct PnpRansacWorkspace {
-  detail::MatchArrays matches;
-  MinimalSampler sampler;
+/// The threshold is a reprojection distance: 2.45 sigma hold 95 %. At least 4 inliers: any three observations have a
+/// pose.
+struct PnpRansacOptions : RansacOptions {
+  constexpr PnpRansacOptions() noexcept {
+    threshold_px = 2.5;
+    min_iterations = 5;
+    min_inliers = 8;
+  }
 };
 
-/// Pose of matches (world[i], pixels[i]). weights: empty (ones) or one per match; only ratios matter. They multiply the
-/// score, sum w min(d^2 / T^2, 1), and the refinement's loss, and steer the sampling; the inlier test sees the
-/// reprojection distance d alone, so a low weight never makes a mismatch harder to reject. A match whose weight is not
-/// positive and finite, whose coordinates are not finite (points: not below 1e8), or whose pixel has no ray counts as
-/// absent. inlier_mask: empty or one per match, 1 = inlier.
+template <typename Scalar>
+struct PnpRansacResult : RansacReport {
+  SE3<Scalar> T_cam_world;  ///< identity unless found()
+};
+
+/// Scratch memory of pnp_ransac: keep one per thread. After a call with n observations, calls with up to n allocate
+/// nothing.
+struct PnpRansacWorkspace {
+  detail::ObservationArrays observations;
+  SamplingWorkspace sampling;
+};
+
+inline namespace CFP_ISA {
+
+[[nodiscard]] inline const char* invalid_field(const PnpRansacOptions& options) noexcept {
+  return invalid_field(options, 4);
+}
+
+/// Pose of the observations (world[i], pixels[i]). weights: empty (ones) or one per observation; only ratios matter.
+/// They multiply the score, sum w min(d^2 / T^2, 1), and the refinement's loss, and steer the sampling; the inlier test
+/// sees the reprojection distance d alone, so a low weight never makes a mismatch harder to reject. An observation
+/// whose weight is not positive and finite, whose coordinates are not finite (points: not below 1e8), or whose pixel
+/// has no ray counts as absent. inlier_mask: empty or one per observation, 1 = inlier.
 ///
 /// During the search d is linearised by the camera's Jacobian at the measured pixel: exact for a pinhole camera, to
 /// first order in d for any other; the final inliers use the camera itself. The search stops early when the weighted
-/// share of inliers gives the confidence. Works in double, scores in float. Source of the local optimisation: Chum,
-/// Matas, Kittler: "Locally optimized RANSAC", DAGM 2003.
+/// share of inliers gives the confidence. Works in double, scores in float.
 template <typename Camera, typename Scalar = typename Camera::ScalarType>
-PnpRansacResult<Scalar> pnp_ransac(const Camera& camera, PointSpan<Scalar, 3> world, PointSpan<Scalar, 2> pixels,
-                                   span<const Scalar> weights, span<char> inlier_mask, const PnpRansacOptions& options,
-                                   PnpRansacWorkspace& workspace) {
+[[nodiscard]] PnpRansacResult<Scalar> pnp_ransac(PointSpan<detail::non_deduced<Scalar>, 3> world,
+                                                 PointSpan<detail::non_deduced<Scalar>, 2> pixels,
+                                                 span<const detail::non_deduced<Scalar>> weights, const Camera& camera,
+                                                 const PnpRansacOptions& options, PnpRansacWorkspace& workspace,
+                                                 span<char> inlier_mask = {}) {
   CFP_ASSERT(world.size() == pixels.size() && (weights.empty() || weights.size() == world.size()) &&
              (inlier_mask.empty() || inlier_mask.size() == world.size()));
   std::fill(inlier_mask.begin(), inlier_mask.end(), char(0));
   PnpRansacResult<Scalar> result;
-  detail::MatchArrays& matches = workspace.matches;
-  matches.load(camera, world, pixels, weights);
-  result.matches = matches.size;
-  if (matches.size < options.min_inliers || matches.size < 4) return result;
-  workspace.sampler.reset(matches.size, weights.empty() ? span<const double>() : matches.weights(), 3, options.sampling,
-                          options.max_iterations);
-  detail::PnpSearch search{matches, options, workspace.sampler, options.threshold_px * options.threshold_px,
-                           Random(options.seed, "pnp_ransac")};
-  detail::PnpCandidate best = search.run();
+  detail::ObservationArrays& observations = workspace.observations;
+  detail::load_observations(world, pixels, weights, camera, observations);
+  result.used = observations.size;
+  if (observations.size < options.min_inliers || observations.size < 4) return result;
+  detail::PnpProblem<double> problem{observations, options.threshold_px * options.threshold_px};
+  Random random(options.seed, "pnp_ransac");
+  RansacSearch<SE3<double>> search = lo_ransac(problem, !weights.empty(), options, random, workspace.sampling);
   result.iterations = search.iterations;
-  result.reason = PnpRansacReason::no_consensus;
-  if (!(best.cost < matches.total_weight)) return result;
-  search.polish(best);
+  result.status = RansacStatus::no_consensus;
+  if (!(search.best.cost < observations.total_weight)) return result;
+  problem.refine(problem.limit, 10, search.best.model);  // the scale of the loss near the inliers' spread
 
-  SE3<double> T = best.T;
-  T.translation -= T.rotation * matches.origin;
+  SE3<double> T = search.best.model;
+  T.translation -= T.rotation * Vector3<double>(observations.origin[0], observations.origin[1], observations.origin[2]);
   const SE3<Scalar> pose = T.template cast<Scalar>();
-  double weight = 0;
-  for (std::size_t i = 0; i < matches.size; ++i) {
-    const std::size_t k = matches.index[i];
+  result.status = search.confident ? RansacStatus::ok : RansacStatus::iteration_limit;
+  const auto is_inlier = [&](std::size_t i) {
+    const std::size_t k = observations.index[i];
     Vector2<Scalar> pixel(Scalar(0), Scalar(0));
-    if (!camera.project(pose * world[k], pixel) || !((pixel - pixels[k]).squaredNorm() <= Scalar(search.limit)))
-      continue;
-    ++result.inliers;
-    weight += matches.weights()[i];
-    if (!inlier_mask.empty()) inlier_mask[k] = 1;
-  }
-  if (result.inliers < options.min_inliers) {
-    std::fill(inlier_mask.begin(), inlier_mask.end(), char(0));
-    result.inliers = 0;
-    return result;
-  }
-  result.inlier_share = (std::min)(weight / matches.total_weight, 1.0);
-  result.T_cam_world = pose;
-  result.reason = search.confident ? PnpRansacReason::ok : PnpRansacReason::iteration_limit;
+    return camera.project(pose * world[k], pixel) &&
+           (pixel - pixels[k]).squaredNorm() <= static_cast<Scalar>(problem.limit);
+  };
+  detail::report_inliers(observations, is_inlier, options.min_inliers, inlier_mask, result);
+  if (result.found()) result.T_cam_world = pose;
   return result;
 }
 
+}  // CFP_ISA
 }  // namespace cfp

@@ -1,0 +1,178 @@
+/// @file fundamental_search_impl.hpp
+/// The search of fundamental_ransac.hpp: samples, local optimisation, measured noise, final refinement. Not an
+/// interface.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "cfp/core/random.hpp"
+#include "cfp/geometry/fundamental_impl.hpp"
+#include "cfp/math/matrix3.hpp"
+#include "cfp/robust/fundamental_pairs_impl.hpp"
+#include "cfp/robust/fundamental_refine_impl.hpp"
+#include "cfp/robust/ransac.hpp"
+
+namespace cfp::detail {
+inline namespace CFP_ISA {
+
+// Both points of every pair of a sample must lie on the same side of the cameras: Chum, Werner, Matas: "Epipolar
+// geometry estimation via RANSAC benefits from the oriented epipolar constraint", ICPR 2004.
+template <typename T>
+[[nodiscard]] bool is_oriented(const Matrix3<T>& F, const std::array<Vector2<T>, 7>& p,
+                               const std::array<Vector2<T>, 7>& q) noexcept {
+  const Vector3<T> epipole = epipole_of(F);
+  int positive = 0;
+  for (std::size_t i = 0; i < 7; ++i) {
+    const Vector3<T> line = F * Vector3<T>(p[i].x(), p[i].y(), 1);
+    positive += cross(epipole, Vector3<T>(q[i].x(), q[i].y(), 1)).dot(line) > 0 ? 1 : 0;
+  }
+  return positive == 0 || positive == 7;
+}
+
+// One call of fundamental_ransac: the problem of lo_ransac, and the steps after it. T is double.
+template <typename T>
+struct FundamentalSearch {
+  using Model = Matrix3<T>;
+  using Candidate = RansacCandidate<Model>;
+  static constexpr std::size_t sample_size = 7;
+  using Sample = std::array<std::uint32_t, sample_size>;
+
+  const PairArrays& pairs;
+  T limit;                           // squared Sampson threshold, scaled pixels
+  std::vector<std::uint32_t>& list;  // scratch, as long as the pairs
+  std::vector<T>& distances_sq;      // Sampson, of the F that was tested or measured last
+  Random random;
+  T noise_variance = limit / T(3.84);  // of the Sampson distances of true pairs, as measured
+
+  // Scales of the refinement's loss: wide in the search, in squared thresholds; the final one in variances of the
+  // measured noise. 2.25 standard deviations lose least over three kinds of noise (cfp_fundamental_scale_study).
+  static constexpr T search_scale = 4, final_scale = T(2.25 * 2.25);
+
+  [[nodiscard]] std::size_t size() const noexcept { return pairs.size; }
+  [[nodiscard]] span<const double> weights() const noexcept { return pairs.weights(); }
+  [[nodiscard]] double total_weight() const noexcept { return pairs.total_weight; }
+
+  // Squared Sampson distance that 95 % of the true pairs stay below.
+  [[nodiscard]] T noise_limit() const noexcept { return (std::min)(limit, T(3.84) * noise_variance); }
+
+  template <typename Visit>
+  void solve(const Sample& sample, Visit&& visit) const {
+    std::array<Vector2<T>, 7> p, q;
+    for (std::size_t k = 0; k < 7; ++k) {
+      p[k] = previous_point<T>(pairs, sample[k]).template head<2>();
+      q[k] = current_point<T>(pairs, sample[k]).template head<2>();
+    }
+    std::array<Matrix3<T>, 3> solutions;
+    const int count = solve_seven_point(p, q, solutions);
+    for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) {
+      if (is_oriented(solutions[k], p, q)) visit(solutions[k]);
+    }
+  }
+
+  [[nodiscard]] double cost(const Model& F, double bound) const noexcept {
+    return msac_cost(fast_columns(pairs), F, limit, bound);
+  }
+
+  void optimize(Candidate& candidate) const noexcept {
+    FactoredF<T> refined(candidate.model);
+    refine_fundamental(thinned_columns(pairs), search_scale * limit, 3, 1e-3, refined);
+    const double refined_cost = cost(refined.matrix(), candidate.cost);
+    if (refined_cost < candidate.cost) candidate = {refined.matrix(), refined_cost};
+  }
+
+  [[nodiscard]] auto inlier_test(const Model& F) noexcept {
+    sampson_distances_sq(exact_columns(pairs), F, distances_sq);
+    return [this](std::size_t i) { return distances_sq[i] <= limit; };
+  }
+
+  // Into `list`, by distances_sq.
+  void collect_inliers() noexcept {
+    list.clear();
+    for (std::size_t i = 0; i < pairs.size; ++i) {
+      if (distances_sq[i] <= limit) list.push_back(static_cast<std::uint32_t>(i));
+    }
+  }
+
+  // A short baseline gives the cost several minima, often within a hundredth of each other, and chance decides into
+  // which of them the first good sample leads. Samples of F's own inliers are nearly all good: the best of them are
+  // refined, too, and the lowest cost under the measured noise wins. What it brings: cfp_fundamental_scale_study. F is
+  // the one whose noise was measured last.
+  void explore(FactoredF<T>& F) noexcept {
+    constexpr int samples = 16, starts = 2;
+    Candidate best[starts];
+    collect_inliers();
+    const std::uint32_t n = static_cast<std::uint32_t>(list.size());
+    if (n < 8) return;
+    for (int k = 0; k < samples; ++k) {
+      Sample sample;
+      for (std::uint32_t j = 0; j < 7; ++j) {
+        std::swap(list[j], list[j + random.index(n - j)]);
+        sample[j] = list[j];
+      }
+      solve(sample, [&](const Model& candidate) {
+        const double c = msac_cost(thinned_columns(pairs), candidate, limit, best[starts - 1].cost);
+        if (!(c < best[starts - 1].cost)) return;
+        best[starts - 1] = {candidate, c};
+        if (c < best[0].cost) std::swap(best[0], best[starts - 1]);
+      });
+    }
+    const double scale = final_scale * noise_variance;
+    double lowest = refine_fundamental(fast_columns(pairs), scale, 2, 1e-3, F);
+    for (const Candidate& start : best) {
+      if (!is_finite(start.cost)) break;
+      FactoredF<T> other(start.model);
+      refine_fundamental(thinned_columns(pairs), search_scale * limit, 2, 1e-3, other);
+      const double c = refine_fundamental(fast_columns(pairs), scale, 2, 1e-3, other, lowest);
+      if (c < lowest) lowest = c, F = other;
+    }
+  }
+
+  // More rounds where the search ran out of samples: its F may be a poor one, which inner samples mend step by step.
+  void polish(Model& F, int rounds) noexcept {
+    FactoredF<T> factored(F);
+    measure_noise(factored.matrix());
+    for (int round = 0; round < rounds; ++round) {
+      explore(factored);
+      measure_noise(factored.matrix());
+    }
+    refine_fundamental(exact_columns(pairs), final_scale * noise_variance, 14, 1e-5, factored);
+    F = factored.matrix();
+    measure_noise(F);
+  }
+
+  // The threshold is the caller's tolerance, not the noise, which the spread of F's own residuals shows: a truncated
+  // variance iterated to its fixed point. 0.911 is the variance that a normal distribution keeps within 2.5 sigma.
+  // Floor: 0.01 px. The refinement needs it for its loss, and whether a homography suffices must not be judged by a
+  // threshold above the parallax of a video.
+  void measure_noise(const Model& F) noexcept {
+    sampson_distances_sq(exact_columns(pairs), F, distances_sq);
+    const T floor = T(1e-4) * pairs.factor * pairs.factor;
+    noise_variance = limit / T(3.84);
+    for (int step = 0; step < 10; ++step) {
+      const T farthest = (std::min)(limit, T(6.25) * noise_variance);
+      T sum = 0, weight = 0;
+      for (std::size_t i = 0; i < pairs.size; ++i) {
+        if (!(distances_sq[i] <= farthest)) continue;
+        sum += pairs.weights()[i] * distances_sq[i];
+        weight += pairs.weights()[i];
+      }
+      if (!(weight > 0)) break;
+      const T next = (std::max)(sum / weight / T(0.911), floor);
+      const bool settled = std::abs(next - noise_variance) < T(1e-3) * next;
+      noise_variance = next;
+      if (settled) break;
+    }
+  }
+};
+
+}  // namespace CFP_ISA
+}  // namespace cfp::detail

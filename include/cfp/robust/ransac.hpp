@@ -1,0 +1,232 @@
+/// @file ransac.hpp
+/// The one locally optimised RANSAC of cfp: options, ways of ending, and the search that the fundamental matrix and the
+/// pose share. Source: Chum, Matas, Kittler: "Locally optimized RANSAC", DAGM 2003.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "cfp/core/options.hpp"
+#include "cfp/core/random.hpp"
+#include "cfp/core/span.hpp"
+#include "cfp/robust/sampling.hpp"
+
+namespace cfp {
+
+struct RansacOptions {
+  double threshold_px = 1;                 ///< distance up to which a datum is an inlier, (0, 1e4)
+  double confidence = 0.99;                ///< of having drawn a sample without mismatches, (0, 1)
+  std::size_t min_iterations = 30;         ///< samples drawn at least
+  std::size_t max_iterations = 1000;       ///< samples drawn at most, >= 1
+  std::size_t min_inliers = 12;            ///< fewer inliers are no consensus; more than a minimal sample
+  Sampling sampling = Sampling::weighted;  ///< how samples follow the weights
+  std::uint64_t seed = 0;                  ///< same input and seed, same bits
+};
+
+enum class RansacStatus : std::uint8_t {
+  ok,               ///< model found with the asked confidence
+  iteration_limit,  ///< model found, but max_iterations ended the search before the confidence was reached
+  not_enough_data,  ///< fewer than min_inliers data are present
+  no_consensus,     ///< no model has min_inliers inliers
+  degenerate,       ///< the data determine no model: points on a line, or in one place
+  no_motion,        ///< F only: the pairs do not move; no F, the homography is the identity
+  pure_rotation,    ///< F only: a rotation of the camera explains the pairs; no F, see the homography
+  planar,           ///< F only: a homography that is no rotation explains the pairs, a plane; no F, see the homography
+  homography        ///< F only: the same without intrinsics, where rotation and plane are not told apart
+};
+
+/// The enumerator's name, for reports.
+[[nodiscard]] constexpr const char* to_string(RansacStatus status) noexcept {
+  switch (status) {
+    case RansacStatus::ok:
+      return "ok";
+    case RansacStatus::iteration_limit:
+      return "iteration limit";
+    case RansacStatus::not_enough_data:
+      return "not enough data";
+    case RansacStatus::no_consensus:
+      return "no consensus";
+    case RansacStatus::degenerate:
+      return "degenerate";
+    case RansacStatus::no_motion:
+      return "no motion";
+    case RansacStatus::pure_rotation:
+      return "pure rotation";
+    case RansacStatus::planar:
+      return "planar";
+    case RansacStatus::homography:
+      return "homography";
+  }
+  return "unknown";
+}
+
+/// What every estimate reports beside its model.
+struct RansacReport {
+  RansacStatus status = RansacStatus::not_enough_data;
+  std::size_t used = 0;        ///< data present: finite, weight > 0
+  std::size_t inliers = 0;     ///< of the model returned
+  std::size_t iterations = 0;  ///< samples drawn
+  double inlier_share = 0;     ///< share of the weight that inliers hold, [0, 1]
+
+  /// Whether there is a model of the kind asked for.
+  [[nodiscard]] constexpr bool found() const noexcept {
+    return status == RansacStatus::ok || status == RansacStatus::iteration_limit;
+  }
+};
+
+namespace detail {
+
+// The data present as one array per coordinate, the weight last and relative to the largest; padded with zeros to whole
+// blocks, so that loops over packets need no rest. In double and, for scoring, rounded to float.
+template <std::size_t Rows>
+struct RansacColumns {
+  static constexpr std::size_t rows = Rows, block = 64;
+
+  std::size_t size = 0, capacity = 0;
+  double total_weight = 0;
+  std::vector<std::uint32_t> index;  // position in the caller's arrays
+  std::vector<double> exact;
+  std::vector<float> fast;
+
+  [[nodiscard]] const double* row(std::size_t r) const noexcept { return exact.data() + r * capacity; }
+  [[nodiscard]] double* row(std::size_t r) noexcept { return exact.data() + r * capacity; }
+  [[nodiscard]] const float* fast_row(std::size_t r) const noexcept { return fast.data() + r * capacity; }
+  [[nodiscard]] span<const double> weights() const noexcept { return {row(Rows - 1), size}; }
+
+  void begin(std::size_t most) {
+    size = 0;
+    capacity = (most + block - 1) / block * block;
+    index.resize(most);
+    exact.assign(Rows * capacity, 0.0);
+    fast.resize(Rows * capacity);
+  }
+  void push(std::size_t i, const double (&datum)[Rows]) noexcept {
+    for (std::size_t r = 0; r < Rows; ++r) row(r)[size] = datum[r];
+    index[size++] = static_cast<std::uint32_t>(i);
+  }
+};
+
+inline namespace CFP_ISA {
+
+template <std::size_t Rows>
+void finish(RansacColumns<Rows>& columns) noexcept {
+  double* const weight = columns.row(Rows - 1);
+  const double largest = columns.size > 0 ? *std::max_element(weight, weight + columns.size) : 1.0;
+  columns.total_weight = 0;
+  for (std::size_t i = 0; i < columns.size; ++i) columns.total_weight += weight[i] /= largest;
+  std::transform(columns.exact.begin(), columns.exact.end(), columns.fast.begin(),
+                 [](double x) { return static_cast<float>(x); });
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
+
+inline namespace CFP_ISA {
+
+/// The first field outside its range.
+[[nodiscard]] inline const char* invalid_field(const RansacOptions& options, std::size_t least_inliers) noexcept {
+  if (!(options.threshold_px > 0 && options.threshold_px < 1e4)) return "threshold_px";
+  if (!(options.confidence > 0 && options.confidence < 1)) return "confidence";
+  if (options.max_iterations < 1) return "max_iterations";
+  if (options.min_iterations > options.max_iterations) return "min_iterations";
+  if (options.min_inliers < least_inliers) return "min_inliers";
+  return nullptr;
+}
+
+/// A model and its cost, the sum over the data of w min(d^2 / T^2, 1) with the distance d and the threshold T (MSAC).
+template <typename Model>
+struct RansacCandidate {
+  Model model;
+  double cost = std::numeric_limits<double>::infinity();
+};
+
+/// What came of a search. No cost below the total weight: no model at all.
+template <typename Model>
+struct RansacSearch {
+  RansacCandidate<Model> best = {};
+  std::size_t iterations = 0;
+  bool confident = false;  ///< whether the confidence was reached
+};
+
+/// Draws samples until one without mismatches is among them with the confidence asked for. The problem has
+///   Model, sample_size
+///   size(), weights() (> 0), total_weight()     of the data
+///   solve(sample, visit)                        calls visit(model) for each model of a sample
+///   double cost(model, bound)                   may give up with any value above the bound
+///   void optimize(candidate)                    local optimisation; keeps the better of both
+///   auto inlier_test(model)                     a predicate of indices
+/// weighted: whether samples may follow the weights.
+template <typename Problem>
+[[nodiscard]] RansacSearch<typename Problem::Model> lo_ransac(Problem& problem, bool weighted,
+                                                              const RansacOptions& options, Random& random,
+                                                              SamplingWorkspace& workspace) {
+  using Model = typename Problem::Model;
+  constexpr std::size_t sample_size = Problem::sample_size;
+  MinimalSampler<sample_size> sampler(problem.size(), weighted ? problem.weights() : span<const double>(),
+                                      options.sampling, options.max_iterations, workspace);
+  RansacSearch<Model> search;
+  std::size_t needed = options.max_iterations;
+  double best_sample_cost = problem.total_weight();
+  const auto count_needed = [&] {
+    const auto is_inlier = problem.inlier_test(search.best.model);
+    if (sampler.sampling() == Sampling::progressive)
+      return progressive_ransac_iterations(sampler.order(), is_inlier, sample_size, options.confidence,
+                                           options.max_iterations);
+    double inliers = 0, all = 0;
+    for (std::size_t i = 0; i < problem.size(); ++i) {
+      const double one = sampler.sampling() == Sampling::weighted ? problem.weights()[i] : 1.0;
+      inliers += is_inlier(i) ? one : 0.0;
+      all += one;
+    }
+    return ransac_iterations(inliers / all, sample_size, options.confidence, options.max_iterations);
+  };
+  const auto judge = [&](const Model& model) {
+    const double cost = problem.cost(model, best_sample_cost);
+    if (!(cost < best_sample_cost)) return;
+    best_sample_cost = cost;
+    RansacCandidate<Model> candidate{model, cost};
+    problem.optimize(candidate);
+    if (!(candidate.cost < search.best.cost)) return;
+    search.best = candidate;
+    needed = count_needed();
+  };
+  typename MinimalSampler<sample_size>::Sample sample;
+  while (search.iterations < (std::max)(needed, options.min_iterations) && sampler.draw(random, sample)) {
+    ++search.iterations;
+    problem.solve(sample, judge);
+  }
+  search.confident = needed < options.max_iterations;
+  return search;
+}
+
+}  // namespace CFP_ISA
+
+namespace detail {
+inline namespace CFP_ISA {
+
+// Fills the counts, the share and the mask (empty, or one per datum of the caller, all 0). Too few inliers are no
+// consensus.
+template <std::size_t Rows, typename IsInlier>
+void report_inliers(const RansacColumns<Rows>& data, IsInlier&& is_inlier, std::size_t min_inliers,
+                    span<char> inlier_mask, RansacReport& report) {
+  double weight = 0;
+  for (std::size_t i = 0; i < data.size; ++i) {
+    if (!is_inlier(i)) continue;
+    ++report.inliers;
+    weight += data.weights()[i];
+    if (!inlier_mask.empty()) inlier_mask[data.index[i]] = 1;
+  }
+  report.inlier_share = (std::min)(weight / data.total_weight, 1.0);
+  if (report.inliers >= min_inliers) return;
+  std::fill(inlier_mask.begin(), inlier_mask.end(), char(0));
+  report.inliers = 0;
+  report.inlier_share = 0;
+  report.status = RansacStatus::no_consensus;
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
+}  // namespace cfp
