@@ -29,18 +29,19 @@ using Method = cfp_benchmark::InterleavedMethod<Scene, cfp::Matrix3<double>>;
 
 Method ours(const char* name, double threshold_px, std::size_t max_iterations) {
   auto workspace = std::make_shared<cfp::FundamentalRansacWorkspace>();
-  return {name,
-          [=](const Scene& scene, double& iterations) {
-            cfp::FundamentalRansacOptions options;
-            options.threshold_px = threshold_px;
-            options.max_iterations = max_iterations;
-            std::vector<char> mask(scene.prev.size());
-            const auto result = cfp::fundamental_ransac<double>(scene.prev, scene.cur, {}, mask, options, *workspace);
-            iterations = static_cast<double>(result.iterations);
-            return result.F;
-          },
-          {},
-          {}};
+  return {
+      name,
+      [=](const Scene& scene, double& iterations) {
+        cfp::FundamentalRansacOptions options;
+        options.threshold_px = threshold_px;
+        options.max_iterations = max_iterations;
+        std::vector<char> mask(scene.prev.size());
+        const auto result = cfp::fundamental_ransac(cfp::PointPairs{scene.prev, scene.cur}, options, *workspace, mask);
+        iterations = static_cast<double>(result.iterations);
+        return result.F;
+      },
+      {},
+      {}};
 }
 
 #ifdef CFP_HAVE_OPENCV

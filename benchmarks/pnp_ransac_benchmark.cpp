@@ -32,8 +32,7 @@ Method ours(const char* name, cfp::Sampling sampling, bool weighted) {
             std::vector<char> mask(scene.world.size());
             const cfp::span<const double> weights =
                 weighted ? cfp::span<const double>(scene.weights) : cfp::span<const double>();
-            const auto result =
-                cfp::pnp_ransac(camera, {scene.world}, {scene.pixels}, weights, mask, options, *workspace);
+            const auto result = cfp::pnp_ransac(scene.world, scene.pixels, weights, camera, options, *workspace, mask);
             iterations = static_cast<double>(result.iterations);
             return result.T_cam_world;
           },

@@ -219,7 +219,7 @@ void run(const std::filesystem::path& folder, const std::filesystem::path& out, 
         "%s: %zu keypoints (%zu foreground, %zu background), flow %s, D_Th %.2f px, pose %s with %zu inliers, "
         "effective points %.0f\n",
         image.file.c_str(), current.keypoints.size(), result.first.foreground, result.first.background,
-        cfp::to_string(result.first.flow_reason), result.second.projection_threshold_px,
+        cfp::to_string(result.first.flow_status), result.second.projection_threshold_px,
         result.pose.valid ? "ok" : "none", result.pose.inliers, result.health.effective_points);
     for (std::size_t b = 0; b < result.boxes.size(); ++b) {
       std::printf("  box %lld %s, O %.3f from %zu flow pairs (%s)\n", static_cast<long long>(result.boxes[b].id),

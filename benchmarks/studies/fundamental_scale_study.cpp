@@ -54,16 +54,13 @@ class Experiment {
  public:
   void run(const Scene& scene, const std::vector<double>& scales, std::vector<double>& plain,
            std::vector<double>& explored) {
-    pairs_.load<double>(scene.prev, scene.cur, {});
-    sampler_.reset(pairs_.size, {}, 7, cfp::Sampling::uniform, options_.max_iterations);
-    cfp::detail::FundamentalSearch search{pairs_,
-                                          options_,
-                                          sampler_,
-                                          list_,
-                                          distances_sq_,
-                                          pairs_.factor * pairs_.factor,
-                                          cfp::Random(0, "fundamental_ransac")};
-    cfp::detail::FactoredF F(search.run().F);
+    cfp::detail::load_pairs(cfp::PointPairs{scene.prev, scene.cur}, pairs_);
+    list_.reserve(pairs_.size);
+    distances_sq_.resize(pairs_.capacity);
+    cfp::detail::FundamentalSearch<double> search{pairs_, pairs_.factor * pairs_.factor, list_, distances_sq_,
+                                                  cfp::Random(0, "fundamental_ransac")};
+    const cfp::Matrix3<double> found = cfp::lo_ransac(search, false, options_, search.random, sampling_).best.model;
+    cfp::detail::FactoredF<double> F(found);
     search.measure_noise(F.matrix());
     plain = errors(scene, scales, search, F);
     search.explore(F);
@@ -73,19 +70,22 @@ class Experiment {
 
  private:
   std::vector<double> errors(const Scene& scene, const std::vector<double>& scales,
-                             const cfp::detail::FundamentalSearch& search, const cfp::detail::FactoredF& F) const {
+                             const cfp::detail::FundamentalSearch<double>& search,
+                             const cfp::detail::FactoredF<double>& F) const {
     std::vector<double> out;
     for (const double scale : scales) {
-      cfp::detail::FactoredF refined = F;
-      cfp::detail::refine_fundamental(pairs_.exact_columns(), scale * scale * search.noise_variance, 30, 1e-8, refined);
-      out.push_back(cfp_test::median_sampson_of_truth<double>(scene, pairs_.to_pixels(refined.matrix())));
+      cfp::detail::FactoredF<double> refined = F;
+      cfp::detail::refine_fundamental(cfp::detail::exact_columns(pairs_), scale * scale * search.noise_variance, 30,
+                                      1e-8, refined);
+      out.push_back(cfp_test::median_sampson_of_truth<double>(
+          scene, cfp::detail::unscaled_fundamental(refined.matrix(), pairs_.scaling)));
     }
     return out;
   }
 
   cfp::FundamentalRansacOptions options_;
   cfp::detail::PairArrays pairs_;
-  cfp::MinimalSampler sampler_;
+  cfp::SamplingWorkspace sampling_;
   std::vector<std::uint32_t> list_;
   std::vector<double> distances_sq_;
 };

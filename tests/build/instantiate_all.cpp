@@ -75,7 +75,12 @@ static void instantiate_geometry() noexcept {
   use(&cfp::nearest_fundamental<Scalar>);
   use(&cfp::fundamental_8point<Scalar>);
   use(&cfp::fundamental_7point<Scalar>);
-  use(&cfp::fundamental_ransac<Scalar>);
+  use(static_cast<cfp::FundamentalResult<Scalar> (*)(
+          const cfp::PointPairs<Scalar>&, const cfp::FundamentalRansacOptions&, cfp::FundamentalRansacWorkspace&,
+          cfp::span<char>)>(&cfp::fundamental_ransac<Scalar>));
+  use(static_cast<cfp::FundamentalResult<Scalar> (*)(
+          const cfp::PointPairs<Scalar>&, const cfp::PinholeCamera<Scalar>&, const cfp::FundamentalRansacOptions&,
+          cfp::FundamentalRansacWorkspace&, cfp::span<char>)>(&cfp::fundamental_ransac<Scalar>));
   use(&cfp::reprojection_distances<Scalar>);
 }
 

@@ -76,12 +76,20 @@
   CFP_LAYOUT(cfp::PinholeCamera<float>, cy)                              \
   CFP_LAYOUT(cfp::PinholeCamera<double>, cy)                             \
   CFP_LAYOUT(cfp::FundamentalRansacOptions, seed)                        \
-  CFP_LAYOUT(cfp::FundamentalResult<float>, inlier_share)                \
-  CFP_LAYOUT(cfp::FundamentalResult<double>, inlier_share)               \
-  CFP_LAYOUT(cfp::FundamentalRansacWorkspace, list)                      \
+  CFP_LAYOUT_OPAQUE(cfp::FundamentalResult<float>)                       \
+  CFP_LAYOUT_OPAQUE(cfp::FundamentalResult<double>)                      \
+  CFP_LAYOUT(cfp::FundamentalRansacWorkspace, distances_sq)                      \
   CFP_LAYOUT(cfp::RadialTangentialCamera<float>, k3)                     \
   CFP_LAYOUT(cfp::RadialTangentialCamera<double>, k3)                    \
-  CFP_LAYOUT_OPAQUE(cfp::MinimalSampler)                                 \
+  CFP_LAYOUT_OPAQUE(cfp::MinimalSampler<7>)                              \
+  CFP_LAYOUT(cfp::SamplingWorkspace, order)                              \
+  CFP_LAYOUT(cfp::RansacOptions, seed)                                   \
+  CFP_LAYOUT(cfp::RansacReport, inlier_share)                            \
+  CFP_LAYOUT_OPAQUE(cfp::RansacCandidate<cfp::Matrix3<double>>)          \
+  CFP_LAYOUT_OPAQUE(cfp::RansacSearch<cfp::Matrix3<double>>)             \
+  CFP_LAYOUT(cfp::PointPairs<float>, weights)                            \
+  CFP_LAYOUT(cfp::PointPairs<double>, weights)                           \
+  CFP_LAYOUT(cfp::SVD3<double>, sigma)                                   \
   CFP_LAYOUT(cfp::SE3<float>, translation)                               \
   CFP_LAYOUT(cfp::SE3<double>, translation)                              \
   CFP_LAYOUT(cfp::Trivial<float>, delta)                                 \
@@ -125,10 +133,10 @@
   CFP_LAYOUT(cfp::LevenbergMarquardtOptions, min_absolute_decrease)      \
   CFP_LAYOUT(cfp::LeastSquaresResult, accepted)                          \
   CFP_LAYOUT_OPAQUE(cfp::Damping)                                        \
-  CFP_LAYOUT(cfp::PnpRansacWorkspace, sampler)                           \
+  CFP_LAYOUT(cfp::PnpRansacWorkspace, sampling)                          \
   CFP_LAYOUT(cfp::PnpRansacOptions, seed)                                \
-  CFP_LAYOUT(cfp::PnpRansacResult<float>, inlier_share)                  \
-  CFP_LAYOUT(cfp::PnpRansacResult<double>, inlier_share)                 \
+  CFP_LAYOUT_OPAQUE(cfp::PnpRansacResult<float>)                         \
+  CFP_LAYOUT_OPAQUE(cfp::PnpRansacResult<double>)                        \
   CFP_LAYOUT_OPAQUE(cfp::BundleWorkspace)                            \
   CFP_LAYOUT(cfp::FirstStageInput<float>, fundamental)                   \
   CFP_LAYOUT(cfp::FirstStageInput<double>, fundamental)                  \

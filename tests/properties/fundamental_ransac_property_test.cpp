@@ -45,13 +45,13 @@ TEST_CASE("fundamental_ransac ends with finite numbers, consistent counts and th
     options.sampling = *rc::gen::element(cfp::Sampling::uniform, cfp::Sampling::weighted, cfp::Sampling::progressive);
     cfp::FundamentalRansacWorkspace workspace;
     std::vector<char> mask(n), again_mask(n);
-    const auto result = cfp::fundamental_ransac<double>(prev, cur, weights, mask, options, workspace);
+    const auto result = cfp::fundamental_ransac(cfp::PointPairs{prev, cur, weights}, options, workspace, mask);
     RC_ASSERT(result.F.allFinite());
     RC_ASSERT(result.homography.allFinite());
     RC_ASSERT(result.inlier_share >= 0 && result.inlier_share <= 1);
-    RC_ASSERT(result.inliers <= result.pairs && result.pairs <= n);
-    RC_ASSERT(result.has_fundamental() == !result.F.isZero(0));
-    const auto again = cfp::fundamental_ransac<double>(prev, cur, weights, again_mask, options, workspace);
+    RC_ASSERT(result.inliers <= result.used && result.used <= n);
+    RC_ASSERT(result.found() == !result.F.isZero(0));
+    const auto again = cfp::fundamental_ransac(cfp::PointPairs{prev, cur, weights}, options, workspace, again_mask);
     RC_ASSERT(again.F == result.F);
     RC_ASSERT(again_mask == mask);
   });

@@ -16,9 +16,10 @@
 using cfp::fundamental_ransac;
 using cfp::FundamentalRansacOptions;
 using cfp::FundamentalRansacWorkspace;
-using cfp::FundamentalReason;
 using cfp::FundamentalResult;
 using cfp::Matrix3;
+using cfp::PointPairs;
+using cfp::RansacStatus;
 using cfp_test::make_two_view_scene;
 using cfp_test::SceneShape;
 using cfp_test::TwoViewOptions;
@@ -53,7 +54,7 @@ Labelled read_labelled(const std::filesystem::path& path) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("F survives mismatches", "[geometry]", float, double) {
+TEMPLATE_TEST_CASE("F survives mismatches", "[robust]", float, double) {
   cfp::Random random(31, "mismatches");
   FundamentalRansacWorkspace workspace;
   for (const double outliers : {0.0, 0.2, 0.4, 0.55}) {
@@ -61,8 +62,8 @@ TEMPLATE_TEST_CASE("F survives mismatches", "[geometry]", float, double) {
       const auto scene = make_two_view_scene<TestType>(random, noisy(300, outliers));
       std::vector<char> mask(300);
       const auto result =
-          fundamental_ransac<TestType>(scene.prev, scene.cur, {}, mask, FundamentalRansacOptions{}, workspace, nullptr);
-      REQUIRE(result.has_fundamental());
+          fundamental_ransac(PointPairs{scene.prev, scene.cur}, FundamentalRansacOptions{}, workspace, mask);
+      REQUIRE(result.found());
       CHECK(cfp_test::median_sampson_of_truth<TestType>(scene, result.F) < 0.35);  // noise is 0.5 px per coordinate
       CHECK(std::size_t(std::count(mask.begin(), mask.end(), 1)) == result.inliers);
       CHECK_THAT(result.inlier_share, WithinAbs(double(result.inliers) / 300, 1e-9));
@@ -79,7 +80,7 @@ TEMPLATE_TEST_CASE("F survives mismatches", "[geometry]", float, double) {
   }
 }
 
-TEST_CASE("F is nearly as good as from the true inliers alone", "[geometry]") {
+TEST_CASE("F is nearly as good as from the true inliers alone", "[robust]") {
   // A short baseline has several minima; one that chance led into would show in the mean.
   FundamentalRansacWorkspace workspace;
   for (const double outliers : {0.2, 0.4}) {
@@ -88,33 +89,32 @@ TEST_CASE("F is nearly as good as from the true inliers alone", "[geometry]") {
     for (int trial = 0; trial < 60; ++trial) {
       const auto scene = make_two_view_scene<double>(random, noisy(500, outliers));
       found += cfp_test::median_sampson_of_truth<double>(
-          scene, fundamental_ransac<double>(scene.prev, scene.cur, {}, {}, FundamentalRansacOptions{}, workspace).F);
+          scene, fundamental_ransac(PointPairs{scene.prev, scene.cur}, FundamentalRansacOptions{}, workspace).F);
       const std::vector<double> labels(scene.is_inlier.begin(), scene.is_inlier.end());
       cfp::detail::PairArrays inliers;
-      inliers.load<double>(scene.prev, scene.cur, labels);
-      cfp::detail::FactoredF F(inliers.scale_cur.matrix().inverse().transpose() * scene.F *
-                               inliers.scale_prev.matrix().inverse());
-      cfp::detail::refine_fundamental(inliers.exact_columns(), 1e6, 30, 1e-10, F);
-      ideal += cfp_test::median_sampson_of_truth<double>(scene, inliers.to_pixels(F.matrix()));
+      cfp::detail::load_pairs(PointPairs{scene.prev, scene.cur, labels}, inliers);
+      cfp::detail::FactoredF<double> F(cfp_test::scaled_fundamental(scene.F, inliers.scaling));
+      cfp::detail::refine_fundamental(cfp::detail::exact_columns(inliers), 1e6, 30, 1e-10, F);
+      ideal += cfp_test::median_sampson_of_truth<double>(
+          scene, cfp::detail::unscaled_fundamental(F.matrix(), inliers.scaling));
     }
     CHECK(found < (outliers < 0.3 ? 1.2 : 1.3) * ideal);
   }
 }
 
-TEST_CASE("Few pairs and many mismatches: F is found as far as samples go", "[geometry]") {
+TEST_CASE("Few pairs and many mismatches: F is found as far as samples go", "[robust]") {
   FundamentalRansacWorkspace workspace;
   cfp::Random random(46, "hard");
   int lost = 0;
   for (int trial = 0; trial < 100; ++trial) {
     const auto scene = make_two_view_scene<double>(random, noisy(120, 0.55));
-    const auto result =
-        fundamental_ransac<double>(scene.prev, scene.cur, {}, {}, FundamentalRansacOptions{}, workspace);
-    lost += result.has_fundamental() && cfp_test::median_sampson_of_truth<double>(scene, result.F) < 0.4 ? 0 : 1;
+    const auto result = fundamental_ransac(PointPairs{scene.prev, scene.cur}, FundamentalRansacOptions{}, workspace);
+    lost += result.found() && cfp_test::median_sampson_of_truth<double>(scene, result.F) < 0.4 ? 0 : 1;
   }
   CHECK(lost <= 4);  // a thousand samples miss with a chance of 2.5 %
 }
 
-TEST_CASE("Without noise mismatches move F by a fiftieth of the threshold at most", "[geometry]") {
+TEST_CASE("Without noise mismatches move F by a fiftieth of the threshold at most", "[robust]") {
   cfp::Random random(32, "exact");
   FundamentalRansacWorkspace workspace;
   for (int trial = 0; trial < 20; ++trial) {
@@ -123,23 +123,23 @@ TEST_CASE("Without noise mismatches move F by a fiftieth of the threshold at mos
     const auto scene = make_two_view_scene<double>(random, options);
     FundamentalRansacOptions tight;
     tight.threshold_px = 0.1;
-    const auto result = fundamental_ransac<double>(scene.prev, scene.cur, {}, {}, tight, workspace);
-    REQUIRE(result.has_fundamental());
+    const auto result = fundamental_ransac(PointPairs{scene.prev, scene.cur}, tight, workspace);
+    REQUIRE(result.found());
     CHECK(cfp_test::median_sampson_of_truth<double>(scene, result.F) < 0.02 * tight.threshold_px);
   }
 }
 
-TEST_CASE("Pairs that a homography explains give a reason and no F", "[geometry]") {
+TEST_CASE("Pairs that a homography explains give a reason and no F", "[robust]") {
   cfp::Random random(33, "degenerate");
   FundamentalRansacWorkspace workspace;
   struct Case {
     SceneShape shape;
     double translation_m, rotation_rad;
-    FundamentalReason with_camera, without;
+    RansacStatus with_camera, without;
   };
-  const Case cases[] = {{SceneShape::volume, 0, 0.035, FundamentalReason::pure_rotation, FundamentalReason::homography},
-                        {SceneShape::plane, 0.1, 0.035, FundamentalReason::planar, FundamentalReason::homography},
-                        {SceneShape::volume, 0, 0, FundamentalReason::no_motion, FundamentalReason::no_motion}};
+  const Case cases[] = {{SceneShape::volume, 0, 0.035, RansacStatus::pure_rotation, RansacStatus::homography},
+                        {SceneShape::plane, 0.1, 0.035, RansacStatus::planar, RansacStatus::homography},
+                        {SceneShape::volume, 0, 0, RansacStatus::no_motion, RansacStatus::no_motion}};
   for (const Case& c : cases) {
     for (const double outliers : {0.0, 0.2, 0.4}) {
       for (int trial = 0; trial < 30; ++trial) {
@@ -148,14 +148,14 @@ TEST_CASE("Pairs that a homography explains give a reason and no F", "[geometry]
         options.translation_m = c.translation_m;
         options.rotation_rad = c.rotation_rad;
         const auto scene = make_two_view_scene<double>(random, options);
-        const auto result = fundamental_ransac<double>(scene.prev, scene.cur, {}, {}, FundamentalRansacOptions{},
-                                                       workspace, &scene.camera);
-        CHECK(result.reason == c.with_camera);
+        const auto result =
+            fundamental_ransac(PointPairs{scene.prev, scene.cur}, scene.camera, FundamentalRansacOptions{}, workspace);
+        CHECK(result.status == c.with_camera);
         CHECK(result.F.isZero());
         CHECK(result.homography.determinant() > 0);
         const auto true_inliers = std::count(scene.is_inlier.begin(), scene.is_inlier.end(), 1);
         CHECK(double(result.inliers) > 0.85 * double(true_inliers));
-        CHECK(fundamental_ransac<double>(scene.prev, scene.cur, {}, {}, FundamentalRansacOptions{}, workspace).reason ==
+        CHECK(fundamental_ransac(PointPairs{scene.prev, scene.cur}, FundamentalRansacOptions{}, workspace).status ==
               c.without);
         double squares = 0;
         for (std::size_t i = 0; i < scene.world.size(); ++i) {
@@ -171,7 +171,7 @@ TEST_CASE("Pairs that a homography explains give a reason and no F", "[geometry]
   }
 }
 
-TEST_CASE("A dominant plane with parallax beside it gives F", "[geometry]") {
+TEST_CASE("A dominant plane with parallax beside it gives F", "[robust]") {
   cfp::Random random(34, "dominant plane");
   FundamentalRansacWorkspace workspace;
   for (int trial = 0; trial < 30; ++trial) {
@@ -179,14 +179,13 @@ TEST_CASE("A dominant plane with parallax beside it gives F", "[geometry]") {
     options.shape = SceneShape::volume_and_plane;
     options.plane_share = 0.75;
     const auto scene = make_two_view_scene<double>(random, options);
-    const auto result =
-        fundamental_ransac<double>(scene.prev, scene.cur, {}, {}, FundamentalRansacOptions{}, workspace);
-    REQUIRE(result.has_fundamental());
+    const auto result = fundamental_ransac(PointPairs{scene.prev, scene.cur}, FundamentalRansacOptions{}, workspace);
+    REQUIRE(result.found());
     CHECK(cfp_test::median_sampson_of_truth<double>(scene, result.F) < 0.3);
   }
 }
 
-TEST_CASE("Same input and seed give the same bits, in a fresh or a used workspace", "[geometry]") {
+TEST_CASE("Same input and seed give the same bits, in a fresh or a used workspace", "[robust]") {
   cfp::Random random(35, "bits");
   FundamentalRansacWorkspace used;
   for (const cfp::Sampling sampling : {cfp::Sampling::uniform, cfp::Sampling::weighted, cfp::Sampling::progressive}) {
@@ -198,21 +197,21 @@ TEST_CASE("Same input and seed give the same bits, in a fresh or a used workspac
     options.seed = 77;
     FundamentalRansacWorkspace fresh;
     std::vector<char> mask_a(400), mask_b(400);
-    const auto a = fundamental_ransac<double>(scene.prev, scene.cur, weights, mask_a, options, used);
-    const auto b = fundamental_ransac<double>(scene.prev, scene.cur, weights, mask_b, options, fresh);
+    const auto a = fundamental_ransac(PointPairs{scene.prev, scene.cur, weights}, options, used, mask_a);
+    const auto b = fundamental_ransac(PointPairs{scene.prev, scene.cur, weights}, options, fresh, mask_b);
     CHECK(a.F == b.F);
     CHECK(a.iterations == b.iterations);
     CHECK(mask_a == mask_b);
   }
 }
 
-TEST_CASE("Absent pairs change nothing, weights guide the search", "[geometry]") {
+TEST_CASE("Absent pairs change nothing, weights guide the search", "[robust]") {
   cfp::Random random(36, "weights");
   FundamentalRansacWorkspace workspace;
   auto scene = make_two_view_scene<double>(random, noisy(300, 0.3));
-  const auto expected = fundamental_ransac<double>(scene.prev, scene.cur, std::vector<double>(300, 1.0), {},
-                                                   FundamentalRansacOptions{}, workspace);
   std::vector<double> weights(300, 1.0);
+  const auto expected =
+      fundamental_ransac(PointPairs{scene.prev, scene.cur, weights}, FundamentalRansacOptions{}, workspace);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::array<double, 2> hostile[] = {
       {nan, 0}, {1, std::numeric_limits<double>::infinity()}, {1e300, 5}, {5, 5}, {7, 7}, {9, 9}};
@@ -222,9 +221,9 @@ TEST_CASE("Absent pairs change nothing, weights guide the search", "[geometry]")
     weights.push_back(k < 3 ? 1.0 : k == 3 ? 0.0 : k == 4 ? -2.0 : nan);
   }
   const auto result =
-      fundamental_ransac<double>(scene.prev, scene.cur, weights, {}, FundamentalRansacOptions{}, workspace);
+      fundamental_ransac(PointPairs{scene.prev, scene.cur, weights}, FundamentalRansacOptions{}, workspace);
   CHECK(result.F == expected.F);
-  CHECK(result.pairs == 300);
+  CHECK(result.used == 300);
 
   // 70 % mismatches: out of reach for 1000 uniform samples, within it when the weights know.
   double iterations[2] = {0, 0};
@@ -236,8 +235,8 @@ TEST_CASE("Absent pairs change nothing, weights guide the search", "[geometry]")
     for (const cfp::Sampling sampling : {cfp::Sampling::weighted, cfp::Sampling::progressive}) {
       FundamentalRansacOptions options;
       options.sampling = sampling;
-      const auto guided = fundamental_ransac<double>(hard.prev, hard.cur, known, {}, options, workspace);
-      REQUIRE(guided.has_fundamental());
+      const auto guided = fundamental_ransac(PointPairs{hard.prev, hard.cur, known}, options, workspace);
+      REQUIRE(guided.found());
       CHECK(cfp_test::median_sampson_of_truth<double>(hard, guided.F) < 0.4);
       iterations[sampling == cfp::Sampling::weighted ? 0 : 1] += double(guided.iterations) / 10;
     }
@@ -246,25 +245,25 @@ TEST_CASE("Absent pairs change nothing, weights guide the search", "[geometry]")
   CHECK(iterations[1] < 400);
 }
 
-TEST_CASE("Too little, coincident or unstructured input is reported and never crashes", "[geometry]") {
+TEST_CASE("Too little, coincident or unstructured input is reported and never crashes", "[robust]") {
   FundamentalRansacWorkspace workspace;
   const auto run = [&](const std::vector<std::array<double, 2>>& prev, const std::vector<std::array<double, 2>>& cur) {
     const FundamentalResult<double> result =
-        fundamental_ransac<double>(prev, cur, {}, {}, FundamentalRansacOptions{}, workspace);
+        fundamental_ransac(PointPairs{prev, cur}, FundamentalRansacOptions{}, workspace);
     CHECK(result.F.allFinite());
     CHECK(result.homography.allFinite());
     CHECK((result.inlier_share >= 0 && result.inlier_share <= 1));
-    return result.reason;
+    return result.status;
   };
   cfp::Random random(37, "hostile");
   const auto scene = make_two_view_scene<double>(random, noisy(6, 0));
-  CHECK(run({}, {}) == FundamentalReason::too_few_pairs);
-  CHECK(run(scene.prev, scene.cur) == FundamentalReason::too_few_pairs);
+  CHECK(run({}, {}) == RansacStatus::not_enough_data);
+  CHECK(run(scene.prev, scene.cur) == RansacStatus::not_enough_data);
   const std::vector<std::array<double, 2>> equal(50, {10.0, 20.0});
-  CHECK(run(equal, equal) == FundamentalReason::coincident);
+  CHECK(run(equal, equal) == RansacStatus::degenerate);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<std::array<double, 2>> bad(50, {nan, nan});
-  CHECK(run(bad, bad) == FundamentalReason::too_few_pairs);
+  CHECK(run(bad, bad) == RansacStatus::not_enough_data);
   std::vector<std::array<double, 2>> line, shifted, a, b;
   for (int i = 0; i < 60; ++i) {
     line.push_back({10.0 * i, 5.0 * i + 3});
@@ -272,16 +271,16 @@ TEST_CASE("Too little, coincident or unstructured input is reported and never cr
     a.push_back({random.uniform(0, 640), random.uniform(0, 480)});
     b.push_back({random.uniform(0, 640), random.uniform(0, 480)});
   }
-  CHECK_FALSE(run(line, shifted) == FundamentalReason::ok);
-  CHECK_FALSE(run(line, line) == FundamentalReason::ok);
-  const FundamentalReason chance = run(a, b);
-  CHECK((chance == FundamentalReason::no_consensus || chance == FundamentalReason::iteration_limit));
+  CHECK_FALSE(run(line, shifted) == RansacStatus::ok);
+  CHECK_FALSE(run(line, line) == RansacStatus::ok);
+  const RansacStatus chance = run(a, b);
+  CHECK((chance == RansacStatus::no_consensus || chance == RansacStatus::iteration_limit));
   std::vector<std::array<double, 2>> two_places(60, {10.0, 20.0});
   for (std::size_t i = 0; i < 30; ++i) two_places[i] = {400.0, 300.0};
-  CHECK_FALSE(run(two_places, two_places) == FundamentalReason::ok);
+  CHECK_FALSE(run(two_places, two_places) == RansacStatus::ok);
 }
 
-TEST_CASE("Options outside their range are named", "[geometry]") {
+TEST_CASE("Options outside their range are named", "[robust]") {
   FundamentalRansacOptions options;
   CHECK(!invalid_field(options));
   options.threshold_px = std::numeric_limits<double>::quiet_NaN();
@@ -294,7 +293,7 @@ TEST_CASE("Options outside their range are named", "[geometry]") {
   CHECK(invalid_field(options).string() == "min_inliers");
 }
 
-TEST_CASE("A second call allocates nothing", "[geometry]") {
+TEST_CASE("A second call allocates nothing", "[robust]") {
   cfp::Random random(38, "allocation");
   const auto scene = make_two_view_scene<double>(random, noisy(500, 0.4));
   TwoViewOptions rotation_options = noisy(500, 0.2);
@@ -306,16 +305,16 @@ TEST_CASE("A second call allocates nothing", "[geometry]") {
   for (const cfp::Sampling sampling : {cfp::Sampling::weighted, cfp::Sampling::progressive}) {
     FundamentalRansacOptions options;
     options.sampling = sampling;
-    (void)fundamental_ransac<double>(scene.prev, scene.cur, weights, mask, options, workspace);
+    (void)fundamental_ransac(PointPairs{scene.prev, scene.cur, weights}, options, workspace, mask);
     CHECK(cfp_test::allocations_in([&] {
-            (void)fundamental_ransac<double>(scene.prev, scene.cur, weights, mask, options, workspace);
-            (void)fundamental_ransac<double>(rotation.prev, rotation.cur, weights, mask, options, workspace,
-                                             &rotation.camera);
+            (void)fundamental_ransac(PointPairs{scene.prev, scene.cur, weights}, options, workspace, mask);
+            (void)fundamental_ransac(PointPairs{rotation.prev, rotation.cur, weights}, rotation.camera, options,
+                                     workspace, mask);
           }) == 0);
   }
 }
 
-TEST_CASE("Labelled real pairs: the labelled inliers fit F", "[geometry]") {
+TEST_CASE("Labelled real pairs: the labelled inliers fit F", "[robust]") {
   CFP_REQUIRE_DATA(folder, "two_view");
   FundamentalRansacWorkspace workspace;
   for (const char* name : {"johnssonb", "unihouse", "physics"}) {
@@ -324,10 +323,10 @@ TEST_CASE("Labelled real pairs: the labelled inliers fit F", "[geometry]") {
     FundamentalRansacOptions options;
     options.threshold_px = 2;
     std::vector<char> mask(pairs.prev.size());
-    const auto result = fundamental_ransac<double>(pairs.prev, pairs.cur, {}, mask, options, workspace);
-    INFO(name << ": " << to_string(result.reason) << ", " << result.inliers << " inliers, " << result.iterations
+    const auto result = fundamental_ransac(PointPairs{pairs.prev, pairs.cur}, options, workspace, mask);
+    INFO(name << ": " << to_string(result.status) << ", " << result.inliers << " inliers, " << result.iterations
               << " iterations");
-    REQUIRE(result.has_fundamental());
+    REQUIRE(result.found());
     double labelled = 0, found = 0;
     for (std::size_t i = 0; i < mask.size(); ++i)
       labelled += pairs.label[i], found += pairs.label[i] != 0 && mask[i] != 0 ? 1 : 0;
@@ -335,8 +334,7 @@ TEST_CASE("Labelled real pairs: the labelled inliers fit F", "[geometry]") {
   }
 }
 
-TEST_CASE("A slow camera before a far wall has an F where its noise allows, and a rotation is never one",
-          "[geometry]") {
+TEST_CASE("A slow camera before a far wall has an F where its noise allows, and a rotation is never one", "[robust]") {
   // A video's parallax over a far wall is often below threshold_px; the choice must rest on the noise, not on the
   // threshold.
   FundamentalRansacWorkspace workspace;
@@ -348,12 +346,12 @@ TEST_CASE("A slow camera before a far wall has an F where its noise allows, and 
         options.pixel_noise_px = noise_px;
         options.translation_m = translation_m;
         const auto scene = cfp_test::make_dynamic_scene<double>(options, seed);
-        const auto result = fundamental_ransac<double>(scene.previous_keypoints, scene.keypoints, {}, {},
-                                                       FundamentalRansacOptions{}, workspace, &scene.camera);
+        const auto result = fundamental_ransac(PointPairs{scene.previous_keypoints, scene.keypoints}, scene.camera,
+                                               FundamentalRansacOptions{}, workspace);
         INFO("noise " << noise_px << " px, translation " << translation_m << " m, seed " << seed << ": "
-                      << to_string(result.reason));
-        if (translation_m == 0) CHECK(result.reason == FundamentalReason::pure_rotation);
-        if (translation_m == 0.1 || (translation_m > 0 && noise_px <= 0.1)) CHECK(result.has_fundamental());
+                      << to_string(result.status));
+        if (translation_m == 0) CHECK(result.status == RansacStatus::pure_rotation);
+        if (translation_m == 0.1 || (translation_m > 0 && noise_px <= 0.1)) CHECK(result.found());
       }
     }
   }

@@ -12,8 +12,8 @@
 using cfp::PinholeCamera;
 using cfp::pnp_ransac;
 using cfp::PnpRansacOptions;
-using cfp::PnpRansacReason;
 using cfp::PnpRansacWorkspace;
+using cfp::RansacStatus;
 using cfp::Sampling;
 using cfp_test::AbsolutePoseOptions;
 using cfp_test::make_absolute_pose_scene;
@@ -33,7 +33,7 @@ AbsolutePoseOptions scene_options(std::size_t points, double outlier_share, doub
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("The pose survives mismatches", "[optimization]", float, double) {
+TEMPLATE_TEST_CASE("The pose survives mismatches", "[robust]", float, double) {
   cfp::Random random(51, "pnp");
   PnpRansacWorkspace workspace;
   for (const double outliers : {0.0, 0.3, 0.6, 0.8}) {
@@ -41,8 +41,8 @@ TEMPLATE_TEST_CASE("The pose survives mismatches", "[optimization]", float, doub
       const auto scene = make_absolute_pose_scene<TestType>(random, camera<TestType>, scene_options(300, outliers));
       std::vector<char> mask(300);
       const auto result =
-          pnp_ransac(camera<TestType>, {scene.world}, {scene.pixels}, {}, mask, PnpRansacOptions{}, workspace);
-      REQUIRE(result.has_pose());
+          pnp_ransac(scene.world, scene.pixels, {}, camera<TestType>, PnpRansacOptions{}, workspace, mask);
+      REQUIRE(result.found());
       const auto error = cfp_test::pose_distance(result.T_cam_world, scene.T_cam_world);
       CHECK(error[0] < 0.03);
       CHECK(error[1] < 0.01);
@@ -58,21 +58,20 @@ TEMPLATE_TEST_CASE("The pose survives mismatches", "[optimization]", float, doub
   }
 }
 
-TEMPLATE_TEST_CASE("Without noise the pose is exact", "[optimization]", float, double) {
+TEMPLATE_TEST_CASE("Without noise the pose is exact", "[robust]", float, double) {
   cfp::Random random(52, "pnp");
   PnpRansacWorkspace workspace;
   for (int trial = 0; trial < 20; ++trial) {
     const auto scene = make_absolute_pose_scene<TestType>(random, camera<TestType>, scene_options(100, 0, 0));
-    const auto result =
-        pnp_ransac(camera<TestType>, {scene.world}, {scene.pixels}, {}, {}, PnpRansacOptions{}, workspace);
-    REQUIRE(result.reason == PnpRansacReason::ok);
+    const auto result = pnp_ransac(scene.world, scene.pixels, {}, camera<TestType>, PnpRansacOptions{}, workspace);
+    REQUIRE(result.status == RansacStatus::ok);
     CHECK(result.inliers == 100);
     CHECK(cfp_test::pose_distance(result.T_cam_world, scene.T_cam_world)[0] <
           (std::is_same_v<TestType, float> ? 1e-4 : 1e-9));
   }
 }
 
-TEST_CASE("A distorted camera is served through the same interface", "[optimization]") {
+TEST_CASE("A distorted camera is served through the same interface", "[robust]") {
   cfp::Random random(53, "pnp");
   cfp::RadialTangentialCamera<double> distorted;
   distorted.fx = 517.3, distorted.fy = 516.5, distorted.cx = 318.6, distorted.cy = 255.3;
@@ -80,14 +79,14 @@ TEST_CASE("A distorted camera is served through the same interface", "[optimizat
   PnpRansacWorkspace workspace;
   for (int trial = 0; trial < 10; ++trial) {
     const auto scene = make_absolute_pose_scene<double>(random, distorted, scene_options(300, 0.4));
-    const auto result = pnp_ransac(distorted, {scene.world}, {scene.pixels}, {}, {}, PnpRansacOptions{}, workspace);
-    INFO(to_string(result.reason) << " " << result.matches << " " << result.iterations);
-    REQUIRE(result.has_pose());
+    const auto result = pnp_ransac(scene.world, scene.pixels, {}, distorted, PnpRansacOptions{}, workspace);
+    INFO(to_string(result.status) << " " << result.used << " " << result.iterations);
+    REQUIRE(result.found());
     CHECK(cfp_test::pose_distance(result.T_cam_world, scene.T_cam_world)[0] < 0.03);
   }
 }
 
-TEST_CASE("Weights at least halve the samples at 60 % mismatches, with the same accuracy", "[optimization]") {
+TEST_CASE("Weights at least halve the samples at 60 % mismatches, with the same accuracy", "[robust]") {
   cfp::Random random(54, "pnp");
   PnpRansacWorkspace workspace;
   double uniform = 0, guided[2] = {0, 0}, uniform_error = 0, guided_error[2] = {0, 0};
@@ -97,9 +96,8 @@ TEST_CASE("Weights at least halve the samples at 60 % mismatches, with the same 
     const auto run = [&](Sampling sampling, double& iterations, double& error) {
       PnpRansacOptions options;
       options.sampling = sampling;
-      const auto result =
-          pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {scene.weights}, {}, options, workspace);
-      REQUIRE(result.has_pose());
+      const auto result = pnp_ransac(scene.world, scene.pixels, scene.weights, camera<double>, options, workspace);
+      REQUIRE(result.found());
       iterations += double(result.iterations) / trials;
       error += cfp_test::pose_distance(result.T_cam_world, scene.T_cam_world)[0] / trials;
     };
@@ -114,12 +112,12 @@ TEST_CASE("Weights at least halve the samples at 60 % mismatches, with the same 
   }
 }
 
-TEST_CASE("Absent matches change nothing", "[optimization]") {
+TEST_CASE("Absent matches change nothing", "[robust]") {
   cfp::Random random(55, "pnp");
   PnpRansacWorkspace workspace;
   auto scene = make_absolute_pose_scene<double>(random, camera<double>, scene_options(200, 0.3));
   const auto expected =
-      pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {scene.weights}, {}, PnpRansacOptions{}, workspace);
+      pnp_ransac(scene.world, scene.pixels, scene.weights, camera<double>, PnpRansacOptions{}, workspace);
   const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
   const std::array<double, 3> points[] = {{nan, 0, 1}, {0, infinity, 1}, {1e300, 1, 1}, {1, 2, 3},
                                           {1, 2, 3},   {1, 2, 3},        {1, 2, 3}};
@@ -133,18 +131,17 @@ TEST_CASE("Absent matches change nothing", "[optimization]") {
   scene.pixels.push_back({nan, 5});
   scene.weights.push_back(1);
   const auto result =
-      pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {scene.weights}, {}, PnpRansacOptions{}, workspace);
+      pnp_ransac(scene.world, scene.pixels, scene.weights, camera<double>, PnpRansacOptions{}, workspace);
   CHECK(result.T_cam_world.rotation == expected.T_cam_world.rotation);
   CHECK(result.T_cam_world.translation == expected.T_cam_world.translation);
-  CHECK(result.matches == 200);
+  CHECK(result.used == 200);
 }
 
-TEST_CASE("A rigid motion of the world moves the pose with it", "[optimization]") {
+TEST_CASE("A rigid motion of the world moves the pose with it", "[robust]") {
   cfp::Random random(56, "pnp");
   PnpRansacWorkspace workspace;
   auto scene = make_absolute_pose_scene<double>(random, camera<double>, scene_options(200, 0.3));
-  const auto expected =
-      pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {}, {}, PnpRansacOptions{}, workspace);
+  const auto expected = pnp_ransac(scene.world, scene.pixels, {}, camera<double>, PnpRansacOptions{}, workspace);
   cfp::SE3<double> T;
   T.rotation = cfp::so3_exp<double>(cfp::Vector3<double>(0.3, -1, 2));
   T.translation = cfp::Vector3<double>(1000, -2000, 500);
@@ -152,12 +149,12 @@ TEST_CASE("A rigid motion of the world moves the pose with it", "[optimization]"
     const cfp::Vector3<double> moved = T * cfp::Vector3<double>(x[0], x[1], x[2]);
     x = {moved.x(), moved.y(), moved.z()};
   }
-  const auto result = pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {}, {}, PnpRansacOptions{}, workspace);
-  REQUIRE(result.has_pose());
+  const auto result = pnp_ransac(scene.world, scene.pixels, {}, camera<double>, PnpRansacOptions{}, workspace);
+  REQUIRE(result.found());
   CHECK(cfp_test::pose_distance<double>(result.T_cam_world * T, expected.T_cam_world)[0] < 1e-3);
 }
 
-TEST_CASE("Same matches and seed give the same bits", "[optimization]") {
+TEST_CASE("Same matches and seed give the same bits", "[robust]") {
   cfp::Random random(57, "pnp");
   PnpRansacWorkspace used;
   for (const Sampling sampling : {Sampling::uniform, Sampling::weighted, Sampling::progressive}) {
@@ -166,30 +163,30 @@ TEST_CASE("Same matches and seed give the same bits", "[optimization]") {
     PnpRansacOptions options;
     options.sampling = sampling;
     options.seed = 9;
-    const auto a = pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {scene.weights}, {}, options, used);
-    const auto b = pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {scene.weights}, {}, options, fresh);
+    const auto a = pnp_ransac(scene.world, scene.pixels, scene.weights, camera<double>, options, used);
+    const auto b = pnp_ransac(scene.world, scene.pixels, scene.weights, camera<double>, options, fresh);
     CHECK(a.T_cam_world.rotation == b.T_cam_world.rotation);
     CHECK(a.T_cam_world.translation == b.T_cam_world.translation);
     CHECK(a.iterations == b.iterations);
   }
 }
 
-TEST_CASE("Too few, collinear or unrelated matches leave the identity and say why", "[optimization]") {
+TEST_CASE("Too few, collinear or unrelated matches leave the identity and say why", "[robust]") {
   PnpRansacWorkspace workspace;
   const auto run = [&](const std::vector<std::array<double, 3>>& world,
                        const std::vector<std::array<double, 2>>& pixels) {
     std::vector<char> mask(world.size());
-    const auto result = pnp_ransac(camera<double>, {world}, {pixels}, {}, mask, PnpRansacOptions{}, workspace);
-    CHECK_FALSE(result.has_pose());
+    const auto result = pnp_ransac(world, pixels, {}, camera<double>, PnpRansacOptions{}, workspace, mask);
+    CHECK_FALSE(result.found());
     CHECK(result.T_cam_world.rotation.isIdentity());
     CHECK(result.T_cam_world.translation.isZero());
     CHECK(std::count(mask.begin(), mask.end(), 1) == 0);
-    return result.reason;
+    return result.status;
   };
   cfp::Random random(58, "pnp");
-  CHECK(run({}, {}) == PnpRansacReason::too_few_matches);
+  CHECK(run({}, {}) == RansacStatus::not_enough_data);
   const auto few = make_absolute_pose_scene<double>(random, camera<double>, scene_options(3, 0));
-  CHECK(run(few.world, few.pixels) == PnpRansacReason::too_few_matches);
+  CHECK(run(few.world, few.pixels) == RansacStatus::not_enough_data);
   std::vector<std::array<double, 3>> line, equal, anywhere;
   std::vector<std::array<double, 2>> pixels, places;
   for (int i = 0; i < 60; ++i) {
@@ -199,12 +196,12 @@ TEST_CASE("Too few, collinear or unrelated matches leave the identity and say wh
     pixels.push_back({10.0 * i, 200});
     places.push_back({random.uniform(0, 640), random.uniform(0, 480)});
   }
-  CHECK(run(line, pixels) == PnpRansacReason::no_consensus);
-  CHECK(run(equal, pixels) == PnpRansacReason::no_consensus);
-  CHECK(run(anywhere, places) == PnpRansacReason::no_consensus);
+  CHECK(run(line, pixels) == RansacStatus::no_consensus);
+  CHECK(run(equal, pixels) == RansacStatus::no_consensus);
+  CHECK(run(anywhere, places) == RansacStatus::no_consensus);
 }
 
-TEST_CASE("RANSAC options outside their range are named; a second call allocates nothing", "[optimization]") {
+TEST_CASE("RANSAC options outside their range are named; a second call allocates nothing", "[robust]") {
   PnpRansacOptions options;
   CHECK(!invalid_field(options));
   options.threshold_px = std::numeric_limits<double>::quiet_NaN();
@@ -220,9 +217,9 @@ TEST_CASE("RANSAC options outside their range are named; a second call allocates
   for (const Sampling sampling : {Sampling::weighted, Sampling::progressive}) {
     options = {};
     options.sampling = sampling;
-    (void)pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {scene.weights}, mask, options, workspace);
+    (void)pnp_ransac(scene.world, scene.pixels, scene.weights, camera<double>, options, workspace, mask);
     CHECK(cfp_test::allocations_in([&] {
-            (void)pnp_ransac(camera<double>, {scene.world}, {scene.pixels}, {scene.weights}, mask, options, workspace);
+            (void)pnp_ransac(scene.world, scene.pixels, scene.weights, camera<double>, options, workspace, mask);
           }) == 0);
   }
 }

@@ -10,6 +10,7 @@
 #include "cfp/core/random.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/epipolar.hpp"
+#include "cfp/geometry/point_pairs.hpp"
 #include "cfp/math/se3.hpp"
 
 namespace cfp_test {
@@ -80,6 +81,13 @@ TwoViewScene<Scalar> make_two_view_scene(cfp::Random& random, const TwoViewOptio
     scene.is_inlier.push_back(inlier ? 1 : 0);
   }
   return scene;
+}
+
+/// F of the scaled pixels of an estimator from F of pixels.
+inline cfp::Matrix3<double> scaled_fundamental(const cfp::Matrix3<double>& F, const cfp::detail::PairScaling& scaling) {
+  return (cfp::detail::unscaling_matrix(scaling.current).transpose() * F *
+          cfp::detail::unscaling_matrix(scaling.previous))
+      .normalized();
 }
 
 /// Median Sampson distance (px) of the exact true pairs under F: the quality measure of BASELINES.

@@ -58,9 +58,8 @@ class Relocalization {
     }
     inlier_.resize(matches_.size());
     options_.min_inliers = min_inliers;
-    const auto found = cfp::pnp_ransac<cfp::PinholeCamera<float>, float>(
-        camera, world_, pixels_, weights_, cfp::span<char>(inlier_), options_, workspace_);
-    if (!found.has_pose()) return false;
+    const auto found = cfp::pnp_ransac(world_, pixels_, weights_, camera, options_, workspace_, inlier_);
+    if (!found.found()) return false;
     frame.T_cam_world = found.T_cam_world.cast<double>();
     frame.has_pose = true;
     std::fill(frame.map_point.begin(), frame.map_point.end(), no_point);

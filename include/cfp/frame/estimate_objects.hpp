@@ -27,8 +27,7 @@ template <typename Scalar>
 [[nodiscard]] FlowModel<Scalar> flow_model(const Frame<Scalar>& frame, const FlowPairs<Scalar>& undistorted_flow,
                                            const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
                                            FrameState<Scalar>& state) {
-  if (frame.fundamental)
-    return {FlowModelKind::fundamental, FlowSupport::caller, FundamentalReason::ok, *frame.fundamental};
+  if (frame.fundamental) return {FlowModelKind::fundamental, FlowSupport::caller, RansacStatus::ok, *frame.fundamental};
   const PointSpan<Scalar, 2>& pixels = frame.flow.current;
   state.scratch.mask.resize(pixels.size());
   for (std::size_t i = 0; i < pixels.size(); ++i) {
@@ -66,7 +65,7 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
       detail::flow_model(frame, flow, undistorted_camera(camera), options.coarse.flow, state);
   report.flow_model = model.kind;
   report.flow_support = model.support;
-  report.flow_status = model.reason;
+  report.flow_status = model.status;
   if (model.kind == FlowModelKind::none) return;
 
   scratch.epipolar.resize(n);

@@ -44,7 +44,7 @@ struct FirstStageOutput {
 struct FirstStageResult {
   FlowModelKind flow_model = FlowModelKind::none;                        ///< what the flow pairs were judged by
   FlowSupport flow_support = FlowSupport::none;                          ///< and what that rests on
-  FundamentalReason flow_reason = FundamentalReason::too_few_pairs;      ///< how its estimation ended
+  RansacStatus flow_status = RansacStatus::not_enough_data;              ///< how its estimation ended
   std::size_t outside = 0, foreground = 0, background = 0, invalid = 0;  ///< keypoints by label
   std::size_t unknown_objects = 0;                                       ///< boxes whose O is not known
   std::size_t undecided_foregrounds = 0;  ///< boxes whose depths could not be separated: all inside is foreground
@@ -74,7 +74,7 @@ void estimate_objects(const FirstStageInput<Scalar>& in, const Camera& camera, s
 
   const PointSpan<Scalar, 2> previous = undistorted(camera, in.flow_previous, work.flow.previous);
   const PointSpan<Scalar, 2> current = undistorted(camera, in.flow_current, work.flow.current);
-  FlowModel<Scalar> model{FlowModelKind::fundamental, FlowSupport::caller, FundamentalReason::ok};
+  FlowModel<Scalar> model{FlowModelKind::fundamental, FlowSupport::caller, RansacStatus::ok};
   if (in.fundamental != nullptr) {
     model.matrix = *in.fundamental;
   } else {
@@ -89,7 +89,7 @@ void estimate_objects(const FirstStageInput<Scalar>& in, const Camera& camera, s
   }
   result.flow_model = model.kind;
   result.flow_support = model.support;
-  result.flow_reason = model.reason;
+  result.flow_status = model.status;
   if (model.kind == FlowModelKind::none) return;
 
   work.flow_distances.resize(n);

@@ -47,8 +47,8 @@ template <typename Scalar>
 struct FlowModel {
   FlowModelKind kind = FlowModelKind::none;
   FlowSupport support = FlowSupport::none;
-  FundamentalReason reason = FundamentalReason::too_few_pairs;  ///< of the estimate; ok with the caller's matrix
-  Matrix3<Scalar> matrix = Matrix3<Scalar>::Zero();             ///< F or H, previous to current
+  RansacStatus status = RansacStatus::not_enough_data;  ///< of the estimate; ok with the caller's matrix
+  Matrix3<Scalar> matrix = Matrix3<Scalar>::Zero();     ///< F or H, previous to current
 };
 
 /// Scratch memory, reused: after a call, calls of at most the same sizes allocate nothing.
@@ -85,15 +85,14 @@ FlowModel<Scalar> estimate_flow_model(const PointSpan<Scalar, 2>& previous, cons
   const bool enough = work.outside_current.size() >= options.min_outside_pairs;
   const PointSpan<Scalar, 2> support_previous = enough ? PointSpan<Scalar, 2>(work.outside_previous) : previous;
   const PointSpan<Scalar, 2> support_current = enough ? PointSpan<Scalar, 2>(work.outside_current) : current;
-  const FundamentalResult<Scalar> estimate = fundamental_ransac(support_previous, support_current, span<const Scalar>(),
-                                                                span<char>(), options.ransac, work.ransac, &camera);
+  const FundamentalResult<Scalar> estimate =
+      fundamental_ransac(PointPairs<Scalar>{support_previous, support_current}, camera, options.ransac, work.ransac);
 
   FlowModel<Scalar> model;
-  model.reason = estimate.reason;
+  model.status = estimate.status;
   model.support = enough ? FlowSupport::outside_pairs : FlowSupport::all_pairs;
-  const bool rotation =
-      estimate.reason == FundamentalReason::no_motion || estimate.reason == FundamentalReason::pure_rotation;
-  if (estimate.has_fundamental()) {
+  const bool rotation = estimate.status == RansacStatus::no_motion || estimate.status == RansacStatus::pure_rotation;
+  if (estimate.found()) {
     model.kind = FlowModelKind::fundamental;
     model.matrix = estimate.F;
   } else if (rotation && options.use_rotation_homography) {

@@ -37,10 +37,10 @@ struct FrameReport {
   std::size_t frames_without_detections = 0;  ///< in a row, with the detector running: the commonest cause of no effect
   std::size_t frames_since_detector = 0;      ///< on which the detector did not run
   // objects
-  FlowModelKind flow_model = FlowModelKind::none;                    ///< what the flow pairs were judged by,
-  FlowSupport flow_support = FlowSupport::none;                      ///< what that rests on,
-  FundamentalReason flow_status = FundamentalReason::too_few_pairs;  ///< and how its estimation ended
-  std::size_t unknown_objects = 0;                                   ///< boxes whose O is not known
+  FlowModelKind flow_model = FlowModelKind::none;            ///< what the flow pairs were judged by,
+  FlowSupport flow_support = FlowSupport::none;              ///< what that rests on,
+  RansacStatus flow_status = RansacStatus::not_enough_data;  ///< and how its estimation ended
+  std::size_t unknown_objects = 0;                           ///< boxes whose O is not known
   // keypoints
   std::size_t outside = 0, foreground = 0, background = 0, invalid = 0;  ///< by label
   std::size_t undecided_foregrounds = 0;  ///< boxes that the depths could not separate: all inside is foreground

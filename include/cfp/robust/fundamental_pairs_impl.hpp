@@ -157,7 +157,7 @@ void sampson_distances_sq(const PairColumns<T>& in, const Matrix3<T>& F, std::ve
 // gradient is exact; H leaves out the k terms, a thousandth of the others for pairs that count, and so is made of 36
 // moments.
 template <typename T>
-[[nodiscard]] double sampson_system(const PairColumns<T>& in, const Matrix3<double>& F, double scale,
+double sampson_system(const PairColumns<T>& in, const Matrix3<double>& F, double scale,
                                     NormalEquations<9>& out) noexcept {
   using P = Packet<T>;
   const Matrix3<T> f = F.template cast<T>();

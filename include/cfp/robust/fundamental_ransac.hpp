@@ -40,11 +40,11 @@ struct FundamentalRansacWorkspace {
 
 inline namespace CFP_ISA {
 
-[[nodiscard]] inline const char* invalid_field(const FundamentalRansacOptions& options) noexcept {
+[[nodiscard]] inline OptionPath invalid_field(const FundamentalRansacOptions& options) noexcept {
   return invalid_field(options, 8);
 }
 
-}  // CFP_ISA
+}  // namespace CFP_ISA
 
 namespace detail {
 inline namespace CFP_ISA {

@@ -69,8 +69,8 @@ template <typename T>
 
 // Sum of w rho(d^2 / scale), d the transfer distance, rho(x) = x / (1 + x), as a model of least_squares.hpp: eight
 // unknowns, h22 = 1 (points are centred, so that it is not near zero). Multiplied by z the residual is linear in h, and
-// every sum is one of W, W u, W v and W (u^2 + v^2) times the products of (x, y, 1); leaving out the derivative of 1 / z
-// moves the minimum by less than the square of the noise.
+// every sum is one of W, W u, W v and W (u^2 + v^2) times the products of (x, y, 1); leaving out the derivative of 1 /
+// z moves the minimum by less than the square of the noise.
 template <typename T>
 struct TransferModel {
   PairColumns<T> pairs;
@@ -124,5 +124,5 @@ void refine_homography(const PairColumns<T>& pairs, double scale, int max_steps,
   H = problem.state();
 }
 
-}  // CFP_ISA
+}  // namespace CFP_ISA
 }  // namespace cfp::detail

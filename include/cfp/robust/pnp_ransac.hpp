@@ -38,7 +38,7 @@ struct PnpRansacWorkspace {
 
 inline namespace CFP_ISA {
 
-[[nodiscard]] inline const char* invalid_field(const PnpRansacOptions& options) noexcept {
+[[nodiscard]] inline OptionPath invalid_field(const PnpRansacOptions& options) noexcept {
   return invalid_field(options, 4);
 }
 
@@ -52,9 +52,9 @@ inline namespace CFP_ISA {
 /// first order in d for any other; the final inliers use the camera itself. The search stops early when the weighted
 /// share of inliers gives the confidence. Works in double, scores in float.
 template <typename Camera, typename Scalar = typename Camera::ScalarType>
-[[nodiscard]] PnpRansacResult<Scalar> pnp_ransac(PointSpan<detail::non_deduced<Scalar>, 3> world,
-                                                 PointSpan<detail::non_deduced<Scalar>, 2> pixels,
-                                                 span<const detail::non_deduced<Scalar>> weights, const Camera& camera,
+[[nodiscard]] PnpRansacResult<Scalar> pnp_ransac(PointSpan<non_deduced<Scalar>, 3> world,
+                                                 PointSpan<non_deduced<Scalar>, 2> pixels,
+                                                 span<const non_deduced<Scalar>> weights, const Camera& camera,
                                                  const PnpRansacOptions& options, PnpRansacWorkspace& workspace,
                                                  span<char> inlier_mask = {}) {
   CFP_ASSERT(world.size() == pixels.size() && (weights.empty() || weights.size() == world.size()) &&
@@ -88,5 +88,5 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
   return result;
 }
 
-}  // CFP_ISA
+}  // namespace CFP_ISA
 }  // namespace cfp

@@ -76,9 +76,7 @@ struct LinearReprojection {
     v = in.row(s22)[i] * dy;
   }
   // In px^2; infinite behind the camera.
-  [[nodiscard]] T distance_sq() const noexcept {
-    return in_front ? u * u + v * v : std::numeric_limits<T>::infinity();
-  }
+  [[nodiscard]] T distance_sq() const noexcept { return in_front ? u * u + v * v : std::numeric_limits<T>::infinity(); }
 };
 
 // Sum of w rho(d^2 / scale), rho(x) = x / (1 + x), as a model of least_squares.hpp. A step is (rho, omega) of
@@ -188,5 +186,5 @@ struct PnpProblem {
   }
 };
 
-}  // CFP_ISA
+}  // namespace CFP_ISA
 }  // namespace cfp::detail

@@ -127,13 +127,13 @@ void finish(RansacColumns<Rows>& columns) noexcept {
 inline namespace CFP_ISA {
 
 /// The first field outside its range.
-[[nodiscard]] inline const char* invalid_field(const RansacOptions& options, std::size_t least_inliers) noexcept {
+[[nodiscard]] inline OptionPath invalid_field(const RansacOptions& options, std::size_t least_inliers) noexcept {
   if (!(options.threshold_px > 0 && options.threshold_px < 1e4)) return "threshold_px";
   if (!(options.confidence > 0 && options.confidence < 1)) return "confidence";
   if (options.max_iterations < 1) return "max_iterations";
   if (options.min_iterations > options.max_iterations) return "min_iterations";
   if (options.min_inliers < least_inliers) return "min_inliers";
-  return nullptr;
+  return {};
 }
 
 /// A model and its cost, the sum over the data of w min(d^2 / T^2, 1) with the distance d and the threshold T (MSAC).
