@@ -4,168 +4,151 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
-#include <Eigen/Core>
-#include <Eigen/LU>
-
+#include "cfp/core/types.hpp"
 #include "cfp/math/cubic.hpp"
-#include "cfp/math/so3.hpp"
+#include "cfp/math/matrix3.hpp"
 
 namespace cfp::detail {
+inline namespace CFP_ISA {
 
-// Two edges of a triangle and their normal.
-[[nodiscard]] inline Matrix3<double> triangle_frame(const Vector3<double>& a, const Vector3<double>& b) noexcept {
-  Matrix3<double> frame;
-  frame.col(0) = a;
-  frame.col(1) = b;
-  frame.col(2) = a.cross(b);
-  return frame;
-}
+// p^T C p for p = (u, v, w), C symmetric.
+template <typename Real>
+struct Conic {
+  Real uu, uv, vv, uw, vw, ww;
 
-// The planes of the degenerate quadric D = v v'^T + v' v^T: with eigenvectors e of the eigenvalues s1 > 0 > s2 and 0,
-// e1 +- sqrt(-s2 / s1) e2 are their normals. False when D is no pair of real planes.
-[[nodiscard]] inline bool plane_pair(const Matrix3<double>& D, Vector3<double> (&normals)[2]) noexcept {
-  // Eigenvalues 0 and the roots of s^2 - tr s + m, m the sum of the principal minors.
-  const double trace = D.trace();
-  const double minors = D(0, 0) * D(1, 1) - D(0, 1) * D(0, 1) + D(0, 0) * D(2, 2) - D(0, 2) * D(0, 2) +
-                        D(1, 1) * D(2, 2) - D(1, 2) * D(1, 2);
-  if (!(minors <= 0)) return false;
-  const double root = std::sqrt(0.25 * trace * trace - minors);
-  const double large = trace > 0 ? 0.5 * trace + root : 0.5 * trace - root;
-  if (!(std::abs(large) > 0)) return false;
-  const double sigma[2] = {large, minors / large};
-  // The null vector is across the rows; the eigenvector of the larger eigenvalue is in the plane of the rows.
-  Vector3<double> e0 = D.col(0).cross(D.col(1));
-  for (int c = 0; c < 2; ++c) {
-    const Vector3<double> other = D.col(c).cross(D.col(2));
-    if (other.squaredNorm() > e0.squaredNorm()) e0 = other;
+  [[nodiscard]] CFP_INLINE Conic adjugate() const noexcept {
+    return {vv * ww - vw * vw, uw * vw - uv * ww, uu * ww - uw * uw,
+            uv * vw - vv * uw, uv * uw - uu * vw, uu * vv - uv * uv};
   }
-  const double norm = e0.norm();
-  if (!(norm > 0)) return false;
-  e0 /= norm;
-  Matrix3<double> shifted = D;
-  shifted.diagonal().array() -= sigma[1];
-  shifted += sigma[1] * e0 * e0.transpose();  // (s1 - s2) e1 e1^T is left
-  int column = 0;
-  if (shifted(1, 1) * shifted(1, 1) > shifted(0, 0) * shifted(0, 0)) column = 1;
-  if (std::abs(shifted(2, 2)) > std::abs(shifted(column, column))) column = 2;
-  const Vector3<double> e1 = shifted.col(column).normalized();
-  const Vector3<double> e2 = e0.cross(e1);
-  const double ratio = std::sqrt((std::max)(-sigma[1] / sigma[0], 0.0));
-  normals[0] = e1 + ratio * e2;
-  normals[1] = e1 - ratio * e2;
-  return normals[0].allFinite() && normals[1].allFinite();
-}
+  // The trace of the product, the sum over all elements.
+  [[nodiscard]] CFP_INLINE Real dot(const Conic& o) const noexcept {
+    return uu * o.uu + vv * o.vv + ww * o.ww + Real(2) * (uv * o.uv + uw * o.uw + vw * o.vw);
+  }
+  [[nodiscard]] CFP_INLINE Conic combine(Real f, const Conic& o, Real g) const noexcept {
+    return {f * uu + g * o.uu, f * uv + g * o.uv, f * vv + g * o.vv,
+            f * uw + g * o.uw, f * vw + g * o.vw, f * ww + g * o.ww};
+  }
+};
 
-// Gauss-Newton on the three squared edge lengths |d_i y_i - d_j y_j|^2. Returns the final error, relative to the
-// longest edge.
-[[nodiscard]] inline double polish_depths(const double (&cosine)[3], const double (&length_sq)[3],
-                                          double (&d)[3]) noexcept {
-  double error = std::numeric_limits<double>::infinity();
-  for (int step = 0; step < 10; ++step) {
-    Vector3<double> r;
-    Matrix3<double> J = Matrix3<double>::Zero();
-    for (int k = 0; k < 3; ++k) {
-      const int i = k == 2 ? 1 : 0, j = k == 0 ? 1 : 2;
-      r[k] = d[i] * d[i] + d[j] * d[j] - 2 * d[i] * d[j] * cosine[k] - length_sq[k];
-      J(k, i) = 2 * (d[i] - d[j] * cosine[k]);
-      J(k, j) = 2 * (d[j] - d[i] * cosine[k]);
+// Three unit rays y_i meet a triangle at the depths d_i: |d_i y_i - d_j y_j|^2 = (d_i - d_j)^2 + d_i d_j |y_i - y_j|^2.
+// The unit of length is the triangle's longest edge, which joins points 1 and 2. The unknowns p = (u, v, w) with
+// d0 = w / chord, d1 = d0 + u, d2 = d0 + v stay near one however far away and small the triangle is; nothing cancels.
+template <typename Real>
+struct P3PEquations {
+  Real a, b;           // squared edges 01 and 02
+  Real chord;          // of the order of the largest |y_i - y_j|
+  Real h01, h02, h12;  // |y_i - y_j|^2 / chord^2
+
+  // The squared edges 01, 02 and 12 minus what they should be.
+  [[nodiscard]] CFP_INLINE Vector3<Real> residual(const Vector3<Real>& p) const noexcept {
+    const Real w0 = p[2], w1 = w0 + chord * p[0], w2 = w0 + chord * p[1], difference = p[0] - p[1];
+    return {p[0] * p[0] + h01 * w0 * w1 - a, p[1] * p[1] + h02 * w0 * w2 - b,
+            difference * difference + h12 * w1 * w2 - Real(1)};
+  }
+
+  // Newton steps for as long as they help. Returns the squared error left.
+  [[nodiscard]] CFP_INLINE Real polish(Vector3<Real>& p) const noexcept {
+    Vector3<Real> r = residual(p);
+    Real error = r.squaredNorm();
+    for (int step = 0; step < 6 && error > Real(1e-29); ++step) {
+      // The Jacobian [A 0 B; 0 C D; E F G] by its cofactors.
+      const Real w0 = p[2], w1 = w0 + chord * p[0], w2 = w0 + chord * p[1], twice = Real(2) * (p[0] - p[1]);
+      const Real A = Real(2) * p[0] + h01 * chord * w0, B = h01 * (w0 + w1);
+      const Real C = Real(2) * p[1] + h02 * chord * w0, D = h02 * (w0 + w2);
+      const Real E = h12 * chord * w2 + twice, F = h12 * chord * w1 - twice, G = h12 * (w1 + w2);
+      const Real minor = C * G - D * F;
+      const Real inverse = Real(1) / (A * minor - B * C * E);
+      const Vector3<Real> next(p[0] - inverse * (minor * r[0] + B * (F * r[1] - C * r[2])),
+                               p[1] - inverse * (D * (E * r[0] - A * r[2]) + (A * G - B * E) * r[1]),
+                               p[2] - inverse * (A * (C * r[2] - F * r[1]) - C * E * r[0]));
+      r = residual(next);
+      const Real next_error = r.squaredNorm();
+      if (!(next_error < error)) break;
+      error = next_error;
+      p = next;
     }
-    const double now = r.cwiseAbs().maxCoeff();
-    if (!(now < error)) return error;
-    error = now;
-    if (error < 1e-16 * d[0] * d[0]) return error;
-    const Vector3<double> change = J.inverse() * r;
-    const double next[3] = {d[0] - change[0], d[1] - change[1], d[2] - change[2]};
-    if (!change.allFinite() || !(next[0] > 0 && next[1] > 0 && next[2] > 0)) return error;
-    for (int i = 0; i < 3; ++i) d[i] = next[i];
+    return error;
   }
-  return error;
+};
+
+// The lines l, m of the degenerate conic C = l m^T + m l^T, up to scale: its adjugate is -(l x m)(l x m)^T, and
+// C + hat(l x m) has rank one. False when they are not real.
+template <typename Real>
+[[nodiscard]] CFP_INLINE bool line_pair(const Conic<Real>& C, Vector3<Real> (&lines)[2]) noexcept {
+  const Conic<Real> A = C.adjugate();
+  Vector3<Real> v(A.uw, A.vw, A.ww);
+  Real square = A.ww;
+  if (A.uu < square) v = Vector3<Real>(A.uu, A.uv, A.uw), square = A.uu;
+  if (A.vv < square) v = Vector3<Real>(A.uv, A.vv, A.vw), square = A.vv;
+  if (!(square < Real(0))) return false;
+  const Real scale = std::sqrt(-square);
+  const Real uu = scale * C.uu, vv = scale * C.vv, uw = scale * C.uw, vw = scale * C.vw;
+  const Real uv = scale * C.uv - v[2], vu = scale * C.uv + v[2];
+  // The column and the row of the largest elements; a line whose u and v vanish is at infinity and holds no solution.
+  const Real diagonal = uu * uu - vv * vv, other = uv * uv - vu * vu;
+  lines[0] = diagonal > other ? Vector3<Real>(uu, vu, uw - v[1]) : Vector3<Real>(uv, vv, vw + v[0]);
+  lines[1] = diagonal + other > Real(0) ? Vector3<Real>(uu, uv, uw + v[1]) : Vector3<Real>(vu, vv, vw - v[0]);
+  return true;
 }
 
-// All positive depths of three points x on unit rays y; x within a unit cube of size one. Edges: 0 = (0,1), 1 = (0,2),
-// 2 = (1,2).
-[[nodiscard]] inline int p3p_depths(const Vector3<double> (&y)[3], const Vector3<double> (&x)[3],
-                                    double (&depths)[4][3]) noexcept {
-  const double cosine[3] = {y[0].dot(y[1]), y[0].dot(y[2]), y[1].dot(y[2])};
-  const double length_sq[3] = {(x[0] - x[1]).squaredNorm(), (x[0] - x[2]).squaredNorm(), (x[1] - x[2]).squaredNorm()};
-  const auto edge = [&](int k) {
-    const int i = k == 2 ? 1 : 0, j = k == 0 ? 1 : 2;
-    Matrix3<double> M = Matrix3<double>::Zero();
-    M(i, i) = M(j, j) = 1;
-    M(i, j) = M(j, i) = -cosine[k];
-    return M;
-  };
-  const Matrix3<double> D1 = edge(0) * length_sq[2] - edge(2) * length_sq[0];
-  const Matrix3<double> D2 = edge(1) * length_sq[2] - edge(2) * length_sq[1];
-  // det(D1 + g D2): coefficients through the cofactors, both matrices symmetric.
-  Matrix3<double> cofactor1, cofactor2;
-  for (int i = 0; i < 3; ++i) {
-    cofactor1.col(i) = D1.col((i + 1) % 3).cross(D1.col((i + 2) % 3));
-    cofactor2.col(i) = D2.col((i + 1) % 3).cross(D2.col((i + 2) % 3));
-  }
-  const double c3 = D2.determinant(), c2 = cofactor2.cwiseProduct(D1).sum(), c1 = cofactor1.cwiseProduct(D2).sum(),
-               c0 = D1.determinant();
-  // The leading coefficient must be safe; the pencil may as well be taken from its other end.
-  const bool swap = std::abs(c0) > std::abs(c3);
-  double roots[3];
-  const int root_count =
-      swap ? real_cubic_roots(c1 / c0, c2 / c0, c3 / c0, roots) : real_cubic_roots(c2 / c3, c1 / c3, c0 / c3, roots);
+// All solutions p with positive depths; returns their number.
+template <typename Real>
+[[nodiscard]] CFP_INLINE int p3p_depths(const P3PEquations<Real>& q, Vector3<Real> (&solutions)[4]) noexcept {
+  // edge01 = a edge12 and edge02 = b edge12: two conics.
+  const Real half = q.chord / Real(2), ah = q.a * q.h12, bh = q.b * q.h12, cosine = Real(1) - half * q.chord * q.h12;
+  const Conic<Real> C1{Real(1) - q.a, q.a * cosine, -q.a, half * (q.h01 - ah), -half * ah, q.h01 - ah};
+  const Conic<Real> C2{-q.b, q.b * cosine, Real(1) - q.b, -half * bh, half * (q.h02 - bh), q.h02 - bh};
+  // det(C1 + s C2) = c0 + c1 s + c2 s^2 + c3 s^3. A c3 that is nearly zero means a root near infinity, C2 itself.
+  const Conic<Real> A1 = C1.adjugate(), A2 = C2.adjugate();
+  const Real c0 = A1.uu * C1.uu + A1.uv * C1.uv + A1.uw * C1.uw, c1 = A1.dot(C2);
+  const Real c3 = A2.uu * C2.uu + A2.uv * C2.uv + A2.uw * C2.uw, c2 = A2.dot(C1);
+  const Real inverse = Real(1) / (c3 + std::copysign(Real(1e-18) * (std::abs(c1) + std::abs(c2)), c3));
+  const Real s = isolated_cubic_root(c2 * inverse, c1 * inverse, c0 * inverse);
+  const Real scale = Real(1) / (Real(1) + std::abs(s));
+  Vector3<Real> lines[2];
+  if (!line_pair(C1.combine(scale, C2, s * scale), lines)) return 0;
 
-  // Any root whose quadric is a pair of real planes gives every solution; the one with the most pronounced pair gives
-  // them best.
-  Vector3<double> normals[2];
-  double best = 0;
-  for (int k = 0; k < root_count; ++k) {
-    const Matrix3<double> D = swap ? Matrix3<double>(D2 + roots[k] * D1) : Matrix3<double>(D1 + roots[k] * D2);
-    const double minors = D(0, 0) * D(1, 1) - D(0, 1) * D(0, 1) + D(0, 0) * D(2, 2) - D(0, 2) * D(0, 2) +
-                          D(1, 1) * D(2, 2) - D(1, 2) * D(1, 2);
-    const double quality = -minors / D.squaredNorm();
-    Vector3<double> candidate[2];
-    if (!(quality > best) || !plane_pair(D, candidate)) continue;
-    best = quality;
-    normals[0] = candidate[0];
-    normals[1] = candidate[1];
-  }
-  if (!(best > 0)) return 0;
-
+  const Conic<Real>& C = std::abs(s) < Real(1) ? C2 : C1;
   int count = 0;
-  for (const Vector3<double>& n : normals) {
-    // On the plane n . d = 0 take the two largest free directions: eliminate the depth with the largest coefficient.
-    int a = 0;
-    if (std::abs(n[1]) > std::abs(n[a])) a = 1;
-    if (std::abs(n[2]) > std::abs(n[a])) a = 2;
-    const int b = (a + 1) % 3, c = (a + 2) % 3;
-    Vector3<double> u = Vector3<double>::Zero(), v = Vector3<double>::Zero();  // d = u + tau v, up to scale
-    u[b] = 1, u[a] = -n[b] / n[a];
-    v[c] = 1, v[a] = -n[c] / n[a];
-    const Matrix3<double>& Q = D1.norm() * length_sq[1] > D2.norm() * length_sq[0] ? D1 : D2;
-    const double qa = v.dot(Q * v), qb = u.dot(Q * v), qc = u.dot(Q * u);
-    const double discriminant = qb * qb - qa * qc;
-    // A slightly negative discriminant is a double root after rounding; the polish below tells.
-    if (!(discriminant > -1e-10 * (qb * qb + std::abs(qa * qc)))) continue;
-    const double w = -(qb + (qb > 0 ? 1.0 : -1.0) * std::sqrt((std::max)(discriminant, 0.0)));
-    const Vector3<double> directions[2] = {u * qa + v * w, u * w + v * qc};  // tau = w / qa and tau = qc / w
-    for (Vector3<double> d : directions) {
-      if (d.sum() < 0) d = -d;
-      if (!(d[0] > 0 && d[1] > 0 && d[2] > 0)) continue;
-      // Scale from all three edges.
-      double ratio = 0, weight = 0;
-      for (int k = 0; k < 3; ++k) {
-        const int i = k == 2 ? 1 : 0, j = k == 0 ? 1 : 2;
-        const double measured = d[i] * d[i] + d[j] * d[j] - 2 * d[i] * d[j] * cosine[k];
-        ratio += length_sq[k] * length_sq[k];
-        weight += measured * length_sq[k];
-      }
-      const double scale = std::sqrt(ratio / weight);
-      double(&out)[3] = depths[count];
-      for (int i = 0; i < 3; ++i) out[i] = scale * d[i];
-      if (!is_finite(scale) || !(polish_depths(cosine, length_sq, out) < 1e-12)) continue;
-      ++count;
+  for (const Vector3<Real>& l : lines) {
+    // Points of the line: the one nearest to the origin of the plane w = 1, (u, v, w), plus t (-l1, l0, 0).
+    const Real u = -l[2] * l[0], v = -l[2] * l[1], w = l[0] * l[0] + l[1] * l[1];
+    const Real Cu = C.uu * u + C.uv * v + C.uw * w, Cv = C.uv * u + C.vv * v + C.vw * w;
+    const Real qa = C.uu * l[1] * l[1] - Real(2) * C.uv * l[0] * l[1] + C.vv * l[0] * l[0];
+    const Real qb = l[0] * Cv - l[1] * Cu, qc = u * Cu + v * Cv + w * (C.uw * u + C.vw * v + C.ww * w);
+    const Real discriminant = qb * qb - qa * qc;
+    // A slightly negative discriminant is a double root after rounding; the polish tells.
+    if (!(discriminant > Real(-1e-8) * (qb * qb + std::abs(qa * qc)))) continue;
+    const Real sum = -(qb + std::copysign(std::sqrt(discriminant > Real(0) ? discriminant : Real(0)), qb));
+    const Real roots[2][2] = {{sum, qa}, {qc, sum}};  // t = sum / qa and qc / sum
+    for (const auto& root : roots) {
+      const Real t = root[0], one = root[1];
+      Vector3<Real> p(one * u - t * l[1], one * v + t * l[0], one * w);
+      const Real w1 = p[2] + q.chord * p[0], w2 = p[2] + q.chord * p[1];
+      if (!((std::min)(w1 * p[2], w2 * p[2]) > Real(0))) continue;
+      p *= std::copysign(Real(1), p[2]) / std::sqrt((p[0] - p[1]) * (p[0] - p[1]) + q.h12 * w1 * w2);
+      if (!(q.polish(p) < Real(1e-20))) continue;
+      solutions[count++] = p;
     }
   }
   return count;
 }
 
+// Orthonormal frame of a triangle: along one edge, whose inverse length is nearly known, towards another, normal. The
+// second axis is made orthogonal twice, which makes it exact for the thinnest of triangles.
+template <typename Real>
+[[nodiscard]] CFP_INLINE Matrix3<Real> triangle_frame(const Vector3<Real>& edge, Real inverse_length,
+                                                      const Vector3<Real>& other) noexcept {
+  Vector3<Real> x = inverse_length * edge;
+  x *= Real(1.5) - Real(0.5) * x.squaredNorm();
+  Vector3<Real> y = other - x.dot(other) * x;
+  y -= x.dot(y) * x;
+  y *= Real(1) / std::sqrt(y.squaredNorm());
+  Matrix3<Real> frame;
+  frame << x, y, cross(x, y);
+  return frame;
+}
+
+}  // namespace CFP_ISA
 }  // namespace cfp::detail

@@ -2,51 +2,86 @@
 /// Real roots of a cubic, for the minimal solvers (seven-point fundamental matrix, P3P).
 #pragma once
 
-#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
 
 #include "cfp/core/numeric.hpp"
 
 namespace cfp {
+namespace detail {
+inline namespace CFP_ISA {
 
-/// Real roots of x^3 + a x^2 + b x + c, in roots[0 .. count); returns the count, 1 or 3 (a double root counts twice),
-/// or 0 when a coefficient is not finite or the roots overflow. Closed form (Cardano for one real root, Viete for
-/// three), then Newton steps on the polynomial itself; a root separated from the others by d is exact to rounding / d.
-/// Allocates nothing.
-template <typename Scalar>
-[[nodiscard]] int real_cubic_roots(Scalar a, Scalar b, Scalar c, Scalar (&roots)[3]) noexcept {
-  using std::abs;
-  const Scalar third = a / Scalar(3);
-  const Scalar q = third * third - b / Scalar(3);
-  const Scalar r = third * (third * third - b / Scalar(2)) + c / Scalar(2);
-  const Scalar q3 = q * q * q;
-  if (!is_finite(q3) || !is_finite(r * r)) return 0;
-  int count = 1;
-  // The margin keeps a double root that rounding would otherwise turn into a pair of complex ones.
-  if (r * r <= q3 * (Scalar(1) + Scalar(16) * std::numeric_limits<Scalar>::epsilon())) {
-    const Scalar angle =
-        std::acos((std::max)(Scalar(-1), (std::min)(Scalar(1), q3 > Scalar(0) ? r / std::sqrt(q3) : Scalar(0)))) /
-        Scalar(3);
-    const Scalar radius = Scalar(-2) * std::sqrt((std::max)(q, Scalar(0)));
-    const Scalar step = Scalar(2) / Scalar(3) * pi<Scalar>;
-    for (int i = 0; i < 3; ++i) roots[i] = radius * std::cos(angle + Scalar(i - 1) * step) - third;
-    count = 3;
-  } else {
-    const Scalar magnitude = std::cbrt(abs(r) + std::sqrt(r * r - q3));
-    const Scalar u = r > Scalar(0) ? -magnitude : magnitude;
-    roots[0] = u + (magnitude > Scalar(0) ? q / u : Scalar(0)) - third;
-  }
-  for (int i = 0; i < count; ++i) {
-    for (int step = 0; step < 2; ++step) {
-      const Scalar x = roots[i];
-      const Scalar value = ((x + a) * x + b) * x + c;
-      const Scalar slope = (Scalar(3) * x + Scalar(2) * a) * x + b;
-      const Scalar next = x - value / slope;
-      // At a double root the slope vanishes with the value: keep a step only when it lowers the polynomial.
-      if (abs(((next + a) * next + b) * next + c) < abs(value)) roots[i] = next;
-    }
-  }
-  return count;
+// The cube root of a positive number to 4 %: a third of the exponent, read from the bits.
+[[nodiscard]] inline double rough_cube_root(double x) noexcept {
+  std::uint64_t bits;
+  std::memcpy(&bits, &x, sizeof bits);
+  bits = bits / 3 + 0x2a9f7893782da1ceULL;
+  std::memcpy(&x, &bits, sizeof bits);
+  return x;
 }
 
+}  // namespace CFP_ISA
+}  // namespace detail
+
+inline namespace CFP_ISA {
+
+/// The real root of x^3 + a x^2 + b x + c farthest from the other two: never a double one, and exact to rounding unless
+/// all three coincide. NaN when a coefficient is, any value when their cubes overflow.
+template <typename Scalar>
+[[nodiscard]] Scalar isolated_cubic_root(Scalar a, Scalar b, Scalar c) noexcept {
+  // x = t - a / 3: t^3 - 3 q t + 2 r = 0. The root sought lies beyond both turning points, t = +-sqrt(q), on the side
+  // of -r.
+  const Scalar third = a / Scalar(3), q = third * third - b / Scalar(3);
+  const Scalar r = third * (third * third - b / Scalar(2)) + c / Scalar(2);
+  const Scalar size = std::abs(r), square = size * size - q * q * q;
+  Scalar t = 0;
+  if (square > Scalar(0)) {  // one real root: Cardano
+    const Scalar sum = static_cast<Scalar>(detail::rough_cube_root(static_cast<double>(size + std::sqrt(square))));
+    t = sum + q / sum;
+  } else if (q > Scalar(0)) {  // three: t = 2 sqrt(q) cos(acos(ratio) / 3), the cosine to 3e-4
+    const Scalar root = std::sqrt(q), ratio = size / (q * root);
+    t = root * (Scalar(1.7323) + ratio * (Scalar(0.3296) - Scalar(0.0622) * ratio));
+  }
+  // Halley steps, which triple the digits.
+  Scalar x = -std::copysign(t, r) - third;
+  const Scalar spread = std::abs(t) + std::abs(third);
+  for (int step = 0; step < 8; ++step) {
+    const Scalar value = ((x + a) * x + b) * x + c, slope = (Scalar(3) * x + Scalar(2) * a) * x + b;
+    const Scalar change = value * slope / (slope * slope - value * (Scalar(3) * x + a));
+    if (!(std::abs(change) <= spread)) break;
+    x -= change;
+    if (std::abs(change) <= Scalar(1e-5) * std::abs(x)) break;
+  }
+  return x;
+}
+
+/// Real roots of x^3 + a x^2 + b x + c in roots[0 .. count), the isolated one first; returns the count, 1 or 3 (a
+/// double root counts twice), or 0 when a coefficient is not finite or the roots overflow. The other two come from the
+/// quadratic that is left, then a Newton step on the cubic itself; a root at distance d from the next is exact to
+/// rounding / d. Allocates nothing.
+template <typename Scalar>
+[[nodiscard]] int real_cubic_roots(Scalar a, Scalar b, Scalar c, Scalar (&roots)[3]) noexcept {
+  const Scalar first = isolated_cubic_root(a, b, c), size = std::abs(a) + std::abs(b) + std::abs(c);
+  if (!is_finite(size * size * size) || !is_finite(first)) return 0;
+  roots[0] = first;
+  // x^2 + (a + first) x + (a + first) first + b, and the discriminant by what the roots are: (a + first) / -2 +- root.
+  const Scalar middle = Scalar(-0.5) * (a + first), product = b - Scalar(2) * middle * first;
+  const Scalar square = middle * middle, discriminant = square - product;
+  // The margin keeps a double root that rounding would otherwise turn into a pair of complex ones.
+  const Scalar margin = Scalar(32) * std::numeric_limits<Scalar>::epsilon() * (square + std::abs(product));
+  if (!(discriminant >= -margin)) return 1;
+  const Scalar root = discriminant > Scalar(0) ? std::sqrt(discriminant) : Scalar(0);
+  roots[1] = middle - root, roots[2] = middle + root;
+  for (Scalar& x : roots) {
+    const Scalar value = ((x + a) * x + b) * x + c, slope = (Scalar(3) * x + Scalar(2) * a) * x + b;
+    const Scalar next = x - value / slope;
+    // At a double root the slope vanishes with the value: keep a step only when it lowers the polynomial.
+    if (std::abs(((next + a) * next + b) * next + c) < std::abs(value)) x = next;
+  }
+  return 3;
+}
+
+}  // namespace CFP_ISA
 }  // namespace cfp

@@ -127,13 +127,13 @@ struct PnpProblem {
 
   template <typename Visit>
   void solve(const std::array<std::uint32_t, 3>& sample, Visit&& visit) const {
-    std::array<Vector3<T>, 3> rays, points;
+    P3PProblem<T> problem;
     for (std::size_t k = 0; k < 3; ++k) {
       const std::size_t i = sample[k];
-      rays[k] = Vector3<T>(in.row(ray_x)[i], in.row(ray_y)[i], 1);
-      points[k] = Vector3<T>(in.row(X)[i], in.row(Y)[i], in.row(Z)[i]);
+      problem.rays[k] = Vector3<T>(in.row(ray_x)[i], in.row(ray_y)[i], 1);
+      problem.world[k] = Vector3<T>(in.row(X)[i], in.row(Y)[i], in.row(Z)[i]);
     }
-    const P3PSolutions<T> solutions = p3p<T>(rays, points);
+    const P3PSolutions<T> solutions = p3p(problem);
     for (int k = 0; k < solutions.count; ++k) visit(solutions.T_cam_world[static_cast<std::size_t>(k)]);
   }
 
