@@ -13,10 +13,11 @@
 #include <cmath>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "cfp/core/random.hpp"
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/reprojection.hpp"
-#include "cfp/probability/confidence.hpp"
 #include "cfp/probability/distance_sigmoid.hpp"
 #include "cfp/probability/object.hpp"
 #include "cfp/probability/second_stage_probability.hpp"
@@ -83,10 +84,10 @@ void stage_two(const Matches<Scalar>& in, const cfp::SE3<Scalar>& T, const cfp::
   const cfp::ConstraintOptions options;
   cfp::reprojection_distances(camera_as<Scalar>(), T, in.prev, in.depth, in.cur, b.projection);
   cfp::epipolar_distances(F, in.prev, in.cur, b.epipolar);
-  const auto by_projection = cfp::fit_constraint(span<const Scalar>(b.projection), span<Scalar>(b.scratch), options);
-  const auto by_line = cfp::fit_constraint(span<const Scalar>(b.epipolar), span<Scalar>(b.scratch), options);
-  cfp::static_probabilities(by_projection, span<const Scalar>(b.projection), span<Scalar>(b.k_projection));
-  cfp::static_probabilities(by_line, span<const Scalar>(b.epipolar), span<Scalar>(b.k_epipolar));
+  const auto by_projection = cfp::fit_constraint(b.projection, options, b.scratch);
+  const auto by_line = cfp::fit_constraint(b.epipolar, options, b.scratch);
+  cfp::static_probabilities(by_projection, b.projection, b.k_projection);
+  cfp::static_probabilities(by_line, b.epipolar, b.k_epipolar);
   if (!combined) return;
   const Scalar cs = cfp::statistical_confidence(pose_inliers, Scalar(20));
   const Scalar ct = cs * by_projection.calculation_confidence, cf = cs * by_line.calculation_confidence;
@@ -194,7 +195,7 @@ void object_score_cfp(benchmark::State& state) {
   const auto next = [&] {
     const Matches<Scalar>& in = inputs[turn++ % inputs.size()];
     cfp::epipolar_distances(F, in.prev, in.cur, distance);
-    return cfp::object_probability(span<const Scalar>(distance), span<Scalar>(scratch), options).static_probability;
+    return cfp::object_probability(distance, options, scratch).static_probability;
   };
   for (auto _ : state) benchmark::DoNotOptimize(next());
   double sum = 0;

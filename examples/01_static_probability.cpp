@@ -99,8 +99,7 @@ int main() {
   std::vector<float> distances(n), scratch(n);
   cfp::epipolar_distances(F, frame.previous_keypoints, frame.keypoints, distances);
   const cfp::span<const float> on_person(distances.data(), frame.person_points);
-  const cfp::ObjectProbability person =
-      cfp::object_probability(on_person, cfp::span<float>(scratch), cfp::ObjectProbabilityOptions{});
+  const cfp::ObjectProbability person = cfp::object_probability(on_person, cfp::ObjectProbabilityOptions{}, scratch);
   // [groups]
   std::printf("object       O = %.3f from %zu pairs, %s dynamic\n", person.static_probability, person.pairs,
               cfp::is_high_dynamic(person.static_probability, 0.9) ? "high" : "low");

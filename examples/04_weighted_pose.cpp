@@ -22,7 +22,7 @@ int main() {
     const bool on_person = i < 240;
     cfp::Vector3<double> ray, p;
     cfp::Vector2<double> pixel;
-    camera.unproject({random.uniform(0, 640), random.uniform(0, 480)}, ray);
+    if (!camera.unproject({random.uniform(0, 640), random.uniform(0, 480)}, ray)) continue;
     p = ray * random.uniform(0.8, 4);
     const cfp::Vector3<double> X = truth.inverse() * p;
     if (on_person) p.x() += 0.15;

@@ -28,8 +28,8 @@ struct Frame {
       line[i] = std::abs(random.normal());
       d[i] = std::hypot(line[i], random.normal());
     }
-    projection = cfp::fit_constraint(cfp::span<const double>(d), cfp::span<double>(scratch), {});
-    epipolar = cfp::fit_constraint(cfp::span<const double>(line), cfp::span<double>(scratch), {});
+    projection = cfp::fit_constraint(d, {}, scratch);
+    epipolar = cfp::fit_constraint(line, {}, scratch);
   }
 
   /// K of a point displaced by (along, across) its epipolar line.
@@ -56,7 +56,7 @@ Outcome follow(double displacement_px, int limit, int settled, const std::vector
     const Frame& sigmoid = sigmoids[random.index(static_cast<std::uint32_t>(sigmoids.size()))];
     const double along = displacement_px * std::cos(angle) + random.normal(),
                  across = displacement_px * std::sin(angle) + random.normal();
-    m = cfp::updated_map_point(m, sigmoid.k(along, across), options);
+    m = cfp::updated_map_point(sigmoid.k(along, across), m, options);
     if (frame + 1 == settled) outcome.m_after = m;
     if (cfp::is_deletable(m, options)) outcome.frames = (std::min)(outcome.frames, frame + 1);
   }

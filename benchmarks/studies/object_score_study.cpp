@@ -24,7 +24,7 @@ double pass_share(std::size_t pairs, double sigma_px, double moving_share, int t
       const double offset = random.uniform() < moving_share ? random.uniform(0.5, 5.0) : 0.0;
       d = std::abs(offset + sigma_px * random.normal());
     }
-    const auto o = cfp::object_probability(cfp::span<const double>(distances), cfp::span<double>(scratch), options);
+    const auto o = cfp::object_probability(distances, options, scratch);
     passed += o.static_probability > 0.9 ? 1 : 0;
   }
   return static_cast<double>(passed) / trials;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <string>
 
+#include <Eigen/Geometry>
+
 #include "cfp/core/random.hpp"
 #include "cfp/math/se3.hpp"
 

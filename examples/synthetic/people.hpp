@@ -6,6 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "surfaces.hpp"
 #include "tracks.hpp"
 

@@ -5,6 +5,8 @@
 
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "surfaces.hpp"
 #include "textures.hpp"
 

@@ -11,6 +11,8 @@
 
 #include <opencv2/imgcodecs.hpp>
 
+#include <Eigen/Geometry>
+
 #include "../support/tum.hpp"
 #include "camera_motion.hpp"
 #include "detector.hpp"

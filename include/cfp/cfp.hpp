@@ -1,6 +1,6 @@
 /// @file cfp.hpp
-/// Everything except interop/ and optimization/bundle/two_threads.hpp (the one header that starts a thread), for those who do
-/// not mind the compile time. A system in which that counts includes the headers it calls: each compiles alone.
+/// Everything except interop/ and optimization/bundle/two_threads.hpp (the one header that starts a thread), for those
+/// who do not mind the compile time. A system in which that counts includes the headers it calls: each compiles alone.
 #pragma once
 
 #include "cfp/version.hpp"
@@ -62,7 +62,6 @@
 #include "cfp/geometry/undistort.hpp"
 #include "cfp/math/chi_squared.hpp"
 #include "cfp/math/cubic.hpp"
-#include "cfp/math/exponential.hpp"
 #include "cfp/math/logistic.hpp"
 #include "cfp/math/matrix3.hpp"
 #include "cfp/math/normal_equations.hpp"
@@ -77,7 +76,6 @@
 #include "cfp/optimization/pose/pose_refinement_types.hpp"
 #include "cfp/optimization/robust_loss.hpp"
 #include "cfp/optimization/solver_status.hpp"
-#include "cfp/probability/confidence.hpp"
 #include "cfp/probability/distance_sigmoid.hpp"
 #include "cfp/probability/first_stage_probability.hpp"
 #include "cfp/probability/map_point.hpp"

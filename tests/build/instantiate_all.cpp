@@ -39,7 +39,9 @@ static void instantiate_math() noexcept {
   use(&cfp::se3_log<Scalar>);
   use(&cfp::adjoint<Scalar>);
   use(&cfp::hat<Scalar>);
-  use(&cfp::so3_exp<Scalar>);
+  use<cfp::Matrix3<Scalar> (*)(const cfp::Vector3<Scalar>&) noexcept>(&cfp::so3_exp<Scalar>);
+  use(&cfp::so3_from_quaternion<Scalar>);
+  use(&cfp::quaternion<Scalar>);
   use(&cfp::so3_log<Scalar>);
   use(&cfp::so3_left_jacobian<Scalar>);
   use(&cfp::normalized_rotation<Scalar>);
@@ -82,6 +84,7 @@ static void instantiate_geometry() noexcept {
           const cfp::PointPairs<Scalar>&, const cfp::PinholeCamera<Scalar>&, const cfp::FundamentalRansacOptions&,
           cfp::FundamentalRansacWorkspace&, cfp::span<char>)>(&cfp::fundamental_ransac<Scalar>));
   use(&cfp::reprojection_distances<Scalar>);
+  use(&cfp::transfer_distances<Scalar>);
 }
 
 // ---- detection ----
@@ -133,8 +136,8 @@ template struct cfp::SecondStageKeypoint<double>;
 template <typename Scalar>
 static void instantiate_probability() noexcept {
   use(&cfp::statistical_confidence<Scalar>);
-  use(&cfp::calculation_confidence<Scalar>);
-  use(&cfp::fit_constraint<Scalar>);
+  use(&cfp::calculation_confidence<std::vector<Scalar>>);
+  use(&cfp::fit_constraint<std::vector<Scalar>>);
   use(&cfp::static_probability<Scalar>);
   use(&cfp::static_probabilities<Scalar>);
   use(&cfp::fuse_high_dynamic<Scalar>);
@@ -143,12 +146,12 @@ static void instantiate_probability() noexcept {
   use(&cfp::is_high_dynamic<Scalar>);
   use(&cfp::background_factor<Scalar>);
   use(&cfp::first_stage_probability<Scalar>);
-  use(&cfp::updated_map_point<Scalar>);
+  use<Scalar (*)(Scalar, Scalar, const cfp::MapPointOptions&) noexcept>(&cfp::updated_map_point<Scalar>);
   use(&cfp::is_deletable<Scalar>);
   use(&cfp::is_mismatch<Scalar>);
   use(&cfp::observation_weight<Scalar>);
   use(&cfp::object_score<Scalar>);
-  use(&cfp::object_probability<Scalar>);
+  use(&cfp::object_probability<std::vector<Scalar>>);
 }
 
 // ---- optimization ----

@@ -67,17 +67,14 @@ void run(Results& results) {
 
   std::vector<Scalar> drawn(n);
   for (Scalar& d : drawn) d = Scalar(std::abs(random.normal()));
-  const auto model = cfp::fit_constraint(span<const Scalar>(drawn), span<Scalar>(scratch), cfp::ConstraintOptions{});
+  const auto model = cfp::fit_constraint(drawn, cfp::ConstraintOptions{}, scratch);
   results.add(model.threshold_px, 0);
   results.add(model.minimum_px, 0);
   results.add(model.calculation_confidence, 1);
-  cfp::static_probabilities(model, span<const Scalar>(drawn), span<Scalar>(k));
+  cfp::static_probabilities(model, drawn, k);
   results.add(k, 1);
-  cfp::chi_squared_survival(span<const Scalar>(drawn), 2, span<Scalar>(k));
-  results.add(k, 1);
-  results.add(cfp::object_probability(span<const Scalar>(drawn), span<Scalar>(scratch), cfp::ObjectProbabilityOptions{})
-                  .static_probability,
-              1);
+  for (const Scalar d : drawn) results.add(cfp::chi_squared_survival(d, 2), 1);
+  results.add(cfp::object_probability(drawn, cfp::ObjectProbabilityOptions{}, scratch).static_probability, 1);
   for (const double q : {0.1, 0.5, 0.95}) {
     scratch = drawn;
     results.add(cfp::order_statistic(span<Scalar>(scratch), cfp::quantile_rank(q, n) - 1), 0);

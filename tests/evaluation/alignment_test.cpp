@@ -4,6 +4,8 @@
 #include <limits>
 #include <vector>
 
+#include <Eigen/LU>
+
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
 #include "support/trajectories.hpp"

@@ -87,8 +87,7 @@ TEST_CASE("Each box's O and labels equal the equation groups called one by one",
       members.push_back(i);
     }
     std::vector<double> scratch(distances.size());
-    const auto o =
-        cfp::object_probability(cfp::span<const double>(distances), cfp::span<double>(scratch), options.object);
+    const auto o = cfp::object_probability(distances, options.object, scratch);
     CHECK_THAT(run.objects[b].static_probability, WithinAbs(o.static_probability, 1e-9));
     CHECK(run.objects[b].pairs == o.pairs);
     std::vector<char> is_foreground(depths.size());

@@ -72,10 +72,8 @@ TEST_CASE("Every K, M and weight equals the scalar formulas applied one keypoint
     outside_f.push_back(df[i]);
   }
   std::vector<double> scratch(n);
-  const auto projection =
-      cfp::fit_constraint(cfp::span<const double>(outside_t), cfp::span<double>(scratch), options.projection);
-  const auto epipolar =
-      cfp::fit_constraint(cfp::span<const double>(outside_f), cfp::span<double>(scratch), options.epipolar);
+  const auto projection = cfp::fit_constraint(outside_t, options.projection, scratch);
+  const auto epipolar = cfp::fit_constraint(outside_f, options.epipolar, scratch);
   const double cs = cfp::statistical_confidence<double>(run.inliers, 10);
   CHECK_THAT(result.projection_threshold_px, WithinAbs(projection.threshold_px, 1e-9));
   CHECK_THAT(result.epipolar_confidence, WithinAbs(cs * epipolar.calculation_confidence, 1e-9));
@@ -95,7 +93,7 @@ TEST_CASE("Every K, M and weight equals the scalar formulas applied one keypoint
     }
     INFO("keypoint " << i);
     CHECK_THAT(run.k[i], WithinAbs(k, 1e-9));
-    const double m = first_m[i] >= 0 ? cfp::updated_map_point(first_m[i], k, options.map_point) : first_m[i];
+    const double m = first_m[i] >= 0 ? cfp::updated_map_point(k, first_m[i], options.map_point) : first_m[i];
     CHECK_THAT(run.m[i], WithinAbs(m, 1e-9));
     const double weight = m < 0 ? k : (cfp::is_mismatch(k, m, options.map_point) ? 0 : k * m);
     CHECK_THAT(run.weight[i], WithinAbs(weight, 1e-9));
@@ -138,7 +136,7 @@ TEST_CASE("Disabled, the second stage keeps K and still updates M and the weight
   run.second(options);
   CHECK(run.k == before);
   for (std::size_t i = 0; i < run.k.size(); ++i)
-    CHECK(run.m[i] == cfp::updated_map_point(1.0, before[i], options.map_point));
+    CHECK(run.m[i] == cfp::updated_map_point(before[i], 1.0, options.map_point));
 }
 
 TEST_CASE("M as a prior changes K of what it has seen inside boxes, and neither M nor a weight", "[pipeline]") {

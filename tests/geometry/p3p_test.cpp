@@ -2,6 +2,9 @@
 
 #include <limits>
 
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
 #include "cfp/core/random.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"

@@ -16,7 +16,7 @@ TEMPLATE_TEST_CASE("Projection in a loop writes both coordinates", "[geometry]",
   std::vector<std::array<Scalar, 2>> pixels(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     cfp::Vector2<Scalar> u(0, 0);
-    camera.project(T * points[i], u);
+    REQUIRE(camera.project(T * points[i], u));
     pixels[i] = {u.x(), u.y()};
   }
   for (std::size_t i = 0; i < points.size(); ++i) {

@@ -4,6 +4,8 @@
 #include <limits>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "cfp/core/random.hpp"
 #include "support/catch.hpp"
 

@@ -174,7 +174,7 @@ TEST_CASE("Weighted PnP, drafts: what double refuses is refused for the same rea
                                      thickness * cfp_test::random_direction(random),
                                  X = scene.truth.inverse() * p;
       cfp::Vector2<double> pixel = cfp::Vector2<double>::Zero();
-      scene.camera.project(p, pixel);
+      (void)scene.camera.project(p, pixel);
       scene.points[i] = {X[0], X[1], X[2]};
       scene.pixels[i] = {pixel[0], pixel[1]};
     }

@@ -89,7 +89,7 @@ TEMPLATE_TEST_CASE("Weighted PnP: collinear and coincident points are degenerate
       for (std::size_t i = 0; i < line.points.size(); ++i) {
         const cfp::Vector3<double> X = a + d * random.uniform(-0.5, 0.5);
         cfp::Vector2<double> pixel(0, 0);
-        scene.camera.project(scene.truth * X, pixel);
+        (void)scene.camera.project(scene.truth * X, pixel);
         for (int c = 0; c < 3; ++c) line.points[i][static_cast<std::size_t>(c)] = static_cast<TestType>(X[c]);
         line.pixels[i] = {static_cast<TestType>(pixel.x() + random.normal()),
                           static_cast<TestType>(pixel.y() + random.normal())};

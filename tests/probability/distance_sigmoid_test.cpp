@@ -15,7 +15,7 @@ namespace {
 template <typename Scalar>
 cfp::ConstraintModel<Scalar> fit(const std::vector<Scalar>& d, const cfp::ConstraintOptions& options = {}) {
   std::vector<Scalar> scratch(d.size());
-  return cfp::fit_constraint(cfp::span<const Scalar>(d), cfp::span<Scalar>(scratch), options);
+  return cfp::fit_constraint(d, options, scratch);
 }
 
 template <typename Scalar>
@@ -69,8 +69,8 @@ TEMPLATE_TEST_CASE("The batch equals the scalar function for every length, in pl
       cfp::ConstraintModel<TestType> m = model;
       m.status = status;
       std::vector<TestType> out(n), in_place = d;
-      cfp::static_probabilities(m, cfp::span<const TestType>(d), cfp::span<TestType>(out));
-      cfp::static_probabilities(m, cfp::span<const TestType>(in_place), cfp::span<TestType>(in_place));
+      cfp::static_probabilities(m, d, out);
+      cfp::static_probabilities(m, in_place, in_place);
       for (std::size_t i = 0; i < n; ++i) {
         INFO("n " << n << " i " << i << " d " << d[i]);
         CHECK_THAT(out[i], WithinAbs(cfp::static_probability(m, d[i]), tolerance));
@@ -107,10 +107,10 @@ TEST_CASE("Too few distances outside the boxes leave the constraint without a sa
 TEST_CASE("The calculation confidence is the printed formula over distances below the threshold", "[probability]") {
   const std::vector<double> d = {0.5, 1.0, -1.0, 1.5, 2.0, 7.0, std::numeric_limits<double>::quiet_NaN()};
   // Below 2: 0.5, 1.0, 1.5: 1 - 3 / (3 * 2).
-  CHECK_THAT(cfp::calculation_confidence(cfp::span<const double>(d), 2.0), WithinAbs(0.5, 1e-15));
-  CHECK(cfp::calculation_confidence(cfp::span<const double>(d), 0.5) == 0);
-  CHECK(cfp::calculation_confidence(cfp::span<const double>(d), std::numeric_limits<double>::infinity()) == 0);
-  CHECK(cfp::calculation_confidence(cfp::span<const double>(d), std::numeric_limits<double>::quiet_NaN()) == 0);
+  CHECK_THAT(cfp::calculation_confidence(d, 2.0), WithinAbs(0.5, 1e-15));
+  CHECK(cfp::calculation_confidence(d, 0.5) == 0);
+  CHECK(cfp::calculation_confidence(d, std::numeric_limits<double>::infinity()) == 0);
+  CHECK(cfp::calculation_confidence(d, std::numeric_limits<double>::quiet_NaN()) == 0);
   // Ideal 2-D noise gives about 0.44 (Rayleigh distances below their 0.8 quantile).
   CHECK_THAT(fit(random_distances<double>(200000, "ideal")).calculation_confidence, WithinAbs(0.44, 0.01));
 }
@@ -132,9 +132,8 @@ TEST_CASE("Fitting and evaluating allocate nothing", "[probability]") {
   const std::vector<float> d = random_distances<float>(1000, "allocation");
   std::vector<float> scratch(d.size()), out(d.size());
   CHECK(cfp_test::allocations_in([&] {
-          const auto model =
-              cfp::fit_constraint(cfp::span<const float>(d), cfp::span<float>(scratch), cfp::ConstraintOptions{});
-          cfp::static_probabilities(model, cfp::span<const float>(d), cfp::span<float>(out));
+          const auto model = cfp::fit_constraint(d, cfp::ConstraintOptions{}, scratch);
+          cfp::static_probabilities(model, d, out);
         }) == 0);
 }
 

@@ -42,7 +42,7 @@ std::vector<Scalar> static_distances(std::size_t n, double sigma, cfp::Random& r
 template <typename Scalar>
 ObjectProbability run(const std::vector<Scalar>& distances, const ObjectProbabilityOptions& options) {
   std::vector<Scalar> scratch(distances.size());
-  return cfp::object_probability(cfp::span<const Scalar>(distances), cfp::span<Scalar>(scratch), options);
+  return cfp::object_probability(distances, options, scratch);
 }
 
 }  // namespace
@@ -144,8 +144,7 @@ TEST_CASE("The object score allocates nothing", "[probability]") {
   std::vector<float> scratch(d.size());
   const ObjectProbabilityOptions options;
   CHECK(cfp_test::allocations_in([&] {
-          volatile double keep =
-              cfp::object_probability(cfp::span<const float>(d), cfp::span<float>(scratch), options).static_probability;
+          volatile double keep = cfp::object_probability(d, options, scratch).static_probability;
           (void)keep;
         }) == 0);
 }

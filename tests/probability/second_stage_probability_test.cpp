@@ -3,7 +3,7 @@
 #include <limits>
 #include <vector>
 
-#include "cfp/probability/confidence.hpp"
+#include "cfp/probability/distance_sigmoid.hpp"
 #include "support/catch.hpp"
 
 namespace {

@@ -53,15 +53,9 @@ TEST_CASE("properties of chi-squared", "[properties]") {
 }
 
 TEST_CASE("properties of logistic", "[properties]") {
-  rc::prop("in [0, 1] for any bits, alone and in an array", [] {
-    std::vector<float> x(static_cast<std::size_t>(*rc::gen::inRange(0, 150)));
-    for (float& value : x) value = any_number<float, std::uint32_t>();
-    std::vector<float> p(x.size());
-    cfp::logistic(cfp::span<const float>(x), cfp::span<float>(p));
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      RC_ASSERT(p[i] >= 0 && p[i] <= 1);
-      RC_ASSERT(std::abs(p[i] - cfp::logistic(x[i])) <= 4e-7F);
-    }
+  rc::prop("in [0, 1] for any bits", [] {
+    const float single = any_number<float, std::uint32_t>();
+    RC_ASSERT(cfp::logistic(single) >= 0 && cfp::logistic(single) <= 1);
     const double value = any_number<double, std::uint64_t>();
     RC_ASSERT(cfp::logistic(value) >= 0 && cfp::logistic(value) <= 1);
   });
@@ -69,15 +63,6 @@ TEST_CASE("properties of logistic", "[properties]") {
     const double x = real(-50, 50), more = x + real(0, 10);
     RC_ASSERT(cfp::logistic(more) >= cfp::logistic(x));
     RC_ASSERT(std::abs(cfp::logistic(x) + cfp::logistic(-x) - 1) <= 3e-16);
-  });
-  rc::prop("a result does not depend on the place in the array, to the bit", [] {
-    std::vector<double> x(static_cast<std::size_t>(*rc::gen::inRange(1, 200)));
-    for (double& value : x) value = real(-40, 40);
-    std::vector<double> reversed(x.rbegin(), x.rend()), p(x.size()), q(x.size());
-    cfp::logistic(cfp::span<double>(x), cfp::span<double>(p));
-    cfp::logistic(cfp::span<double>(reversed), cfp::span<double>(q));
-    std::reverse(q.begin(), q.end());
-    RC_ASSERT(p == q);
   });
 }
 

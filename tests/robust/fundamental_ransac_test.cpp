@@ -6,6 +6,9 @@
 #include <sstream>
 #include <vector>
 
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
 #include "cfp/geometry/epipolar.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"

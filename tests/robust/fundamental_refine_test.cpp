@@ -2,6 +2,8 @@
 
 #include <vector>
 
+#include <Eigen/LU>
+
 #include "cfp/robust/homography_impl.hpp"
 #include "support/catch.hpp"
 #include "support/two_view_scene.hpp"

@@ -92,7 +92,7 @@ DynamicScene<Scalar> make_dynamic_scene(const DynamicSceneOptions& options, std:
   }
   for (std::size_t i = 0; i < options.wall_points; ++i) {
     cfp::Vector3<double> ray;
-    camera.unproject(cfp::Vector2<double>(random.uniform(5, 635), random.uniform(5, 475)), ray);
+    (void)camera.unproject(cfp::Vector2<double>(random.uniform(5, 635), random.uniform(5, 475)), ray);
     add(ray * random.uniform(3.5, 5.0), cfp::Vector3<double>::Zero(), false);
   }
   return scene;

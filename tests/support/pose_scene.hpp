@@ -75,7 +75,7 @@ PoseScene<Scalar> make_pose_scene(std::uint64_t seed, const PoseSceneOptions& op
   for (int i = 0; i < options.points; ++i) {
     const double u = random.uniform(0, 640), v = random.uniform(0, 480), depth = random.uniform(0.6, 5);
     cfp::Vector3<double> ray;
-    scene.camera.unproject({u, v}, ray);
+    (void)scene.camera.unproject({u, v}, ray);
     const double sigma = options.octaves ? std::pow(1.2, random.index(8)) : 1.0;
     const bool moving = i < options.moving_share * options.points;
     const bool outlier = !moving && i >= options.points * (1 - options.outlier_share);
@@ -83,7 +83,7 @@ PoseScene<Scalar> make_pose_scene(std::uint64_t seed, const PoseSceneOptions& op
     cfp::Vector3<double> p = ray * depth;
     if (moving) p += walk;
     cfp::Vector2<double> pixel(u, v);
-    scene.camera.project(p, pixel);
+    (void)scene.camera.project(p, pixel);
     double noise = options.noise_px * sigma;
     double x = pixel.x() + noise * random.normal(), y = pixel.y() + noise * random.normal();
     double measured = p.z() > 0.1 ? scene.baseline_fx / (scene.baseline_fx / p.z() + noise * random.normal()) : -1;

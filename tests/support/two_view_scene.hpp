@@ -55,7 +55,7 @@ TwoViewScene<Scalar> make_two_view_scene(cfp::Random& random, const TwoViewOptio
   while (scene.world.size() < options.pairs) {
     const cfp::Vector2<double> u(random.uniform(0, 640), random.uniform(0, 480));
     cfp::Vector3<double> ray;
-    scene.camera.unproject(u, ray);
+    (void)scene.camera.unproject(u, ray);
     const bool on_plane = options.shape == SceneShape::plane ||
                           (options.shape == SceneShape::volume_and_plane && random.uniform() < options.plane_share);
     const cfp::Vector3<double> point = ray * (on_plane ? 1.2 / tilt.dot(ray) : random.uniform(0.6, 5));

@@ -383,7 +383,7 @@ class Tracking {
         point.static_probability =
             match_[i] != cfp::no_match && m >= 0
                 ? m
-                : cfp::updated_map_point(point.static_probability, frame.static_probability[i], policy);
+                : cfp::updated_map_point(frame.static_probability[i], point.static_probability, policy);
         m = point.static_probability;
         if (cfp::is_deletable(m, policy)) {
           map_.erase_point(frame.map_point[i]);

@@ -26,6 +26,8 @@ struct Tolerance<float> {
 template <typename Scalar>
 inline constexpr Scalar pi = Scalar(3.14159265358979323846264338327950288L);
 
+inline namespace CFP_ISA {
+
 /// True for neither NaN nor infinite. A comparison, so that it holds for dual numbers, too.
 template <typename Scalar>
 [[nodiscard]] constexpr bool is_finite(const Scalar& x) noexcept {
@@ -46,4 +48,5 @@ template <typename Scalar>
   return depth_m > Scalar(0) && depth_m <= Scalar((std::numeric_limits<Scalar>::max)());
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

@@ -10,6 +10,7 @@
 #include "cfp/core/numeric.hpp"
 
 namespace cfp {
+inline namespace CFP_ISA {
 
 /// SplitMix64 (Steele, Lea, Flood: "Fast splittable pseudorandom number generators", 2014): 64 bits of state, period
 /// 2^64. Meets the standard's UniformRandomBitGenerator, so std::shuffle and RapidCheck-like tools accept it.
@@ -51,4 +52,5 @@ class Random {
   std::uint64_t state_;
 };
 
+}  // namespace CFP_ISA
 }  // namespace cfp

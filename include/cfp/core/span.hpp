@@ -158,7 +158,7 @@ class PointSpan {
 
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
-  [[nodiscard]] Scalar operator()(std::size_t i, int c) const noexcept {
+  [[nodiscard]] CFP_INLINE Scalar operator()(std::size_t i, int c) const noexcept {
     CFP_ASSERT(i < size_ && c >= 0 && c < Dim);
     return *reinterpret_cast<const Scalar*>(first_ + i * point_stride_ +
                                             static_cast<std::size_t>(c) * coordinate_stride_);
@@ -169,7 +169,7 @@ class PointSpan {
                ? reinterpret_cast<const Scalar*>(first_)
                : nullptr;
   }
-  [[nodiscard]] Point operator[](std::size_t i) const noexcept {
+  [[nodiscard]] CFP_INLINE Point operator[](std::size_t i) const noexcept {
     Point point;
     for (int c = 0; c < Dim; ++c) point[c] = (*this)(i, c);
     return point;

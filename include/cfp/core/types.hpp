@@ -13,11 +13,15 @@ using Vector2 = Eigen::Matrix<Scalar, 2, 1>;
 template <typename Scalar>
 using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
 template <typename Scalar>
+using Vector4 = Eigen::Matrix<Scalar, 4, 1>;
+template <typename Scalar>
 using Vector6 = Eigen::Matrix<Scalar, 6, 1>;
 template <typename Scalar>
 using Matrix2 = Eigen::Matrix<Scalar, 2, 2>;
 template <typename Scalar>
 using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+template <typename Scalar>
+using Matrix4 = Eigen::Matrix<Scalar, 4, 4>;
 template <typename Scalar>
 using Matrix6 = Eigen::Matrix<Scalar, 6, 6>;
 template <typename Scalar>

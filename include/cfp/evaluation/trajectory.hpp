@@ -11,6 +11,7 @@
 
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
+#include "cfp/math/matrix3.hpp"
 #include "cfp/math/se3.hpp"
 
 namespace cfp {
@@ -27,10 +28,10 @@ struct StampedPose {
 template <typename Scalar>
 [[nodiscard]] bool is_usable(const StampedPose<Scalar>& pose) noexcept {
   const Matrix3<Scalar>& R = pose.T_world_cam.rotation;
-  const Scalar determinant = R.col(0).cross(R.col(1)).dot(R.col(2));
+  const Scalar volume = determinant(R);
   const Vector3<Scalar>& t = pose.T_world_cam.translation;
   return is_finite(pose.time_s) && is_finite(t.x()) && is_finite(t.y()) && is_finite(t.z()) &&
-         determinant > Scalar(0.5) && determinant < Scalar(2) && R.squaredNorm() < Scalar(12);
+         volume > Scalar(0.5) && volume < Scalar(2) && R.squaredNorm() < Scalar(12);
 }
 
 /// Indices of the usable poses in order of time; of several with one stamp the last in the array stays, as in the

@@ -15,7 +15,6 @@
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/reprojection.hpp"
 #include "cfp/geometry/undistort.hpp"
-#include "cfp/probability/confidence.hpp"
 #include "cfp/probability/distance_sigmoid.hpp"
 #include "cfp/probability/map_point.hpp"
 #include "cfp/probability/second_stage_probability.hpp"
@@ -64,7 +63,7 @@ template <typename Scalar>
     if (state.label[i] == KeypointLabel::outside) scratch.samples.push_back(distances[i]);
   }
   scratch.scratch.resize(distances.size());
-  return fit_constraint(span<const Scalar>(scratch.samples), span<Scalar>(scratch.scratch), options);
+  return fit_constraint(scratch.samples, options, scratch.scratch);
 }
 
 /// Median of the valid depths among the matches, 0 without any; for the parallax form of t_Th.

@@ -78,8 +78,7 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
       if (detail::lies_on(state.boxes[b], frame.labels, frame.flow.current(i, 0), frame.flow.current(i, 1)))
         scratch.samples.push_back(scratch.epipolar[i]);
     }
-    state.objects[b] =
-        object_probability(span<const Scalar>(scratch.samples), span<Scalar>(scratch.scratch), object_options);
+    state.objects[b] = object_probability(scratch.samples, object_options, scratch.scratch);
     if (state.objects[b].status == Status::ok) --report.unknown_objects;
   }
 }

@@ -102,7 +102,7 @@ void estimate_objects(const FirstStageInput<Scalar>& in, const Camera& camera, s
       if (contains(in.boxes[b].box, in.flow_current(i, 0), in.flow_current(i, 1)))
         work.box_distances.push_back(work.flow_distances[i]);
     }
-    objects[b] = object_probability(span<const Scalar>(work.box_distances), span<Scalar>(work.scratch), options.object);
+    objects[b] = object_probability(work.box_distances, options.object, work.scratch);
     if (objects[b].status == Status::ok) --result.unknown_objects;
   }
 }

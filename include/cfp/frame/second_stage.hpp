@@ -20,7 +20,6 @@
 #include "cfp/geometry/reprojection.hpp"
 #include "cfp/geometry/undistort.hpp"
 #include "cfp/math/se3.hpp"
-#include "cfp/probability/confidence.hpp"
 #include "cfp/probability/distance_sigmoid.hpp"
 #include "cfp/probability/map_point.hpp"
 #include "cfp/probability/second_stage_probability.hpp"
@@ -109,7 +108,7 @@ ConstraintModel<Scalar> fit_outside(const SecondStageInput<Scalar>& in, const st
     if (in.label[i] == KeypointLabel::outside) work.samples.push_back(distances[i]);
   }
   work.scratch.resize(distances.size());
-  return fit_constraint(span<const Scalar>(work.samples), span<Scalar>(work.scratch), options);
+  return fit_constraint(work.samples, options, work.scratch);
 }
 
 /// Median of the valid depths among the matches, 0 without any; for the parallax form of t_Th.
@@ -142,7 +141,7 @@ void update_map_points(const SecondStageOutput<Scalar>& out, const MapPointOptio
       out.weight[i] = k;
       continue;
     }
-    m = updated_map_point(m, k, options);
+    m = updated_map_point(k, m, options);
     const bool mismatch = is_mismatch(k, m, options);
     out.weight[i] = mismatch ? Scalar(0) : observation_weight(k, m, options.weight);
     result.mismatched += mismatch ? 1U : 0U;

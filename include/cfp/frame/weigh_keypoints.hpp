@@ -19,7 +19,7 @@ template <typename Scalar>
 [[nodiscard]] Scalar updated_map_point(std::size_t i, non_deduced<Scalar> map_point_probability,
                                        const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
   if (!(map_point_probability >= Scalar(0)) || state.label[i] == KeypointLabel::invalid) return map_point_probability;
-  return updated_map_point(map_point_probability, state.static_probability[i], options.map_point);
+  return updated_map_point(state.static_probability[i], map_point_probability, options.map_point);
 }
 
 /// The weight of keypoint i for a map point of probability M, before any fallback: K without a map point (M negative or

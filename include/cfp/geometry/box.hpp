@@ -14,9 +14,11 @@ template <typename Scalar>
 struct Box {
   Scalar x1{}, y1{}, x2{}, y2{};
 
-  [[nodiscard]] constexpr Scalar width() const noexcept { return x2 - x1; }
-  [[nodiscard]] constexpr Scalar height() const noexcept { return y2 - y1; }
+  [[nodiscard]] CFP_INLINE constexpr Scalar width() const noexcept { return x2 - x1; }
+  [[nodiscard]] CFP_INLINE constexpr Scalar height() const noexcept { return y2 - y1; }
 };
+
+inline namespace CFP_ISA {
 
 template <typename Scalar>
 [[nodiscard]] constexpr bool is_proper(const Box<Scalar>& box) noexcept {
@@ -59,4 +61,5 @@ template <typename Scalar>
   return intersection(box, Box<Scalar>{Scalar(0), Scalar(0), image_width, image_height});
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

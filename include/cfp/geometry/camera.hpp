@@ -21,8 +21,8 @@ struct PinholeCamera {
 
   /// Projects a point of the camera frame. Returns whether the projection is valid: z > Tolerance::min_depth and a
   /// finite pixel; otherwise pixel and jacobian are left as they were. jacobian, when asked for: d pixel / d point.
-  bool project(const Vector3<Scalar>& point, Vector2<Scalar>& pixel,
-               Matrix23<Scalar>* jacobian = nullptr) const noexcept {
+  [[nodiscard]] CFP_INLINE bool project(const Vector3<Scalar>& point, Vector2<Scalar>& pixel,
+                                        Matrix23<Scalar>* jacobian = nullptr) const noexcept {
     if (!(point.z() > Scalar(Tolerance<Scalar>::min_depth))) return false;
     const Scalar inv_z = Scalar(1) / point.z();
     const Scalar x = point.x() * inv_z;
@@ -45,22 +45,27 @@ struct PinholeCamera {
 
   /// The ray through a pixel, scaled to z = 1: a point at depth d is d * ray. False, and ray untouched, for a pixel or
   /// an intrinsic that is not finite.
-  bool unproject(const Vector2<Scalar>& pixel, Vector3<Scalar>& ray) const noexcept {
+  [[nodiscard]] CFP_INLINE bool unproject(const Vector2<Scalar>& pixel, Vector3<Scalar>& ray) const noexcept {
     const Scalar x = (pixel.x() - cx) / fx;
     const Scalar y = (pixel.y() - cy) / fy;
     if (!is_finite(x) || !is_finite(y)) return false;
-    ray = Vector3<Scalar>(x, y, Scalar(1));
+    ray = {x, y, Scalar(1)};
     return true;
   }
 
   /// The intrinsic matrix.
-  [[nodiscard]] Matrix3<Scalar> matrix() const noexcept {
+  [[nodiscard]] CFP_INLINE Matrix3<Scalar> matrix() const noexcept {
     Matrix3<Scalar> K = Matrix3<Scalar>::Identity();
     K(0, 0) = fx;
     K(1, 1) = fy;
     K(0, 2) = cx;
     K(1, 2) = cy;
     return K;
+  }
+
+  template <typename Other>
+  [[nodiscard]] CFP_INLINE PinholeCamera<Other> cast() const noexcept {
+    return {static_cast<Other>(fx), static_cast<Other>(fy), static_cast<Other>(cx), static_cast<Other>(cy)};
   }
 };
 

@@ -2,16 +2,13 @@
 /// What all pixel distances of cfp share: the value that stands for "no distance", and the guarded quotient.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <limits>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
-#include "cfp/math/so3.hpp"
-#include "cfp/simd/chunk.hpp"
+#include "cfp/core/types.hpp"
 
 namespace cfp {
 
@@ -20,6 +17,8 @@ namespace cfp {
 template <typename Scalar>
 inline constexpr Scalar no_distance = Scalar(-1);
 
+inline namespace CFP_ISA {
+
 /// Whether d is a distance: finite and >= 0.
 template <typename Scalar>
 [[nodiscard]] constexpr bool has_distance(const Scalar& d) noexcept {
@@ -27,35 +26,23 @@ template <typename Scalar>
 }
 
 /// Copies those of `from` that are distances, in their order; `to` needs room for all of them and may be the same
-/// memory. Returns how many there are. Without a branch per element: which distances are missing is hard to foresee.
+/// memory. Returns how many there are.
 template <typename Scalar>
-std::size_t copy_distances(span<const Scalar> from, span<Scalar> to) noexcept {
+[[nodiscard]] std::size_t copy_distances(span<const Scalar> from, span<Scalar> to) noexcept {
   CFP_ASSERT(to.size() >= from.size());
   std::size_t kept = 0;
-  detail::for_each_chunk(from.size(), [&](std::size_t first, std::size_t count) {
-    detail::Chunk<Scalar> d;
-    std::uint8_t keep[detail::chunk_size];
-    detail::load_chunk(from, first, count, d);
-    for (std::size_t i = 0; i < detail::chunk_size; ++i)
-      keep[i] = static_cast<std::uint8_t>(static_cast<int>(d.data()[i] >= Scalar(0)) &
-                                          static_cast<int>(d.data()[i] <= (std::numeric_limits<Scalar>::max)()));
-    std::size_t kept_here = 0;
-    for (std::size_t i = 0; i < detail::chunk_size; ++i) kept_here += keep[i];
-    if (kept_here == detail::chunk_size &&
-        count == detail::chunk_size) {  // mostly none is missing, or there are gaps in every chunk
-      std::copy_n(d.data(), detail::chunk_size, to.data() + kept);
-      kept += detail::chunk_size;
-      return;
-    }
-    for (std::size_t i = 0; i < count; ++i) {
-      to.data()[kept] = d.data()[i];
-      kept += keep[i];
-    }
-  });
+  for (const Scalar d : from) {  // no branch: which distances are missing is hard to foresee
+    to.data()[kept] = d;
+    kept += static_cast<std::size_t>(static_cast<int>(d >= Scalar(0)) &
+                                     static_cast<int>(d <= (std::numeric_limits<Scalar>::max)()));
+  }
   return kept;
 }
 
+}  // namespace CFP_ISA
+
 namespace detail {
+inline namespace CFP_ISA {
 
 /// |numerator| / sqrt(norm_sq), or no_distance unless norm_sq > noise_sq >= 0 and the quotient is finite.
 template <typename Scalar>
@@ -88,5 +75,6 @@ template <typename Scalar>
   return tolerance * tolerance * F.template topRows<2>().squaredNorm();
 }
 
+}  // namespace CFP_ISA
 }  // namespace detail
 }  // namespace cfp

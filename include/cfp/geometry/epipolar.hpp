@@ -9,19 +9,18 @@
 
 #include <cmath>
 #include <cstddef>
-#include <limits>
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/distance.hpp"
+#include "cfp/math/matrix3.hpp"
 #include "cfp/math/se3.hpp"
-#include "cfp/simd/chunk.hpp"
 
 namespace cfp {
+inline namespace CFP_ISA {
 
 /// E = [t]x R of T_cur_prev = (R, t): y_cur^T E y_prev = 0 for rays y = K^-1 x. Zero when t is zero.
 template <typename Scalar>
@@ -34,7 +33,7 @@ template <typename Scalar>
 template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> fundamental_from_pose(const Matrix3<Scalar>& K_prev, const Matrix3<Scalar>& K_cur,
                                                     const SE3<Scalar>& T_cur_prev) noexcept {
-  return K_cur.inverse().transpose() * essential_from_pose(T_cur_prev) * K_prev.inverse();
+  return inverse(K_cur).transpose() * essential_from_pose(T_cur_prev) * inverse(K_prev);
 }
 template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> fundamental_from_pose(const PinholeCamera<Scalar>& camera_prev,
@@ -61,6 +60,26 @@ template <typename Scalar>
   return detail::ratio_distance(numerator, line.x() * line.x() + line.y() * line.y(), Scalar(0));
 }
 
+}  // namespace CFP_ISA
+
+namespace detail {
+inline namespace CFP_ISA {
+
+/// epipolar_distance for an F of unit_scale, whose line_noise is given.
+template <typename Scalar>
+[[nodiscard]] Scalar scaled_epipolar_distance(const Matrix3<Scalar>& F, const Scalar& noise,
+                                              const Vector2<Scalar>& x_prev, const Vector2<Scalar>& x_cur) noexcept {
+  const Vector3<Scalar> line = epipolar_line(F, x_prev);
+  return ratio_distance(Scalar(line.x() * x_cur.x() + line.y() * x_cur.y() + line.z()),
+                        Scalar(line.x() * line.x() + line.y() * line.y()),
+                        Scalar(noise * (x_prev.squaredNorm() + Scalar(1))));
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
+
+inline namespace CFP_ISA {
+
 /// The paper's d = |x_cur^T F x_prev| / sqrt(A^2 + B^2), (A, B, C) = F x_prev: distance in pixels of the current point
 /// to the line of the previous one. no_distance where sqrt(A^2 + B^2) is below Tolerance::degenerate times the size of
 /// the terms it is summed from: such a line is rounding noise.
@@ -68,10 +87,7 @@ template <typename Scalar>
 [[nodiscard]] Scalar epipolar_distance(const Matrix3<Scalar>& F, const Vector2<Scalar>& x_prev,
                                        const Vector2<Scalar>& x_cur) noexcept {
   const Matrix3<Scalar> G = detail::unit_scale(F);
-  const Vector3<Scalar> line = epipolar_line(G, x_prev);
-  const Scalar noise = detail::line_noise(G) * (x_prev.squaredNorm() + Scalar(1));
-  return detail::ratio_distance(line.x() * x_cur.x() + line.y() * x_cur.y() + line.z(),
-                                line.x() * line.x() + line.y() * line.y(), noise);
+  return detail::scaled_epipolar_distance(G, detail::line_noise(G), x_prev, x_cur);
 }
 
 /// Mean of the distances in both images, in pixels: invariant when the two views change roles (F becomes F^T).
@@ -101,31 +117,15 @@ template <typename Scalar>
   return detail::ratio_distance(line.x() * x_cur.x() + line.y() * x_cur.y() + line.z(), norm_sq, noise);
 }
 
-/// epipolar_distance of every correspondence; equal to the scalar function up to a few roundings. Vectorised; allocates
-/// nothing; the result of a pair does not depend on its place in the arrays.
+/// epipolar_distance of every correspondence. Allocates nothing.
 template <typename Scalar>
 void epipolar_distances(const Matrix3<Scalar>& F, const PointSpan<non_deduced<Scalar>, 2>& prev,
                         const PointSpan<non_deduced<Scalar>, 2>& cur, span<non_deduced<Scalar>> out) noexcept {
   CFP_ASSERT(prev.size() == cur.size() && prev.size() == out.size());
   const Matrix3<Scalar> G = detail::unit_scale(F);
   const Scalar noise = detail::line_noise(G);
-  using Chunk = detail::Chunk<Scalar>;
-  detail::for_each_chunk(out.size(), [&](std::size_t first, std::size_t count) {
-    Chunk u_prev, v_prev, u, v;
-    detail::load_chunk(prev, first, count, u_prev, v_prev);
-    detail::load_chunk(cur, first, count, u, v);
-    const Chunk a = G(0, 0) * u_prev + G(0, 1) * v_prev + G(0, 2);
-    const Chunk b = G(1, 0) * u_prev + G(1, 1) * v_prev + G(1, 2);
-    const Chunk numerator = a * u + b * v + (G(2, 0) * u_prev + G(2, 1) * v_prev + G(2, 2));
-    const Chunk norm_sq = a * a + b * b;
-    const Chunk threshold = noise * (u_prev * u_prev + v_prev * v_prev + Scalar(1));
-    Chunk distance = numerator.abs() / norm_sq.sqrt();
-    for (Eigen::Index i = 0; i < distance.size(); ++i) {
-      const Scalar d = distance[i] <= (std::numeric_limits<Scalar>::max)() ? distance[i] : no_distance<Scalar>;
-      distance[i] = norm_sq[i] > threshold[i] ? d : no_distance<Scalar>;
-    }
-    detail::store_chunk(distance, first, count, out);
-  });
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = detail::scaled_epipolar_distance(G, noise, prev[i], cur[i]);
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

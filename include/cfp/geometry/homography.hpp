@@ -7,10 +7,9 @@
 
 #include "cfp/core/span.hpp"
 #include "cfp/geometry/distance.hpp"
-#include "cfp/math/so3.hpp"
-#include "cfp/simd/chunk.hpp"
 
 namespace cfp {
+inline namespace CFP_ISA {
 
 /// || x_cur - H x_prev || in pixels of the current image, H x_prev divided by its last component. `no_distance` (-1)
 /// where that component is not positive (the point maps behind the camera or to infinity; H is taken with det > 0) or
@@ -19,7 +18,7 @@ template <typename Scalar>
 [[nodiscard]] Scalar transfer_distance(const Matrix3<Scalar>& H, const Vector2<Scalar>& x_prev,
                                        const Vector2<Scalar>& x_cur) noexcept {
   using std::sqrt;
-  const Vector3<Scalar> mapped = H * x_prev.homogeneous();
+  const Vector3<Scalar> mapped = H.col(0) * x_prev.x() + H.col(1) * x_prev.y() + H.col(2);
   if (!(mapped.z() > Scalar(0))) return Scalar(no_distance<double>);
   const Scalar distance = sqrt((mapped.template head<2>() / mapped.z() - x_cur).squaredNorm());
   return has_distance(distance) ? distance : Scalar(no_distance<double>);
@@ -33,4 +32,5 @@ void transfer_distances(const Matrix3<Scalar>& H, const PointSpan<non_deduced<Sc
   for (std::size_t i = 0; i < out.size(); ++i) out[i] = transfer_distance<Scalar>(H, prev[i], cur[i]);
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

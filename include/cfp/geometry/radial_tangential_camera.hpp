@@ -12,7 +12,11 @@
 
 namespace cfp {
 
+template <typename Scalar>
+struct RadialTangentialCamera;
+
 namespace detail {
+inline namespace CFP_ISA {
 
 /// Whether 1 + a s + b s^2 + c s^3 > 0 for every s in [0, end].
 template <typename Scalar>
@@ -33,6 +37,67 @@ template <typename Scalar>
   return !fails_at(q / (Scalar(3) * c)) && !fails_at(a / q);
 }
 
+/// A distorted point of the plane z = 1 and the (symmetric) Jacobian of the distortion.
+template <typename Scalar>
+struct DistortedPoint {
+  Scalar x{}, y{}, xx{}, xy{}, yy{};
+};
+
+/// Distorts the point (x, y) of the plane z = 1; false beyond the fold or when not finite.
+template <typename Scalar>
+[[nodiscard]] bool distort(const RadialTangentialCamera<Scalar>& camera, const Scalar& x, const Scalar& y,
+                           DistortedPoint<Scalar>& d) noexcept {
+  const Scalar &k1 = camera.k1, &k2 = camera.k2, &k3 = camera.k3, &p1 = camera.p1, &p2 = camera.p2;
+  const Scalar s = x * x + y * y;
+  const Scalar radial = Scalar(1) + s * (k1 + s * (k2 + s * k3));
+  // The slope of `radial` along x is x times this, along y y times this.
+  const Scalar twice_slope = Scalar(2) * (k1 + s * (Scalar(2) * k2 + s * Scalar(3) * k3));
+  d.x = x * radial + Scalar(2) * p1 * x * y + p2 * (s + Scalar(2) * x * x);
+  d.y = y * radial + p1 * (s + Scalar(2) * y * y) + Scalar(2) * p2 * x * y;
+  d.xx = radial + x * x * twice_slope + Scalar(2) * p1 * y + Scalar(6) * p2 * x;
+  d.xy = x * y * twice_slope + Scalar(2) * p1 * x + Scalar(2) * p2 * y;
+  d.yy = radial + y * y * twice_slope + Scalar(6) * p1 * y + Scalar(2) * p2 * x;
+  return is_finite(d.x) && is_finite(d.y) && d.xx * d.yy - d.xy * d.xy > Scalar(0) &&
+         stays_positive(Scalar(Scalar(3) * k1), Scalar(Scalar(5) * k2), Scalar(Scalar(7) * k3), s);
+}
+
+/// RadialTangentialCamera::unproject.
+template <typename Scalar>
+[[nodiscard]] bool find_ray(const RadialTangentialCamera<Scalar>& camera, const Vector2<Scalar>& pixel,
+                            Vector3<Scalar>& ray) noexcept {
+  const Scalar target_x = (pixel.x() - camera.cx) / camera.fx;
+  const Scalar target_y = (pixel.y() - camera.cy) / camera.fy;
+  Scalar error_sq = target_x * target_x + target_y * target_y;
+  if (!is_finite(error_sq) || !is_finite(Scalar(camera.k1 + camera.k2 + camera.k3 + camera.p1 + camera.p2)))
+    return false;
+  const Scalar unit_roundoff(std::numeric_limits<Scalar>::epsilon());
+  const Scalar enough_sq = Scalar(256) * unit_roundoff * unit_roundoff * (Scalar(1) + error_sq);
+  // On the axis the distortion is 0 and its Jacobian the identity: the first step is the target itself.
+  Scalar x(0), y(0), step_x = target_x, step_y = target_y;
+  for (int evaluation = 0; evaluation < 40 && !(error_sq <= enough_sq); ++evaluation) {
+    DistortedPoint<Scalar> d;
+    const bool valid = distort(camera, Scalar(x + step_x), Scalar(y + step_y), d);
+    const Scalar ex = target_x - d.x;
+    const Scalar ey = target_y - d.y;
+    const Scalar candidate_error_sq = ex * ex + ey * ey;
+    if (!valid || !(candidate_error_sq < error_sq)) {
+      step_x *= Scalar(0.5);
+      step_y *= Scalar(0.5);
+      continue;
+    }
+    x += step_x;
+    y += step_y;
+    error_sq = candidate_error_sq;
+    const Scalar inv_determinant = Scalar(1) / (d.xx * d.yy - d.xy * d.xy);
+    step_x = (d.yy * ex - d.xy * ey) * inv_determinant;
+    step_y = (d.xx * ey - d.xy * ex) * inv_determinant;
+  }
+  if (!(error_sq <= enough_sq)) return false;
+  ray = {x, y, Scalar(1)};
+  return true;
+}
+
+}  // namespace CFP_ISA
 }  // namespace detail
 
 /// With x, y = X/Z, Y/Z and s = x^2 + y^2:
@@ -58,18 +123,18 @@ struct RadialTangentialCamera {
 
   /// The same camera without its distortion: where the pixels of an undistorted image belong, as epipolar lines need
   /// them.
-  [[nodiscard]] PinholeCamera<Scalar> pinhole() const noexcept { return {fx, fy, cx, cy}; }
+  [[nodiscard]] CFP_INLINE PinholeCamera<Scalar> pinhole() const noexcept { return {fx, fy, cx, cy}; }
 
   /// Projects a point of the camera frame. Returns whether the projection is valid: z > Tolerance::min_depth, before
   /// the fold, a finite pixel; otherwise pixel and jacobian are left as they were. jacobian: d pixel / d point.
-  bool project(const Vector3<Scalar>& point, Vector2<Scalar>& pixel,
-               Matrix23<Scalar>* jacobian = nullptr) const noexcept {
+  [[nodiscard]] CFP_INLINE bool project(const Vector3<Scalar>& point, Vector2<Scalar>& pixel,
+                                        Matrix23<Scalar>* jacobian = nullptr) const noexcept {
     if (!(point.z() > Scalar(Tolerance<Scalar>::min_depth))) return false;
     const Scalar inv_z = Scalar(1) / point.z();
     const Scalar x = point.x() * inv_z;
     const Scalar y = point.y() * inv_z;
-    Distorted d;
-    if (!distort(x, y, d)) return false;
+    detail::DistortedPoint<Scalar> d;
+    if (!detail::distort(*this, x, y, d)) return false;
     const Scalar u = fx * d.x + cx;
     const Scalar v = fy * d.y + cy;
     if (!is_finite(u) || !is_finite(v)) return false;
@@ -92,57 +157,14 @@ struct RadialTangentialCamera {
   /// The ray through a pixel, scaled to z = 1, by Newton's method from the axis with step halving. False, and ray
   /// untouched, when no ray before the fold gives the pixel, or anything is not finite. At most 40 evaluations of the
   /// model.
-  bool unproject(const Vector2<Scalar>& pixel, Vector3<Scalar>& ray) const noexcept {
-    const Scalar target_x = (pixel.x() - cx) / fx;
-    const Scalar target_y = (pixel.y() - cy) / fy;
-    Scalar error_sq = target_x * target_x + target_y * target_y;
-    if (!is_finite(error_sq)) return false;
-    const Scalar unit_roundoff(std::numeric_limits<Scalar>::epsilon());
-    const Scalar enough_sq = Scalar(256) * unit_roundoff * unit_roundoff * (Scalar(1) + error_sq);
-    // On the axis the distortion is 0 and its Jacobian the identity: the first step is the target itself.
-    Scalar x(0), y(0), step_x = target_x, step_y = target_y;
-    for (int evaluation = 0; evaluation < 40 && !(error_sq <= enough_sq); ++evaluation) {
-      Distorted d;
-      const bool valid = distort(x + step_x, y + step_y, d);
-      const Scalar ex = target_x - d.x;
-      const Scalar ey = target_y - d.y;
-      const Scalar candidate_error_sq = ex * ex + ey * ey;
-      if (!valid || !(candidate_error_sq < error_sq)) {
-        step_x *= Scalar(0.5);
-        step_y *= Scalar(0.5);
-        continue;
-      }
-      x += step_x;
-      y += step_y;
-      error_sq = candidate_error_sq;
-      const Scalar inv_determinant = Scalar(1) / (d.xx * d.yy - d.xy * d.xy);
-      step_x = (d.yy * ex - d.xy * ey) * inv_determinant;
-      step_y = (d.xx * ey - d.xy * ex) * inv_determinant;
-    }
-    if (!(error_sq <= enough_sq)) return false;
-    ray = Vector3<Scalar>(x, y, Scalar(1));
-    return true;
+  [[nodiscard]] CFP_INLINE bool unproject(const Vector2<Scalar>& pixel, Vector3<Scalar>& ray) const noexcept {
+    return detail::find_ray(*this, pixel, ray);
   }
 
- private:
-  /// The distorted point and the (symmetric) Jacobian of the distortion.
-  struct Distorted {
-    Scalar x{}, y{}, xx{}, xy{}, yy{};
-  };
-
-  /// Distorts the point (x, y) of the plane z = 1; false beyond the fold or when not finite.
-  bool distort(const Scalar& x, const Scalar& y, Distorted& d) const noexcept {
-    const Scalar s = x * x + y * y;
-    const Scalar radial = Scalar(1) + s * (k1 + s * (k2 + s * k3));
-    const Scalar twice_slope =
-        Scalar(2) * (k1 + s * (Scalar(2) * k2 + s * Scalar(3) * k3));  // of `radial` along x is x times this
-    d.x = x * radial + Scalar(2) * p1 * x * y + p2 * (s + Scalar(2) * x * x);
-    d.y = y * radial + p1 * (s + Scalar(2) * y * y) + Scalar(2) * p2 * x * y;
-    d.xx = radial + x * x * twice_slope + Scalar(2) * p1 * y + Scalar(6) * p2 * x;
-    d.xy = x * y * twice_slope + Scalar(2) * p1 * x + Scalar(2) * p2 * y;
-    d.yy = radial + y * y * twice_slope + Scalar(6) * p1 * y + Scalar(2) * p2 * x;
-    return is_finite(d.x) && is_finite(d.y) && d.xx * d.yy - d.xy * d.xy > Scalar(0) &&
-           detail::stays_positive(Scalar(3) * k1, Scalar(5) * k2, Scalar(7) * k3, s);
+  template <typename Other>
+  [[nodiscard]] CFP_INLINE RadialTangentialCamera<Other> cast() const noexcept {
+    const auto to = [](const Scalar& x) { return static_cast<Other>(x); };
+    return {to(fx), to(fy), to(cx), to(cy), to(k1), to(k2), to(p1), to(p2), to(k3)};
   }
 };
 

@@ -17,18 +17,21 @@
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/distance.hpp"
 #include "cfp/math/se3.hpp"
-#include "cfp/simd/chunk.hpp"
 
 namespace cfp {
 
 namespace detail {
+inline namespace CFP_ISA {
 /// Largest depth that is back-projected: beyond it a moved point may overflow, which would project to a wrong but
 /// finite pixel.
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar max_reprojected_depth() noexcept {
   return Scalar(1e-6) * (std::numeric_limits<Scalar>::max)();
 }
+}  // namespace CFP_ISA
 }  // namespace detail
+
+inline namespace CFP_ISA {
 
 /// d_T = || pixel_cur - project(T_cur_prev * depth_prev * ray(pixel_prev)) ||, depth along z in metres.
 template <typename Camera, typename Scalar>
@@ -60,39 +63,28 @@ void reprojection_distances(const Camera& camera, const SE3<typename Camera::Sca
     out[i] = reprojection_distance(camera, T_cur_prev, prev[i], depth_prev[i], cur[i]);
 }
 
-/// The same for the pinhole camera, vectorised. Equal to the scalar function up to rounding; the result of a keypoint
-/// does not depend on its place in the arrays.
+/// The same for the pinhole camera, by a third of the operations. Equal to the scalar function up to rounding.
 template <typename Scalar>
 void reprojection_distances(const PinholeCamera<Scalar>& camera, const SE3<non_deduced<Scalar>>& T_cur_prev,
                             const PointSpan<non_deduced<Scalar>, 2>& prev, span<const non_deduced<Scalar>> depth_prev,
                             const PointSpan<non_deduced<Scalar>, 2>& cur, span<non_deduced<Scalar>> out) noexcept {
   CFP_ASSERT(prev.size() == out.size() && depth_prev.size() == out.size() && cur.size() == out.size());
-  const Matrix3<Scalar> R = T_cur_prev.rotation;
-  const Vector3<Scalar> t = T_cur_prev.translation;
-  const Scalar inv_fx = Scalar(1) / camera.fx;
-  const Scalar inv_fy = Scalar(1) / camera.fy;
-  const Scalar largest = (std::numeric_limits<Scalar>::max)();
-  using Chunk = detail::Chunk<Scalar>;
-  detail::for_each_chunk(out.size(), [&](std::size_t first, std::size_t count) {
-    Chunk u_prev, v_prev, u, v, depth;
-    detail::load_chunk(prev, first, count, u_prev, v_prev);
-    detail::load_chunk(cur, first, count, u, v);
-    detail::load_chunk(depth_prev, first, count, depth);
-    const Chunk x = (u_prev - camera.cx) * inv_fx;
-    const Chunk y = (v_prev - camera.cy) * inv_fy;
-    const Chunk z = depth * (R(2, 0) * x + R(2, 1) * y + R(2, 2)) + t.z();
-    const Chunk inv_z = z.inverse();
-    const Chunk du = camera.fx * ((depth * (R(0, 0) * x + R(0, 1) * y + R(0, 2)) + t.x()) * inv_z) + (camera.cx - u);
-    const Chunk dv = camera.fy * ((depth * (R(1, 0) * x + R(1, 1) * y + R(1, 2)) + t.y()) * inv_z) + (camera.cy - v);
-    Chunk distance = (du * du + dv * dv).sqrt();
-    for (Eigen::Index i = 0; i < distance.size(); ++i) {
-      Scalar d = distance[i] <= largest ? distance[i] : no_distance<Scalar>;
-      d = z[i] > Tolerance<Scalar>::min_depth ? d : no_distance<Scalar>;
-      d = depth[i] > Scalar(0) ? d : no_distance<Scalar>;
-      distance[i] = depth[i] <= detail::max_reprojected_depth<Scalar>() ? d : no_distance<Scalar>;
-    }
-    detail::store_chunk(distance, first, count, out);
-  });
+  const Matrix3<Scalar>& R = T_cur_prev.rotation;
+  const Vector3<Scalar>& t = T_cur_prev.translation;
+  const Scalar inv_fx = Scalar(1) / camera.fx, inv_fy = Scalar(1) / camera.fy;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const Scalar x = (prev(i, 0) - camera.cx) * inv_fx, y = (prev(i, 1) - camera.cy) * inv_fy, depth = depth_prev[i];
+    const Scalar z = depth * (R(2, 0) * x + R(2, 1) * y + R(2, 2)) + t[2];
+    const Scalar inv_z = Scalar(1) / z;
+    const Scalar u = camera.fx * ((depth * (R(0, 0) * x + R(0, 1) * y + R(0, 2)) + t[0]) * inv_z);
+    const Scalar v = camera.fy * ((depth * (R(1, 0) * x + R(1, 1) * y + R(1, 2)) + t[1]) * inv_z);
+    const Scalar du = u + (camera.cx - cur(i, 0)), dv = v + (camera.cy - cur(i, 1));
+    const Scalar distance = std::sqrt(du * du + dv * dv);
+    const bool valid = depth > Scalar(0) && depth <= detail::max_reprojected_depth<Scalar>() &&
+                       z > Tolerance<Scalar>::min_depth && has_distance(distance);
+    out[i] = valid ? distance : no_distance<Scalar>;
+  }
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

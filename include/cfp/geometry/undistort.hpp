@@ -12,6 +12,7 @@
 #include "cfp/geometry/camera.hpp"
 
 namespace cfp {
+inline namespace CFP_ISA {
 
 /// The pinhole camera of a camera's undistorted image: focal lengths and principal point of its projection at the
 /// optical axis. A pinhole camera gives itself. All zero (every unprojection invalid) for a camera that cannot project
@@ -29,9 +30,9 @@ template <typename Camera>
 /// The pixel of `camera` in its undistorted image, that of `pinhole` = undistorted_camera(camera). False, and
 /// undistorted untouched, where the pixel has no ray.
 template <typename Camera>
-bool undistort(const Camera& camera, const PinholeCamera<typename Camera::ScalarType>& pinhole,
-               const Vector2<typename Camera::ScalarType>& pixel,
-               Vector2<typename Camera::ScalarType>& undistorted) noexcept {
+[[nodiscard]] bool undistort(const Camera& camera, const PinholeCamera<typename Camera::ScalarType>& pinhole,
+                             const Vector2<typename Camera::ScalarType>& pixel,
+                             Vector2<typename Camera::ScalarType>& undistorted) noexcept {
   Vector3<typename Camera::ScalarType> ray;
   return camera.unproject(pixel, ray) && pinhole.project(ray, undistorted);
 }
@@ -40,7 +41,7 @@ bool undistort(const Camera& camera, const PinholeCamera<typename Camera::Scalar
 /// camera's points are their own, and storage is not touched. A pixel without a ray becomes NaN, which no distance
 /// accepts. Allocates only to grow storage.
 template <typename Camera>
-PointSpan<typename Camera::ScalarType, 2> undistorted(
+[[nodiscard]] PointSpan<typename Camera::ScalarType, 2> undistorted(
     const Camera& camera, const PointSpan<typename Camera::ScalarType, 2>& points,
     std::vector<std::array<typename Camera::ScalarType, 2>>& storage) {
   using Scalar = typename Camera::ScalarType;
@@ -50,12 +51,13 @@ PointSpan<typename Camera::ScalarType, 2> undistorted(
     const PinholeCamera<Scalar> pinhole = undistorted_camera(camera);
     storage.resize(points.size());
     for (std::size_t i = 0; i < points.size(); ++i) {
-      Vector2<Scalar> pixel = Vector2<Scalar>::Constant(std::numeric_limits<Scalar>::quiet_NaN());
-      undistort(camera, pinhole, points[i], pixel);
+      Vector2<Scalar> pixel;
+      if (!undistort(camera, pinhole, points[i], pixel)) pixel.setConstant(std::numeric_limits<Scalar>::quiet_NaN());
       storage[i] = {pixel.x(), pixel.y()};
     }
     return PointSpan<Scalar, 2>(storage);
   }
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

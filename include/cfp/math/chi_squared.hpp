@@ -13,11 +13,10 @@
 #include <type_traits>
 
 #include "cfp/core/numeric.hpp"
-#include "cfp/core/span.hpp"
 #include "cfp/math/chi_squared_impl.hpp"
-#include "cfp/simd/chunk.hpp"
 
 namespace cfp {
+inline namespace CFP_ISA {
 
 /// x^(k/2-1) exp(-x/2) / (2^(k/2) Γ(k/2)). 0 for x < 0; at x = 0 the limit from the right: 0 for k > 2, 1/2 for k = 2,
 /// and for k < 2, where it is infinite, the largest finite number, which is also the cap for tiny x.
@@ -58,21 +57,5 @@ template <typename Scalar>
   return k < 2 ? std::numeric_limits<double>::infinity() : chi_squared_density(k - 2, k);
 }
 
-/// The survival function of every element; `out` may be the same memory as `x`. Vectorised for k = 2, equal to the
-/// scalar function up to a few roundings (absolutely, not relatively, for x > 1400 in double and x > 170 in float).
-template <typename Scalar>
-void chi_squared_survival(span<const Scalar> x, double k, span<Scalar> out) noexcept {
-  CFP_ASSERT(x.size() == out.size());
-  if (k == 2) return detail::half_exponential(x, Scalar(1), Scalar(1), out);
-  for (std::size_t i = 0; i < x.size(); ++i) out[i] = chi_squared_survival(x[i], k);
-}
-
-/// The density of every element; `out` may be the same memory as `x`. Vectorised for k = 2, as above.
-template <typename Scalar>
-void chi_squared_density(span<const Scalar> x, double k, span<Scalar> out) noexcept {
-  CFP_ASSERT(x.size() == out.size());
-  if (k == 2) return detail::half_exponential(x, Scalar(0.5), Scalar(0), out);
-  for (std::size_t i = 0; i < x.size(); ++i) out[i] = chi_squared_density(x[i], k);
-}
-
+}  // namespace CFP_ISA
 }  // namespace cfp

@@ -5,15 +5,12 @@
 #pragma once
 
 #include <cmath>
-#include <cstddef>
 #include <type_traits>
 
 #include "cfp/core/numeric.hpp"
-#include "cfp/core/span.hpp"
-#include "cfp/math/exponential.hpp"
-#include "cfp/simd/chunk.hpp"
 
 namespace cfp::detail {
+inline namespace CFP_ISA {
 
 template <typename Scalar>
 using at_least_double = std::conditional_t<std::is_same_v<Scalar, float>, double, Scalar>;
@@ -120,22 +117,5 @@ template <typename T>
   return y * density * h;
 }
 
-/// factor * exp(-x/2), `below` for x < 0, 0 for NaN, element by element.
-template <typename Scalar>
-void half_exponential(span<const Scalar> x, Scalar factor, Scalar below, span<Scalar> out) noexcept {
-  for_each_chunk(x.size(), [&](std::size_t first, std::size_t count) {
-    using P = Packet<Scalar>;
-    using std::abs;
-    Chunk<Scalar> values, result;
-    load_chunk(x, first, count, values);
-    map_chunk(
-        result, [](const P& v) { return P(Scalar(-0.5)) * abs(v); }, values);
-    const Chunk<Scalar> tail = exponential_of_nonpositive(result);
-    map_chunk(
-        result, [&](const P& v, const P& t) { return select(v < P(Scalar(0)), P(below), P(factor) * t); }, values,
-        tail);
-    store_chunk(result, first, count, out);
-  });
-}
-
+}  // namespace CFP_ISA
 }  // namespace cfp::detail

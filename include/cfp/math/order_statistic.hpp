@@ -2,8 +2,8 @@
 /// Order statistics in linear time: the quantiles at 0.1, 0.2, 0.3 of the object probability (paper section IV-B) and
 /// the adaptive threshold of the constraints (section IV-D). Exact: the result is one of the given values.
 ///
-/// The values must not contain NaN: callers filter (a NaN here does not crash, but takes part as a very large or very
-/// small number). Infinite and negative values are fine.
+/// The values must not contain NaN: callers filter (a NaN here does not crash, but the result may be any of the
+/// values). Infinite and negative values are fine.
 #pragma once
 
 #include <algorithm>
@@ -13,11 +13,54 @@
 #include <limits>
 
 #include "cfp/core/assert.hpp"
-#include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
-#include "cfp/math/order_statistic_impl.hpp"
 
 namespace cfp {
+
+namespace detail {
+inline namespace CFP_ISA {
+
+// Moves the values that `goes_first` accepts to the front and returns their number, without a branch to mispredict.
+template <typename Scalar, typename Predicate>
+std::size_t branchless_partition(Scalar* values, std::size_t n, const Predicate& goes_first) noexcept {
+  std::size_t front = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const Scalar value = values[i];
+    values[i] = values[front];
+    values[front] = value;
+    front += goes_first(value) ? 1U : 0U;
+  }
+  return front;
+}
+
+// Hoare's quickselect: values[rank] becomes what sorting would put there, with nothing larger before it. Partitions
+// without branches make it several times as fast as std::nth_element.
+template <typename Scalar>
+void select_rank(Scalar* values, std::size_t n, std::size_t rank) noexcept {
+  constexpr std::size_t few = 16;
+  constexpr int max_rounds = 64;  // a heap finishes what so many pivots did not
+  for (int round = 0; n > few && round < max_rounds; ++round) {
+    const Scalar a = values[0], b = values[n / 2], c = values[n - 1];
+    const Scalar pivot = (std::max)((std::min)(a, b), (std::min)((std::max)(a, b), c));
+    const std::size_t below = branchless_partition(values, n, [pivot](Scalar x) { return x < pivot; });
+    if (rank < below) {
+      n = below;
+      continue;
+    }
+    const std::size_t up_to =
+        below + branchless_partition(values + below, n - below, [pivot](Scalar x) { return x <= pivot; });
+    if (rank < up_to) return;
+    values += up_to;
+    rank -= up_to;
+    n -= up_to;
+  }
+  std::partial_sort(values, values + rank + 1, values + n);
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
+
+inline namespace CFP_ISA {
 
 /// 1-based position of the q-quantile among n ascending values: ceil(q n), at least 1 and at most n; 0 for n = 0. A
 /// product that exceeds a whole number by its rounding error alone counts as that number: quantile_rank(0.1, 30) is 3,
@@ -30,46 +73,31 @@ namespace cfp {
   return position < size ? static_cast<std::size_t>(position) : n;
 }
 
-/// The smallest value; 0 for none.
+/// The value at 0-based position rank0 of the ascending order (0: the smallest). Reorders `values`. 0 without values; a
+/// rank beyond the end counts as the last. Linear time, allocates nothing.
 template <typename Scalar>
-[[nodiscard]] Scalar minimum(span<const Scalar> values) noexcept {
-  return values.empty() ? Scalar(0) : detail::value_range(values.data(), values.size()).smallest;
-}
-template <typename Scalar>
-[[nodiscard]] Scalar minimum(span<Scalar> values) noexcept {
-  return minimum(span<const Scalar>(values));
-}
-
-/// The value at 0-based position rank0 of the ascending order (0: the smallest). Overwrites `scratch`: afterwards its
-/// content is unspecified. 0 for an empty span; a rank beyond the end counts as the last.
-///
-/// A histogram over the bit patterns, ordered as the numbers are, narrows the candidates to those of one of 256
-/// buckets, again and again until few are left, which are compared with each other: linear for any distribution (at
-/// most 5 rounds for float, 10 for double), without the branch misses that make up most of std::nth_element's time.
-/// Allocates nothing.
-template <typename Scalar>
-[[nodiscard]] Scalar order_statistic(span<Scalar> scratch, std::size_t rank0) noexcept {
-  CFP_ASSERT(rank0 < scratch.size());
-  if (scratch.empty()) return Scalar(0);
-  const std::size_t n = scratch.size();
-  return detail::select_one(scratch.data(), n, (std::min)(rank0, n - 1), detail::value_range(scratch.data(), n));
+[[nodiscard]] Scalar order_statistic(span<Scalar> values, std::size_t rank0) noexcept {
+  if (values.empty()) return Scalar(0);
+  rank0 = (std::min)(rank0, values.size() - 1);
+  detail::select_rank(values.data(), values.size(), rank0);
+  return values[rank0];
 }
 
-/// The values at the quantile ranks of `quantiles` (ascending), as {0.1, 0.2, 0.3}, with one pass over the data for
-/// all. Overwrites `scratch`. All 0 for an empty span.
+/// The values at the quantile ranks of `quantiles` (ascending), as {0.1, 0.2, 0.3}. Reorders `values`. All 0 without
+/// values.
 template <typename Scalar, std::size_t Count>
-[[nodiscard]] std::array<Scalar, Count> select_quantiles(span<Scalar> scratch,
+[[nodiscard]] std::array<Scalar, Count> select_quantiles(span<Scalar> values,
                                                          const std::array<double, Count>& quantiles) noexcept {
-  static_assert(Count > 0, "at least one quantile");
-  std::array<Scalar, Count> values{};
-  if (scratch.empty()) return values;
-  std::array<std::size_t, Count> ranks{};
-  for (std::size_t i = 0; i < Count; ++i) {
-    ranks[i] = quantile_rank(quantiles[i], scratch.size()) - 1;
-    CFP_ASSERT(i == 0 || ranks[i - 1] <= ranks[i]);
+  const std::size_t n = values.size();
+  std::array<Scalar, Count> selected{};
+  for (std::size_t i = Count; i-- > 0 && n > 0;) {
+    const std::size_t rank0 = quantile_rank(quantiles[i], n) - 1;
+    CFP_ASSERT(rank0 < values.size());
+    selected[i] = order_statistic(values, rank0);
+    values = values.subspan(0, rank0 + 1);  // nothing larger stands before it
   }
-  detail::select_many(scratch.data(), scratch.size(), ranks, values);
-  return values;
+  return selected;
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

@@ -16,18 +16,39 @@ struct SE3 {
   Matrix3<Scalar> rotation = Matrix3<Scalar>::Identity();
   Vector3<Scalar> translation = Vector3<Scalar>::Zero();
 
-  [[nodiscard]] Vector3<Scalar> operator*(const Vector3<Scalar>& point) const noexcept {
+  /// From the upper three rows of a homogeneous matrix.
+  [[nodiscard]] CFP_INLINE static SE3 from_matrix(const Matrix4<Scalar>& T) noexcept {
+    return {T.template topLeftCorner<3, 3>(), T.template topRightCorner<3, 1>()};
+  }
+  /// From a quaternion (x, y, z, w), as Eigen::Quaternion::coeffs() and TUM trajectories have it; any length but 0.
+  [[nodiscard]] CFP_INLINE static SE3 from_quaternion(const Vector4<Scalar>& q,
+                                                      const Vector3<Scalar>& translation) noexcept {
+    return {so3_from_quaternion(q), translation};
+  }
+
+  [[nodiscard]] CFP_INLINE Vector3<Scalar> operator*(const Vector3<Scalar>& point) const noexcept {
     return rotation * point + translation;
   }
-  [[nodiscard]] SE3 operator*(const SE3& other) const noexcept {
+  [[nodiscard]] CFP_INLINE SE3 operator*(const SE3& other) const noexcept {
     return {rotation * other.rotation, rotation * other.translation + translation};
   }
-  [[nodiscard]] SE3 inverse() const noexcept { return {rotation.transpose(), -(rotation.transpose() * translation)}; }
+  [[nodiscard]] CFP_INLINE SE3 inverse() const noexcept {
+    return {rotation.transpose(), -(rotation.transpose() * translation)};
+  }
+  /// The homogeneous matrix [R t; 0 1].
+  [[nodiscard]] CFP_INLINE Matrix4<Scalar> matrix() const noexcept {
+    Matrix4<Scalar> T = Matrix4<Scalar>::Identity();
+    T.template topLeftCorner<3, 3>() = rotation;
+    T.template topRightCorner<3, 1>() = translation;
+    return T;
+  }
   template <typename Other>
-  [[nodiscard]] SE3<Other> cast() const noexcept {
+  [[nodiscard]] CFP_INLINE SE3<Other> cast() const noexcept {
     return {rotation.template cast<Other>(), translation.template cast<Other>()};
   }
 };
+
+inline namespace CFP_ISA {
 
 /// exp((rho, w)) = (exp(w), J_l(w) rho).
 template <typename Scalar>
@@ -56,4 +77,5 @@ template <typename Scalar>
   return A;
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

@@ -1,18 +1,18 @@
 /// @file so3.hpp
-/// Rotations: hat, exponential, logarithm, left Jacobian. A rotation is a plain 3x3 matrix (no alignment demands: public structs have
-/// one layout under all vector flags); rotation vectors are in radians.
+/// Rotations: hat, exponential, logarithm, left Jacobian. A rotation is a plain 3x3 matrix (no alignment demands:
+/// public structs have one layout under all vector flags); rotation vectors are in radians.
 /// Source: Sola, Deray, Atchuthan: "A micro Lie theory for state estimation in robotics", 2018, eqs. (69), (132)-(145).
 #pragma once
 
 #include <cmath>
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/types.hpp"
 
 namespace cfp {
+inline namespace CFP_ISA {
 
 /// The skew-symmetric matrix with hat(a) b = a x b.
 template <typename Scalar>
@@ -29,7 +29,7 @@ template <typename Scalar>
 
 /// exp: rotation vector (axis times angle, rad) to rotation matrix: I + a hat(w) + b hat(w)^2 with
 /// a = sin(t)/t, b = (1 - cos t)/t^2, t = |w|; Taylor expansion below Tolerance::small_angle. Never divides by zero.
-template <typename Scalar>
+template <typename Scalar = double>
 [[nodiscard]] Matrix3<Scalar> so3_exp(const Vector3<Scalar>& w) noexcept {
   using std::cos;
   using std::sin;
@@ -52,6 +52,48 @@ template <typename Scalar>
   return R;
 }
 
+template <typename Derived, typename = typename Derived::PlainObject>
+[[nodiscard]] auto so3_exp(const Eigen::MatrixBase<Derived>& w) noexcept {
+  return so3_exp(Vector3<typename Derived::Scalar>(w));
+}
+
+/// The rotation matrix of the quaternion q = (x, y, z, w) over its length, in the order of Eigen's coefficients and of
+/// TUM trajectories. Not finite for a zero quaternion.
+template <typename Scalar>
+[[nodiscard]] Matrix3<Scalar> so3_from_quaternion(const Vector4<Scalar>& q) noexcept {
+  const Vector3<Scalar> v = q.template head<3>();
+  const Scalar twice = Scalar(2) / q.squaredNorm();
+  const Matrix3<Scalar> V = hat(v);
+  Matrix3<Scalar> R = (twice * q[3]) * V;
+  R.noalias() += twice * (V * V);
+  R.diagonal().array() += Scalar(1);
+  return R;
+}
+
+/// A quaternion (x, y, z, w) with w >= 0 of the rotation R, of unit length up to the error of R.
+template <typename Scalar>
+[[nodiscard]] Vector4<Scalar> quaternion(const Matrix3<Scalar>& R) noexcept {
+  using std::sqrt;
+  Vector4<Scalar> q;
+  // The largest of the four numbers is computed from the diagonal, the others by division by it (Shepperd 1978).
+  Eigen::Index i = 3;
+  if (!(R.trace() > Scalar(0))) i = R(1, 1) > R(0, 0) ? (R(2, 2) > R(1, 1) ? 2 : 1) : (R(2, 2) > R(0, 0) ? 2 : 0);
+  if (i == 3) {
+    q[3] = Scalar(0.5) * sqrt(R.trace() + Scalar(1));
+    const Scalar scale = Scalar(0.25) / q[3];
+    for (Eigen::Index j = 0; j < 3; ++j) q[j] = scale * (R((j + 2) % 3, (j + 1) % 3) - R((j + 1) % 3, (j + 2) % 3));
+    return q;
+  }
+  const Eigen::Index j = (i + 1) % 3, k = (i + 2) % 3;
+  q[i] = Scalar(0.5) * sqrt(R(i, i) - R(j, j) - R(k, k) + Scalar(1));
+  const Scalar scale = Scalar(0.25) / q[i];
+  q[j] = scale * (R(j, i) + R(i, j));
+  q[k] = scale * (R(k, i) + R(i, k));
+  q[3] = scale * (R(k, j) - R(j, k));
+  if (q[3] < Scalar(0)) q = -q;
+  return q;
+}
+
 /// log: rotation matrix to rotation vector with angle in [0, pi] (at pi one of the two axes). Goes through the
 /// quaternion, so it is exact near 0 and near pi; a matrix that is not quite a rotation gives the vector of a nearby
 /// one.
@@ -59,15 +101,14 @@ template <typename Scalar>
 [[nodiscard]] Vector3<Scalar> so3_log(const Matrix3<Scalar>& R) noexcept {
   using std::atan2;
   using std::sqrt;
-  Eigen::Quaternion<Scalar> q(R);
-  if (q.w() < Scalar(0)) q.coeffs() = -q.coeffs();
-  const Vector3<Scalar> v = q.vec();
+  const Vector4<Scalar> q = quaternion(R);
+  const Vector3<Scalar> v = q.template head<3>();
   const Scalar n2 = v.squaredNorm();
   if (n2 > Scalar(Tolerance<Scalar>::small_angle) * Scalar(Tolerance<Scalar>::small_angle)) {
     const Scalar n = sqrt(n2);
-    return (Scalar(2) * atan2(n, q.w()) / n) * v;
+    return (Scalar(2) * atan2(n, q[3]) / n) * v;
   }
-  const Scalar inv_w = Scalar(1) / q.w();
+  const Scalar inv_w = Scalar(1) / q[3];
   return (Scalar(2) * inv_w - Scalar(2) / Scalar(3) * n2 * inv_w * inv_w * inv_w) * v;
 }
 
@@ -122,7 +163,8 @@ template <typename Scalar>
 /// the drift that products of many rotations collect.
 template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> normalized_rotation(const Matrix3<Scalar>& R) noexcept {
-  return Eigen::Quaternion<Scalar>(R).normalized().toRotationMatrix();
+  return so3_from_quaternion(quaternion(R));
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

@@ -6,6 +6,7 @@
 #include "cfp/core/numeric.hpp"
 
 namespace cfp {
+inline namespace CFP_ISA {
 
 /// Whether an object counts as high dynamic: O <= O_Th (paper IV-B; O_Th = 0.9). NaN counts as high dynamic.
 template <typename Scalar>
@@ -38,4 +39,5 @@ template <typename Scalar>
   return clamp_probability(o * background_factor(o, o, object_threshold));
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

@@ -1,6 +1,6 @@
 /// @file map_point.hpp
 /// Static probability M of a map point over time, and the weight that a keypoint and its map point give an observation
-/// (paper section IV-D). The paper only says "is updated"; the policies are ours (MODEL.md section 4).
+/// (paper section IV-D). The paper only says "is updated"; the policies are ours.
 #pragma once
 
 #include <cmath>
@@ -17,32 +17,38 @@ enum class MapPointPolicy : std::uint8_t {
   copy  ///< K, the simplest reading of the paper: a static in-box point has P(K < 0.3) ~ 0.25 in each frame
 };
 
-enum class WeightRule : std::uint8_t { product, minimum, mean };
+enum class WeightRule : std::uint8_t { product, minimum };
 
 struct MapPointOptions {
   /// At the same number of frames until a moving point is deleted, log_odds deletes 5 to 15 times fewer static points
   /// than the exponential mean, and its M is nearer to the truth (benchmarks/studies/map_point_study).
   MapPointPolicy policy = MapPointPolicy::log_odds;
   double rate = 0.2;                ///< weight of the new K against M, in (0, 1]; the same study
-  double evidence_limit = 0.02;     ///< log_odds only: K and M are kept in [limit, 1 - limit], in (0, 0.5)
+  double evidence_limit = 0.02;     ///< log_odds only: K and M are kept in [limit, 1 - limit], in [1e-4, 0.5)
   double deletion_threshold = 0.3;  ///< a map point with M below it is to be deleted (paper), in [0, 1]
   double mismatch_threshold =
       0.5;  ///< |K - M| above it: keypoint and map point are mismatched (no value in the paper), in (0, 1]
   WeightRule weight = WeightRule::product;  ///< how K and M give one weight (paper: "as weights")
 };
 
+inline namespace CFP_ISA {
+
 [[nodiscard]] inline OptionPath invalid_field(const MapPointOptions& o) noexcept {
   if (!(o.rate > 0 && o.rate <= 1)) return "rate";
-  if (!(o.evidence_limit > 0 && o.evidence_limit < 0.5)) return "evidence_limit";
+  // Nearer to 1 a float has too few numbers left: M would not move, or be NaN.
+  if (!(o.evidence_limit >= 1e-4 && o.evidence_limit < 0.5)) return "evidence_limit";
   if (!(o.deletion_threshold >= 0 && o.deletion_threshold <= 1)) return "deletion_threshold";
   if (!(o.mismatch_threshold > 0 && o.mismatch_threshold <= 1)) return "mismatch_threshold";
   return {};
 }
 
+}  // namespace CFP_ISA
+
 namespace detail {
+inline namespace CFP_ISA {
 
 template <typename Scalar>
-[[nodiscard]] Scalar log_odds_update(Scalar m, Scalar k, Scalar rate, Scalar limit) noexcept {
+[[nodiscard]] Scalar log_odds_update(Scalar k, Scalar m, Scalar rate, Scalar limit) noexcept {
   using std::exp;
   using std::log;
   const auto bounded = [limit](Scalar p) {
@@ -55,12 +61,15 @@ template <typename Scalar>
   return k > Scalar(1) - limit && updated < m ? m : updated;
 }
 
+}  // namespace CFP_ISA
 }  // namespace detail
+
+inline namespace CFP_ISA {
 
 /// M after the keypoint's second-stage K: see MapPointPolicy. In [0, 1], non-decreasing in both arguments; with the
 /// exponential mean, K = M is a fixed point. A K or M that is NaN counts as 0.
 template <typename Scalar>
-[[nodiscard]] Scalar updated_map_point(Scalar map_point_probability, Scalar keypoint_probability,
+[[nodiscard]] Scalar updated_map_point(Scalar keypoint_probability, Scalar map_point_probability,
                                        const MapPointOptions& options) noexcept {
   const Scalar m = clamp_probability(map_point_probability);
   const Scalar k = clamp_probability(keypoint_probability);
@@ -70,7 +79,7 @@ template <typename Scalar>
     case MapPointPolicy::exponential_mean:
       return clamp_probability(m + Scalar(options.rate) * (k - m));
     case MapPointPolicy::log_odds:
-      return detail::log_odds_update(m, k, Scalar(options.rate), Scalar(options.evidence_limit));
+      return detail::log_odds_update(k, m, Scalar(options.rate), Scalar(options.evidence_limit));
   }
   return m;
 }
@@ -105,7 +114,7 @@ template <typename Scalar>
   return !(difference <= Scalar(options.mismatch_threshold) && -difference <= Scalar(options.mismatch_threshold));
 }
 
-/// The weight of the observation in the first-stage pose: K M, min(K, M) or their mean; in [0, 1], NaN counts as 0. The
+/// The weight of the observation in the first-stage pose: K M or min(K, M); in [0, 1], NaN counts as 0. The
 /// mismatch rule is not part of it: in the first stage K is coarse, a foreground point's 0 says nothing of its match.
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar observation_weight(Scalar keypoint_probability, Scalar map_point_probability,
@@ -117,10 +126,9 @@ template <typename Scalar>
       return k * m;
     case WeightRule::minimum:
       return k < m ? k : m;
-    case WeightRule::mean:
-      return Scalar(0.5) * (k + m);
   }
   return Scalar(0);
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

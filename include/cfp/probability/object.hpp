@@ -43,6 +43,8 @@ struct ObjectProbabilityOptions {
   double unknown_object_probability = 0.5;
 };
 
+inline namespace CFP_ISA {
+
 [[nodiscard]] inline OptionPath invalid_field(const ObjectProbabilityOptions& o) noexcept {
   if (!detail::positive(o.degrees_of_freedom)) return "degrees_of_freedom";
   if (o.score == ObjectScore::normalized_density && o.degrees_of_freedom < 2) return "degrees_of_freedom";
@@ -55,12 +57,16 @@ struct ObjectProbabilityOptions {
   return {};
 }
 
+}  // namespace CFP_ISA
+
 /// The static probability of one object and where it comes from.
 struct ObjectProbability {
   double static_probability = 0;            ///< O in [0, 1]; unknown_object_probability when the status is not ok
   std::size_t pairs = 0;                    ///< usable pairs: finite, non-negative distances
   Status status = Status::not_enough_data;  ///< not_enough_data: O is unknown
 };
+
+inline namespace CFP_ISA {
 
 /// Score of one pair: f((d / sigma)^2; k) with f as `options.score` says (paper eqs. chsq and (O)_m). Non-increasing in
 /// |d|, except for densities with k > 2. In [0, 1]; NaN or an infinite distance scores 0. Allocates nothing.
@@ -85,23 +91,23 @@ template <typename Scalar>
 }
 
 /// O = mean of the ascending scores at the 1-based positions ceil(q M), q in `options.positions`, at least 1 (paper
-/// IV-B). Distances that are negative ("no distance") or not finite are left out; `scratch` needs room for all
+/// IV-B). Distances that are negative ("no distance") or not finite are left out; `workspace` needs room for all
 /// distances and is overwritten. Fewer than min_pairs usable distances: unknown, see ObjectProbability. O(M), allocates
 /// nothing.
-template <typename Scalar>
-[[nodiscard]] ObjectProbability object_probability(span<const Scalar> epipolar_distances_px, span<Scalar> scratch,
-                                                   const ObjectProbabilityOptions& options) noexcept {
-  CFP_ASSERT(scratch.size() >= epipolar_distances_px.size());
+template <typename Range, typename Scalar = range_value_t<Range>>
+[[nodiscard]] ObjectProbability object_probability(const Range& epipolar_distances_px,
+                                                   const ObjectProbabilityOptions& options,
+                                                   span<non_deduced<Scalar>> workspace) noexcept {
   ObjectProbability result;
   result.static_probability = options.unknown_object_probability;
-  const std::size_t n = copy_distances(epipolar_distances_px, scratch);
+  const std::size_t n = copy_distances(span<const Scalar>(epipolar_distances_px), workspace);
   result.pairs = n;
   if (n < (std::max)(options.min_pairs, std::size_t(1))) return result;
 
   // Where the score falls with the distance, the ascending order of the negated distances is that of the scores, and
   // only the three selected need one.
   const bool monotone = options.score == ObjectScore::survival || options.degrees_of_freedom <= 2;
-  const span<Scalar> values = scratch.subspan(0, n);
+  const span<Scalar> values = workspace.subspan(0, n);
   if (monotone) {
     for (Scalar& value : values) value = -value;
   } else {
@@ -116,4 +122,5 @@ template <typename Scalar>
   return result;
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

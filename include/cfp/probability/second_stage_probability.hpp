@@ -19,6 +19,8 @@ struct Evidence {
   bool available = false;  ///< false: no depth, behind the camera, translation below t_Th, constraint not fitted
 };
 
+inline namespace CFP_ISA {
+
 /// For O <= O_Th: K^T K^F, a point must satisfy both; with one constraint, that one's K (paper eq. for high-dynamic
 /// objects; K^F is unavailable for |t| <= t_Th). Neither: 0, nothing speaks for the point.
 template <typename Scalar>
@@ -44,6 +46,8 @@ template <typename Scalar>
   return clamp_probability(projection.static_probability * share + epipolar.static_probability * (Scalar(1) - share));
 }
 
+}  // namespace CFP_ISA
+
 /// All that the second stage needs to know of one keypoint inside a box.
 template <typename Scalar>
 struct SecondStageKeypoint {
@@ -55,6 +59,8 @@ struct SecondStageKeypoint {
   bool matched = false;                      ///< has a match in frame k-1
   bool box_associated = true;                ///< its box continues a box of frame k-1
 };
+
+inline namespace CFP_ISA {
 
 /// K after the second stage. In the paper's order:
 /// box not associated with one of frame k-1: foreground 0 (its matches are false), background by the rules below;
@@ -71,4 +77,5 @@ template <typename Scalar>
              : fuse_low_dynamic(keypoint.projection, keypoint.epipolar);
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

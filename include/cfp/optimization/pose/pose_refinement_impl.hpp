@@ -23,7 +23,7 @@ inline bool is_rigid_motion(const SE3<double>& T) noexcept {
   // A float rotation from a host is off by 1e-7 or, after many products, more; a scaled or mirrored matrix is a
   // mistake.
   return finite && (T.rotation.transpose() * T.rotation - Matrix3<double>::Identity()).cwiseAbs().maxCoeff() < 1e-2 &&
-         T.rotation.determinant() > 0;
+         determinant(T.rotation) > 0;
 }
 
 template <typename Camera>
