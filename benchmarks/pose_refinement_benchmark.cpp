@@ -103,7 +103,8 @@ Answer from_opencv(const cv::Mat& rvec, const cv::Mat& tvec) {
 std::vector<Method> methods(bool stereo) {
   const cfp::PoseOptions lean, orb = cfp::orb_slam2_pose_options();
   cfp::PoseOptions least_squares;
-  least_squares.rounds[0] = {cfp::LossType::trivial, 1, 20, 1e-6, false, false};
+  least_squares.rounds[0] = {cfp::LossType::trivial, 1};
+  least_squares.min_decrease = 1e-6;
   least_squares.round_count = 1;
   std::vector<Method> list;
   list.push_back(ours<double>("cfp double, ORB-SLAM2 schedule", orb, &Problem::d));
@@ -265,7 +266,7 @@ void contaminated(int people) {
     const auto host = [&](cfp::Stage, cfp::span<const double> weights) {
       const auto result = solve(weights);
       return cfp::PoseEstimate{result.T_cam_world, static_cast<std::size_t>(result.inliers),
-                               cfp::is_refined(result.reason)};
+                               cfp::is_solved(result.status)};
     };
     std::vector<cfp::Detection<double>> detections;
     for (const auto& box : scene.boxes) detections.push_back({box, 0, 0.8});

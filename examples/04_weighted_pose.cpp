@@ -47,6 +47,6 @@ int main() {
     const double error_mm = 1e3 * (result.T_cam_world.inverse().translation - truth.inverse().translation).norm();
     std::printf("%-8s camera centre off by %7.2f mm, %3d of %3d inliers, worth %5.1f observations, %d passes, %s\n",
                 weighted ? "weighted" : "plain", error_mm, result.inliers, result.used, result.effective,
-                result.evaluations, cfp::to_string(result.reason));
+                result.evaluations, cfp::to_string(result.status));
   }
 }

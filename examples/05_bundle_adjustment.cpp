@@ -103,7 +103,7 @@ int main(int argc, char** argv) {
   std::printf("RMS   %.6f px -> %.6f px\ncost  %.6f -> %.6f\n", before, rms(squared_errors), result.initial_cost,
               result.final_cost);
   std::printf("%d iterations (%d accepted), %s, %.2f ms\n", result.iterations, result.accepted,
-              to_string(result.reason), time.count());
+              to_string(result.status), time.count());
   std::printf("observations: %zu used, %zu behind a camera, %zu invalid\n", result.used, result.behind, result.invalid);
   return 0;
 }

@@ -96,7 +96,7 @@ class PoseSolver {
     observations.depths = depths_;
     observations.baseline_fx = 40;  // ORB-SLAM2's Camera.bf for this sensor
     const cfp::PoseResult result = cfp::refine_pose(observations, camera_, start_, cfp::PoseOptions{}, workspace_);
-    if (!cfp::is_refined(result.reason)) return {};
+    if (!cfp::is_solved(result.status)) return {};
     start_ = result.T_cam_world;
     return {result.T_cam_world, static_cast<std::size_t>(result.inliers), true};
   }

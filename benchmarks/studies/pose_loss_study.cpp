@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <initializer_list>
 #include <vector>
 
 #include "../../tests/support/pose_scene.hpp"
@@ -22,47 +23,65 @@ struct Schedule {
   cfp::PoseOptions options;
 };
 
-Schedule two_rounds(const char* name, double first_mean_decrease, cfp::LossType loss, double scale,
-                    double last_decrease = 1e-2) {
+cfp::PoseOptions with_rounds(std::initializer_list<cfp::PoseRound> rounds) {
   cfp::PoseOptions options;
-  options.rounds[0].min_mean_decrease = first_mean_decrease;
-  options.rounds[1].loss = loss;
-  options.rounds[1].scale = scale;
-  options.rounds[1].min_decrease = last_decrease;
-  return {name, options};
+  std::copy(rounds.begin(), rounds.end(), options.rounds.begin());
+  options.round_count = rounds.size();
+  return options;
+}
+
+std::vector<Schedule> schedules() {
+  using cfp::LossType;
+  std::vector<Schedule> list = {{"default", {}}, {"ORB-SLAM2 (hard cut)", cfp::orb_slam2_pose_options()}};
+  cfp::PoseOptions hard = with_rounds({{LossType::huber, 1}, {LossType::trivial, 1}, {LossType::trivial, 1}});
+  hard.inliers_only = true;
+  list.push_back({"Huber, hard cut, hard cut", hard});
+  for (const cfp::PoseRound alone : {cfp::PoseRound{LossType::huber, 1}, cfp::PoseRound{LossType::cauchy, 1}}) {
+    list.push_back({alone.loss == LossType::huber ? "Huber alone" : "Cauchy alone", with_rounds({alone})});
+  }
+  const cfp::PoseRound last{LossType::geman_mcclure, 1.5}, first{LossType::geman_mcclure, 30};
+  list.push_back({"Huber 1, GM 1.5", with_rounds({{LossType::huber, 1}, last})});
+  list.push_back({"Cauchy 4, GM 1.5", with_rounds({{LossType::cauchy, 4}, last})});
+  list.push_back({"GM 5, GM 1.5", with_rounds({{LossType::geman_mcclure, 5}, last})});
+  list.push_back({"GM 10, GM 1.5", with_rounds({{LossType::geman_mcclure, 10}, last})});
+  list.push_back({"GM 20, GM 1.5", with_rounds({{LossType::geman_mcclure, 20}, last})});
+  list.push_back({"GM 40, GM 1.5", with_rounds({{LossType::geman_mcclure, 40}, last})});
+  list.push_back(
+      {"GM 40, GM 5, GM 1.5", with_rounds({{LossType::geman_mcclure, 40}, {LossType::geman_mcclure, 5}, last})});
+  list.push_back({"GM 30, truncated 1", with_rounds({first, {LossType::truncated, 1}})});
+  list.push_back({"GM 30, Cauchy 0.7", with_rounds({first, {LossType::cauchy, 0.7}})});
+  list.push_back({"GM 30, GM 1", with_rounds({first, {LossType::geman_mcclure, 1}})});
+  list.push_back({"GM 30, GM 2", with_rounds({first, {LossType::geman_mcclure, 2}})});
+  list.push_back({"GM 30, GM 3", with_rounds({first, {LossType::geman_mcclure, 3}})});
+  for (const double handover : {0.003, 0.03, 3.0}) {
+    cfp::PoseOptions options;
+    options.handover_decrease = handover;
+    list.push_back({handover > 1      ? "default, hand-over 3"
+                    : handover > 0.01 ? "default, hand-over 0.03"
+                                      : "default, hand-over 0.003",
+                    options});
+  }
+  for (const double decrease : {1e-3, 1e-6}) {
+    cfp::PoseOptions options;
+    options.min_decrease = decrease;
+    list.push_back({decrease > 1e-5 ? "default to 1e-3" : "default to 1e-6", options});
+  }
+  return list;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   const int problems = argc > 1 ? std::max(1, std::atoi(argv[1])) : 200;
-  std::vector<Schedule> schedules = {{"ORB-SLAM2 (hard cut)", cfp::orb_slam2_pose_options()}};
-  Schedule hard = two_rounds("Huber, hard cut, hard cut", 3e-4, cfp::LossType::trivial, 1);
-  hard.options.rounds[1].inliers_only = true;
-  hard.options.rounds[2] = hard.options.rounds[1];
-  hard.options.round_count = 3;
-  schedules.push_back(hard);
-  using cfp::LossType;
-  schedules.push_back(two_rounds("Huber, truncated 1", 0.003, LossType::truncated, 1));
-  schedules.push_back(two_rounds("Huber, Cauchy 0.7", 0.3, LossType::cauchy, 0.7));
-  schedules.push_back(two_rounds("Huber, Cauchy 1", 0.3, LossType::cauchy, 1));
-  schedules.push_back(two_rounds("Huber, Geman-McClure 1", 0.3, LossType::geman_mcclure, 1));
-  schedules.push_back(two_rounds("Huber, Geman-McClure 1.5", 0.3, LossType::geman_mcclure, 1.5));
-  schedules.push_back(two_rounds("Huber, Geman-McClure 2", 0.3, LossType::geman_mcclure, 2));
-  schedules.push_back(two_rounds("Huber, Geman-McClure 3", 0.3, LossType::geman_mcclure, 3));
-  schedules.push_back(two_rounds("Huber to 0.003, GM 1.5", 0.003, LossType::geman_mcclure, 1.5));
-  schedules.push_back(two_rounds("Huber to 0.03, GM 1.5", 0.03, LossType::geman_mcclure, 1.5));
-  schedules.push_back(two_rounds("Huber to 3, GM 1.5", 3, LossType::geman_mcclure, 1.5));
-  schedules.push_back(two_rounds("Huber, GM 1.5 to 1e-3", 0.3, LossType::geman_mcclure, 1.5, 1e-3));
-  schedules.push_back(two_rounds("Huber, GM 1.5 to 1e-6", 0.3, LossType::geman_mcclure, 1.5, 1e-6));
-
   struct Case {
     int points;
     double outliers, moving, start_m, start_deg;
   };
   const Case cases[] = {{30, 0.1, 0, 0.02, 1},   {300, 0.1, 0, 0.02, 1},  {300, 0.3, 0, 0.02, 1},
                         {1000, 0.1, 0, 0.02, 1}, {1000, 0.3, 0, 0.02, 1}, {300, 0.1, 0.2, 0.02, 1},
-                        {300, 0.3, 0, 0.2, 8}};
+                        {300, 0.3, 0, 0.2, 8},   {300, 0, 0, 0.8, 30},    {300, 0.1, 0, 0.8, 30},
+                        {300, 0.3, 0, 0.8, 30},  {30, 0.3, 0, 0.8, 30},   {300, 0.7, 0, 0.2, 8},
+                        {300, 0.3, 0, 1.2, 50}};
   std::printf("error relative to the floor (median) / data passes (median) / failures\n%-34s", "");
   for (const Case& c : cases)
     std::printf(" N%d o%.0f m%.0f %gcm,%gdeg |", c.points, 100 * c.outliers, 100 * c.moving, 100 * c.start_m,
@@ -70,9 +89,9 @@ int main(int argc, char** argv) {
   std::printf("\n");
   cfp::PoseWorkspace<double> workspace;
   cfp::PoseOptions least_squares;
-  least_squares.rounds[0] = {cfp::LossType::trivial, 1, 20, 1e-6, false, false};
-  least_squares.round_count = 1;
-  for (const Schedule& schedule : schedules) {
+  least_squares.rounds[0] = {cfp::LossType::trivial, 1};
+  least_squares.round_count = 1, least_squares.min_decrease = 1e-6;
+  for (const Schedule& schedule : schedules()) {
     std::printf("%-34s", schedule.name);
     for (const Case& c : cases) {
       std::vector<double> error, floor, passes;

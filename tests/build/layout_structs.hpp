@@ -104,11 +104,11 @@
   CFP_LAYOUT(cfp::Truncated<double>, delta)                              \
   CFP_LAYOUT(cfp::RobustLoss<float>, delta)                              \
   CFP_LAYOUT(cfp::RobustLoss<double>, delta)                             \
-  CFP_LAYOUT(cfp::PoseRound, min_mean_decrease)                          \
-  CFP_LAYOUT(cfp::PoseOptions, round_count)                       \
+  CFP_LAYOUT(cfp::PoseRound, scale)                                      \
+  CFP_LAYOUT(cfp::PoseOptions, inliers_only)                      \
   CFP_LAYOUT(cfp::PoseObservations<float>, baseline_fx)                  \
   CFP_LAYOUT(cfp::PoseObservations<double>, baseline_fx)                 \
-  CFP_LAYOUT(cfp::PoseResult, reason)                             \
+  CFP_LAYOUT(cfp::PoseResult, evaluations)                        \
   CFP_LAYOUT(cfp::PoseWorkspace<float>, indices)                  \
   CFP_LAYOUT(cfp::PoseWorkspace<double>, indices)                 \
   CFP_LAYOUT(cfp::ConstraintOptions, min_samples)                        \

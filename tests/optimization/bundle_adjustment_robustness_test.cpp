@@ -87,7 +87,7 @@ TEST_CASE("A second call of the same size allocates nothing; a large one nothing
 
 TEST_CASE("Nothing to do is reported and changes nothing", "[optimization][bundle_adjustment]") {
   cfp::BundleWorkspace workspace;
-  CHECK(adjust_bundle(cfp::BundleProblem<>{}, cfp::BundleOptions{}, workspace).reason ==
+  CHECK(adjust_bundle(cfp::BundleProblem<>{}, cfp::BundleOptions{}, workspace).status ==
         cfp::SolverStatus::not_enough_data);
   cfp_test::BaSceneOptions options;
   options.points = 20;
@@ -95,14 +95,14 @@ TEST_CASE("Nothing to do is reported and changes nothing", "[optimization][bundl
   cfp_test::BaScene scene = start;
   std::fill(scene.weights.begin(), scene.weights.end(), 0.0);
   cfp::BundleResult result = adjust(scene);
-  CHECK(result.reason == cfp::SolverStatus::not_enough_data);
+  CHECK(result.status == cfp::SolverStatus::not_enough_data);
   CHECK(result.zero_weight == scene.pose.size());
   CHECK(same_bits(scene, start));
   scene = start;
   cfp::BundleOptions none;
   none.levenberg_marquardt.max_iterations = 0;
   result = adjust(scene, none);
-  CHECK(result.reason == cfp::SolverStatus::iteration_limit);
+  CHECK(result.status == cfp::SolverStatus::iteration_limit);
   CHECK(result.final_cost == result.initial_cost);
   CHECK(same_bits(scene, start));
 }

@@ -169,7 +169,7 @@ TEST_CASE("At the truth without noise the gradient is zero and nothing moves", "
   cfp_test::BaScene scene = cfp_test::make_ba_scene(options, 1);
   cfp::BundleWorkspace work;
   const cfp::BundleResult result = cfp::adjust_bundle(scene.problem(), {}, work);
-  CHECK(result.reason == cfp::SolverStatus::converged);
+  CHECK(result.status == cfp::SolverStatus::converged);
   CHECK(result.initial_cost < 1e-15);
   CHECK(scene.position_error() < 1e-12);
   for (const double g : work.linear.poses) CHECK(cfp::is_finite(g));
@@ -178,8 +178,8 @@ TEST_CASE("At the truth without noise the gradient is zero and nothing moves", "
   }
 }
 
-TEMPLATE_TEST_CASE("From a disturbed start without noise it returns to the truth", "[optimization][bundle_adjustment]", float,
-                   double) {
+TEMPLATE_TEST_CASE("From a disturbed start without noise it returns to the truth", "[optimization][bundle_adjustment]",
+                   float, double) {
   cfp_test::BaSceneOptions options;
   options.points = 200;
   options.noise_px = options.outlier_share = 0;
@@ -203,7 +203,7 @@ TEMPLATE_TEST_CASE("From a disturbed start without noise it returns to the truth
   ba.levenberg_marquardt.max_iterations = 50;
   cfp::BundleWorkspace work;
   const cfp::BundleResult result = cfp::adjust_bundle(problem, ba, work);
-  CHECK(result.reason == cfp::SolverStatus::converged);
+  CHECK(result.status == cfp::SolverStatus::converged);
   CHECK(result.final_cost < 1e-6);
   CHECK(scene.position_error() < 1e-6);
   std::vector<int> views(scene.points.size(), 0);

@@ -60,7 +60,8 @@ double largest_difference(const cfp_test::BaScene& a, const cfp_test::BaScene& b
 
 }  // namespace
 
-TEST_CASE("The costs are those of the definition and never rise from step to step", "[optimization][bundle_adjustment]") {
+TEST_CASE("The costs are those of the definition and never rise from step to step",
+          "[optimization][bundle_adjustment]") {
   for (const cfp::LossType loss : {cfp::LossType::trivial, cfp::LossType::huber, cfp::LossType::cauchy,
                                    cfp::LossType::geman_mcclure, cfp::LossType::truncated}) {
     cfp::BundleOptions options;
@@ -83,7 +84,8 @@ TEST_CASE("The costs are those of the definition and never rise from step to ste
   }
 }
 
-TEST_CASE("Outliers and noise: the robust loss brings the cameras near the truth", "[optimization][bundle_adjustment]") {
+TEST_CASE("Outliers and noise: the robust loss brings the cameras near the truth",
+          "[optimization][bundle_adjustment]") {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     cfp_test::BaSceneOptions options;
     options.stereo_share = 0.5;
@@ -165,7 +167,8 @@ TEST_CASE("A rigid motion or a scale of the world moves the solution with it", "
   CHECK(largest_difference(scene, moved) < 1e-7);
 }
 
-TEST_CASE("Free gauge: without a fixed pose it converges to the cost it has with one", "[optimization][bundle_adjustment]") {
+TEST_CASE("Free gauge: without a fixed pose it converges to the cost it has with one",
+          "[optimization][bundle_adjustment]") {
   for (const double stereo_share : {0.0, 1.0}) {
     cfp_test::BaSceneOptions options = mixed_scene();
     options.stereo_share = stereo_share;
@@ -175,7 +178,7 @@ TEST_CASE("Free gauge: without a fixed pose it converges to the cost it has with
     const cfp::BundleResult a = adjust(free, until_converged()), b = adjust(fixed, until_converged());
     CAPTURE(stereo_share, a.iterations, b.iterations);
     CHECK(a.free_poses == 8);
-    CHECK(a.reason == cfp::SolverStatus::converged);
+    CHECK(a.status == cfp::SolverStatus::converged);
     CHECK_THAT(a.final_cost, WithinAbs(b.final_cost, 1e-7 * b.final_cost));
     // The free directions stay near the start.
     CHECK((free.poses[0].translation - free.true_poses[0].translation).norm() < 0.1);

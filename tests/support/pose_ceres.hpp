@@ -120,7 +120,8 @@ CeresPose ceres_refine(const PoseScene<Scalar>& scene, const std::vector<Scalar>
     cost.inverse_sigma = 1 / static_cast<double>(scene.sigmas[i]);
   };
   for (std::size_t i = 0; i < n; ++i) {
-    if (scene.depths[i] > 0) {
+    // A column left of the right image's border is no measurement.
+    if (scene.depths[i] > 0 && scene.pixels[i][0] - scene.baseline_fx / scene.depths[i] > 0) {
       fill(*(stereo[i] = std::make_unique<PixelError<3>>()), i);
     } else {
       fill(*(mono[i] = std::make_unique<PixelError<2>>()), i);
@@ -137,7 +138,7 @@ CeresPose ceres_refine(const PoseScene<Scalar>& scene, const std::vector<Scalar>
   reset();
   for (std::size_t r = 0; r < options.round_count; ++r) {
     const cfp::PoseRound& round = options.rounds[r];
-    if (round.from_start) reset();
+    if (options.from_start) reset();
     ceres::Problem::Options problem_options;
     problem_options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     problem_options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -151,7 +152,7 @@ CeresPose ceres_refine(const PoseScene<Scalar>& scene, const std::vector<Scalar>
         ceres_loss(round.loss, round.scale * std::sqrt(options.chi2_stereo)));
     std::vector<std::unique_ptr<ceres::LossFunction>> scaled;
     for (std::size_t i = 0; i < n; ++i) {
-      if (round.inliers_only && result.mask[i] == 0) continue;
+      if (r > 0 && options.inliers_only && result.mask[i] == 0) continue;
       ceres::LossFunction* loss = mono[i] ? mono_loss.get() : stereo_loss.get();
       if (!weights.empty()) {
         scaled.push_back(
@@ -162,7 +163,7 @@ CeresPose ceres_refine(const PoseScene<Scalar>& scene, const std::vector<Scalar>
     }
     ceres::Solver::Options solver_options;
     solver_options.linear_solver_type = solver;
-    solver_options.max_num_iterations = round.max_iterations;
+    solver_options.max_num_iterations = options.max_iterations;
     solver_options.function_tolerance = tolerance;
     solver_options.parameter_tolerance = tolerance * 1e-3;
     solver_options.gradient_tolerance = tolerance * 1e-6;

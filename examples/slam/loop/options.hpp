@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "cfp/frame/options.hpp"
-#include "cfp/optimization/pose/pose_refinement_types.hpp"
+#include "cfp/optimization/pose/pose_problem.hpp"
 #include "flow.hpp"
 
 namespace cfp_slam {

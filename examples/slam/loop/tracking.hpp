@@ -250,7 +250,7 @@ class Tracking {
     inlier_.resize(keypoint_.size());
     const cfp::PoseResult result = cfp::refine_pose(observations, solver_camera_, frame.T_cam_world, options_.pose,
                                                     pose_workspace_, cfp::span<char>(inlier_));
-    if (!cfp::is_refined(result.reason)) return 0;
+    if (!cfp::is_solved(result.status)) return 0;
     frame.T_cam_world = result.T_cam_world;
     std::size_t count = 0;
     for (std::size_t o = 0; o < keypoint_.size(); ++o) {

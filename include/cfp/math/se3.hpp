@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "cfp/math/matrix3.hpp"
 #include "cfp/math/so3.hpp"
 
 namespace cfp {
@@ -75,6 +76,15 @@ template <typename Scalar>
   A.template bottomRightCorner<3, 3>() = T.rotation;
   A.template topRightCorner<3, 3>() = hat(T.translation) * T.rotation;
   return A;
+}
+
+/// Whether T is finite (translation within 1e9) and its rotation one to 1e-2: a float matrix from a host is off by 1e-7
+/// or, after many products, more; a scaled or mirrored one is a mistake.
+template <typename Scalar>
+[[nodiscard]] bool is_rigid_motion(const SE3<Scalar>& T) noexcept {
+  if (!(T.translation.cwiseAbs().sum() <= Scalar(1e9)) || !(T.rotation.cwiseAbs().sum() <= Scalar(10))) return false;
+  const Matrix3<Scalar> excess = T.rotation.transpose() * T.rotation - Matrix3<Scalar>::Identity();
+  return excess.cwiseAbs().maxCoeff() < Scalar(1e-2) && determinant(T.rotation) > Scalar(0);
 }
 
 }  // namespace CFP_ISA

@@ -46,7 +46,7 @@ struct LeastSquaresResult {
 
 inline namespace CFP_ISA {
 
-/// The first field outside its range, or nullptr.
+/// The first field outside its range, or nothing.
 [[nodiscard]] inline OptionPath invalid_field(const LevenbergMarquardtOptions& options) noexcept {
   if (!(options.max_iterations >= 0)) return "max_iterations";
   if (!detail::non_negative(options.initial_damping)) return "initial_damping";
@@ -75,7 +75,7 @@ class Damping {
   [[nodiscard]] bool exhausted() const noexcept { return exhausted_; }
 
   /// Judges a step by gain = (cost before - cost after) / (predicted decrease); NaN is refused. Accepted (gain above
-  /// 1e-3): lambda shrinks by max(1/3, 1 - (2 gain - 1)^3), and does not grow for gain >= 1/2; below a tenth of
+  /// 1e-3): lambda shrinks by max(1/3, 1 - (2 gain - 1)^3), and does not grow for gain >= 1/2; below
   /// rejected_damping it falls to min_damping at once. Refused: lambda grows 2, 4, 8, … times.
   bool accept(double gain) noexcept {
     if (!(gain > 1e-3)) {
@@ -84,7 +84,7 @@ class Damping {
     }
     const double t = 2 * (std::min)(gain, 1.0) - 1;
     value_ = clamped(value_ * (std::max)(1.0 / 3, 1 - t * t * t));
-    if (value_ < 0.1 * rejected_) value_ = min_;
+    if (value_ < rejected_) value_ = min_;
     growth_ = 2;
     return true;
   }
@@ -119,7 +119,10 @@ LeastSquaresResult minimize_least_squares(Problem& problem, const LevenbergMarqu
     ++result.iterations;
     const double promised = problem.propose(damping.value());
     if (is_finite(promised)) {
-      if (!(promised > (std::max)(options.min_absolute_decrease, options.min_relative_decrease * cost))) {
+      // A small promise says something about the minimum only where the damping is small, too.
+      const bool damped = damping.value() > (std::max)(options.initial_damping, options.rejected_damping);
+      const double enough = (std::max)(options.min_absolute_decrease, options.min_relative_decrease * cost);
+      if (!(promised > (damped ? 0 : enough))) {
         result.status = damping.last_step_rejected() ? SolverStatus::no_decrease : SolverStatus::converged;
         break;
       }

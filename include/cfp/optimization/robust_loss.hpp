@@ -132,7 +132,7 @@ struct RobustLoss {
   }
 };
 
-/// The first field of a loss outside its range, or nullptr.
+/// The first field of a loss outside its range, or nothing.
 template <typename Scalar>
 [[nodiscard]] OptionPath invalid_field(const RobustLoss<Scalar>& loss) noexcept {
   if (!(static_cast<unsigned>(loss.type) <= static_cast<unsigned>(LossType::truncated))) return "type";

@@ -189,13 +189,10 @@ template <typename T, int Lanes>
 [[nodiscard]] BasicPacket<T, Lanes> abs(const BasicPacket<T, Lanes>& a) noexcept {
   return BasicPacket<T, Lanes>::wrap(Eigen::internal::pabs(a.bits));
 }
-/// log(1 + x) for x > -1, lane by lane.
+/// log(1 + x) for x > -1, within a few units in the last place.
 template <typename T, int Lanes>
 [[nodiscard]] BasicPacket<T, Lanes> log1p(const BasicPacket<T, Lanes>& a) noexcept {
-  T lanes[static_cast<std::size_t>(Lanes)];
-  store(lanes, a);
-  for (T& x : lanes) x = std::log1p(x);
-  return load<BasicPacket<T, Lanes>>(lanes);
+  return BasicPacket<T, Lanes>::wrap(Eigen::internal::generic_plog1p(a.bits));
 }
 
 /// 1 / sqrt(x) within 3 units in the last place; infinite at 0 (for packets also at denormals), 0 at infinity. One root

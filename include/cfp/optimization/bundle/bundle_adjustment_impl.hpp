@@ -169,7 +169,7 @@ void minimize(const BundleProblem<Camera, Scalar>& problem, const LevenbergMarqu
   };
   BundleLeastSquares<decltype(linearize_at), Executor> least_squares{work, linearize_at, executor};
   const LeastSquaresResult solved = minimize_least_squares(least_squares, options);
-  result.reason = solved.status;
+  result.status = solved.status;
   result.initial_cost = solved.initial_cost, result.final_cost = solved.final_cost;
   result.iterations = solved.iterations, result.accepted = solved.accepted;
 }

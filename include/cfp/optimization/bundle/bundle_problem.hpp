@@ -48,7 +48,7 @@ struct BundleOptions {
   double chi2_stereo = 7.815;  ///< delta^2 of the loss for three residuals, > 0: 3 degrees of freedom
 };
 
-/// The first field outside its range, or nullptr.
+/// The first field outside its range, or nothing.
 [[nodiscard]] inline OptionPath invalid_field(const BundleOptions& options) noexcept {
   if (const OptionPath field = nested("levenberg_marquardt", invalid_field(options.levenberg_marquardt))) return field;
   if (invalid_field(RobustLoss<double>{options.loss, 1.0})) return "loss";
@@ -59,7 +59,7 @@ struct BundleOptions {
 
 /// Every observation is counted once: used + zero_weight + invalid + behind = all.
 struct BundleResult {
-  SolverStatus reason = SolverStatus::not_enough_data;
+  SolverStatus status = SolverStatus::not_enough_data;
   double initial_cost = 0;      ///< sum of w rho(|r|^2 / sigma^2) over the used observations
   double final_cost = 0;        ///< <= initial_cost
   int iterations = 0;           ///< steps tried

@@ -1,4 +1,4 @@
-/// @file pose_system_impl.hpp
+/// @file pose_kernel_impl.hpp
 /// One pass over the observations of one pose: normal equations, cost and squared errors (internal to
 /// pose_refinement.hpp).
 ///
@@ -20,6 +20,7 @@
 #include <Eigen/Core>
 
 #include "cfp/geometry/camera.hpp"
+#include "cfp/math/normal_equations.hpp"
 #include "cfp/math/se3.hpp"
 #include "cfp/optimization/pose/pose_columns_impl.hpp"
 #include "cfp/optimization/robust_loss.hpp"
@@ -27,12 +28,14 @@
 
 namespace cfp::detail {
 
+/// Sums of one pass: H (upper triangle) = sum of W J^T J, g = sum of W J^T r with W = w rho'(s) / sigma^2.
 struct PoseSystem {
-  Matrix6<double> H = Matrix6<double>::Zero();  // upper triangle: sum of W J^T J
-  Vector6<double> g = Vector6<double>::Zero();  // sum of W J^T r; the gradient of the cost is 2 g
-  double cost = 0;
-  bool draft = false;  // summed from float on the way to a result in double: pose_refinement_impl.hpp
+  NormalEquations<6> equations;
+  double cost = 0;       // sum of w rho(s)
+  double influence = 0;  // sum of w rho'(s) in front of the camera
 };
+
+inline namespace CFP_ISA {
 
 /// A point that goes behind the camera keeps the error it last had in front: otherwise a step that hides points would
 /// pay.
@@ -53,34 +56,12 @@ void add_pinhole(const PoseColumns<scalar_of<P>>& columns, std::size_t begin, st
                  PoseSystem& system) noexcept {
   using Scalar = scalar_of<P>;
   constexpr std::size_t lanes = static_cast<std::size_t>(lanes_of<P>);
+  // clang-format off
   enum {
-    cost,
-    g0,
-    g1,
-    g2,
-    g3,
-    g4,
-    g5,
-    h00,
-    h02,
-    h03,
-    h04,
-    h05,
-    h12,
-    h13,
-    h14,
-    h15,
-    h22,
-    h23,
-    h24,
-    h33,
-    h34,
-    h35,
-    h44,
-    h45,
-    h55,
-    count
+    cost, influence, g0, g1, g2, g3, g4, g5, h00, h02, h03, h04, h05, h12, h13, h14, h15, h22, h23, h24, h33, h34, h35,
+    h44, h45, h55, count
   };
+  // clang-format on
   const auto constant = [](double value) { return P(static_cast<Scalar>(value)); };
   const P r00 = constant(T.rotation(0, 0)), r01 = constant(T.rotation(0, 1)), r02 = constant(T.rotation(0, 2)),
           t0 = constant(T.translation.x());
@@ -123,7 +104,8 @@ void add_pinhole(const PoseColumns<scalar_of<P>>& columns, std::size_t begin, st
       const P s = visible_error<P>(front, information * multiply_add(kv, rv, uu), load<P>(columns.error + begin));
       store(columns.error + begin, stored_error<P>(front, s));
       sum[cost] = multiply_add(active, loss.value(s), sum[cost]);
-      const P W = select(front, active * information * loss.first(s), zero);
+      const P pull = select(front, active * loss.first(s), zero), W = information * pull;
+      sum[influence] += pull;
 
       const P br = W * kv, ar = W * sr, e = multiply_add(y, br, W * skr);
       sum[g0] = multiply_add(q, ar, sum[g0]);
@@ -157,10 +139,11 @@ void add_pinhole(const PoseColumns<scalar_of<P>>& columns, std::size_t begin, st
     double total[count];
     for (int i = 0; i < count; ++i) total[i] = static_cast<double>(reduce_add(sum[i]));
     system.cost += total[cost];
-    system.g[0] += total[g0], system.g[1] += total[g1], system.g[2] -= total[g2], system.g[3] -= total[g3],
-        system.g[4] += total[g4], system.g[5] -= total[g5];
+    system.influence += total[influence];
+    Vector6<double>& g = system.equations.g;
+    g[0] += total[g0], g[1] += total[g1], g[2] -= total[g2], g[3] -= total[g3], g[4] += total[g4], g[5] -= total[g5];
     constexpr double rows = stereo ? 2 : 1;
-    Matrix6<double>& H = system.H;
+    Matrix6<double>& H = system.equations.H;
     H(0, 0) += rows * total[h00], H(0, 2) -= total[h02], H(0, 3) -= total[h03], H(0, 4) += total[h04],
         H(0, 5) -= rows * total[h05];
     H(1, 1) += aspect_sq * total[h00], H(1, 2) -= aspect_sq * total[h12], H(1, 3) -= aspect_sq * total[h13],
@@ -178,49 +161,41 @@ void add_camera(const PoseColumns<Scalar>& columns, std::size_t begin, std::size
   using C = typename Camera::ScalarType;
   constexpr int rows = stereo ? 3 : 2;
   for (std::size_t i = begin; i < end; ++i) {
-    const Vector3<double> p = T * Vector3<double>(static_cast<double>(columns.x[i]), static_cast<double>(columns.y[i]),
-                                                  static_cast<double>(columns.z[i]));
+    const Vector3<double> p = T * Vector3<Scalar>(columns.x[i], columns.y[i], columns.z[i]).template cast<double>();
     Vector2<C> pixel = Vector2<C>::Zero();
-    Matrix23<C> Jp = Matrix23<C>::Zero();
-    const bool front =
-        camera.project(p.template cast<C>(), pixel, &Jp) && p.z() > static_cast<double>(Tolerance<Scalar>::min_depth);
-    double r[3] = {0, 0, 0}, J[3][6] = {};
-    double s = static_cast<double>(std::abs(columns.error[i]));
-    if (front) {
-      r[0] = static_cast<double>(pixel.x()) - static_cast<double>(columns.u[i]);
-      r[1] = static_cast<double>(pixel.y()) - static_cast<double>(columns.v[i]);
-      double D[3][3];
-      for (int row = 0; row < 2; ++row) {
-        for (int c = 0; c < 3; ++c) D[row][c] = static_cast<double>(Jp(row, c));
-      }
-      if constexpr (stereo) {
-        r[2] = static_cast<double>(pixel.x()) - baseline_fx / p.z() - static_cast<double>(columns.u_right[i]);
-        for (int c = 0; c < 3; ++c) D[2][c] = D[0][c];
-        D[2][2] += baseline_fx / (p.z() * p.z());
-      }
-      s = 0;
-      for (int row = 0; row < rows; ++row) {
-        s += r[row] * r[row];
-        for (int c = 0; c < 3; ++c) J[row][c] = D[row][c];
-        J[row][3] = p.y() * D[row][2] - p.z() * D[row][1];  // row times -hat(p)
-        J[row][4] = p.z() * D[row][0] - p.x() * D[row][2];
-        J[row][5] = p.x() * D[row][1] - p.y() * D[row][0];
-      }
-      s *= static_cast<double>(columns.information[i]);
+    Matrix23<C> pixel_by_point = Matrix23<C>::Zero();
+    const bool front = camera.project(p.template cast<C>(), pixel, &pixel_by_point) &&
+                       p.z() > static_cast<double>(Tolerance<Scalar>::min_depth);
+    const double active = static_cast<double>(columns.active[i]),
+                 information = static_cast<double>(columns.information[i]);
+    if (!front) {
+      const double s = static_cast<double>(std::abs(columns.error[i]));
+      columns.error[i] = stored_error<Scalar>(false, static_cast<Scalar>(s));
+      system.cost += active * loss.value(s);
+      continue;
     }
-    columns.error[i] = stored_error<Scalar>(front, static_cast<Scalar>(s));
-    const double active = static_cast<double>(columns.active[i]);
-    if (!(active > 0)) continue;
+    Eigen::Matrix<double, rows, 1> r;
+    Eigen::Matrix<double, rows, 3> D;
+    r[0] = static_cast<double>(pixel.x()) - static_cast<double>(columns.u[i]);
+    r[1] = static_cast<double>(pixel.y()) - static_cast<double>(columns.v[i]);
+    D.template topRows<2>() = pixel_by_point.template cast<double>();
+    if constexpr (stereo) {
+      r[2] = static_cast<double>(pixel.x()) - baseline_fx / p.z() - static_cast<double>(columns.u_right[i]);
+      D.row(2) = D.row(0);
+      D(2, 2) += baseline_fx / (p.z() * p.z());
+    }
+    const double s = information * r.squaredNorm();
+    columns.error[i] = stored_error<Scalar>(true, static_cast<Scalar>(s));
+    Eigen::Matrix<double, rows, 6> J;
+    J.template leftCols<3>() = D;
+    J.template rightCols<3>() = -D.lazyProduct(hat(p));
+    const double pull = active * loss.first(s);
     system.cost += active * loss.value(s);
-    const double W = active * static_cast<double>(columns.information[i]) * loss.first(s);
-    for (int row = 0; front && row < rows; ++row) {
-      for (int k = 0; k < 6; ++k) {
-        const double WJ = W * J[row][k];
-        system.g[k] += WJ * r[row];
-        for (int l = k; l < 6; ++l) system.H(k, l) += WJ * J[row][l];
-      }
-    }
+    system.influence += pull;
+    system.equations.H += information * pull * J.transpose().lazyProduct(J);
+    system.equations.g += information * pull * J.transpose().lazyProduct(r);
   }
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp::detail

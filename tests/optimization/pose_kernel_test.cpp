@@ -1,4 +1,4 @@
-#include "cfp/optimization/pose/pose_system_impl.hpp"
+#include "cfp/optimization/pose/pose_kernel_impl.hpp"
 
 #include <type_traits>
 #include <vector>
@@ -35,15 +35,15 @@ PoseSystem numeric_system(const cfp::SE3<double>& T, const Eigen::Vector3d& X, c
                (2 * h);
   }
   PoseSystem system;
-  system.H = W * J.transpose() * J;
-  system.g = W * J.transpose() * r;
+  system.equations.H = W * J.transpose() * J;
+  system.equations.g = W * J.transpose() * r;
   return system;
 }
 
 }  // namespace
 
 TEMPLATE_TEST_CASE(
-    "Pose system: H and g equal those of numeric Jacobians, pixel and depth, packet, scalar and any camera",
+    "Pose kernel: H and g equal those of numeric Jacobians, pixel and depth, packet, scalar and any camera",
     "[optimization]", float, double) {
   using Scalar = TestType;
   using P = cfp::Packet<Scalar>;
@@ -87,10 +87,10 @@ TEMPLATE_TEST_CASE(
     };
     const PoseSystem expected = numeric_system(T, X, r, weight * information, camera, baseline_fx, stereo);
     const auto check = [&](const PoseSystem& system) {
-      const Matrix6<double> H = system.H.selfadjointView<Eigen::Upper>();
-      CAPTURE(i, stereo, H, expected.H, system.g.transpose(), expected.g.transpose());
-      CHECK((H - expected.H).norm() < tolerance * expected.H.norm());
-      CHECK((system.g - expected.g).norm() < 20 * tolerance * expected.g.norm());
+      const Matrix6<double> H = system.equations.H.selfadjointView<Eigen::Upper>();
+      CAPTURE(i, stereo, H, expected.equations.H, system.equations.g.transpose(), expected.equations.g.transpose());
+      CHECK((H - expected.equations.H).norm() < tolerance * expected.equations.H.norm());
+      CHECK((system.equations.g - expected.equations.g).norm() < 20 * tolerance * expected.equations.g.norm());
       CHECK(system.cost == Approx(weight * information * r.squaredNorm()).epsilon(20 * tolerance));
     };
     const auto add = [&](auto is_stereo) {
@@ -112,7 +112,7 @@ TEMPLATE_TEST_CASE(
   }
 }
 
-TEST_CASE("Pose system: a point behind the camera keeps the error it last had in front and adds nothing to H and g",
+TEST_CASE("Pose kernel: a point behind the camera keeps the error it last had in front and adds nothing to H and g",
           "[optimization]") {
   using P = cfp::Packet<double>;
   const cfp::PinholeCamera<double> camera{500, 500, 320, 240};
@@ -128,8 +128,8 @@ TEST_CASE("Pose system: a point behind the camera keeps the error it last had in
   CHECK(first.cost == Approx(25.0));
   cfp::detail::add_pinhole<P, false>(columns, 0, lanes, camera, 0, behind, cfp::Trivial<P>{}, second);
   CHECK(second.cost == Approx(25.0));
-  CHECK(second.H.norm() == 0);
-  CHECK(second.g.norm() == 0);
+  CHECK(second.equations.H.norm() == 0);
+  CHECK(second.equations.g.norm() == 0);
   CHECK(error[0] < 0);
   cfp::detail::add_pinhole<P, false>(columns, 0, lanes, camera, 0, front, cfp::Trivial<P>{}, third);
   CHECK(third.cost == Approx(25.0));
