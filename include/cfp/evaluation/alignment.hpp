@@ -9,11 +9,12 @@
 #include <limits>
 
 #include <Eigen/Core>
-#include <Eigen/SVD>
 
+#include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/status.hpp"
-#include "cfp/math/so3.hpp"
+#include "cfp/core/types.hpp"
+#include "cfp/math/matrix3.hpp"
 
 namespace cfp {
 
@@ -46,7 +47,7 @@ struct Similarity {
   Matrix3<double> rotation = Matrix3<double>::Identity();
   Vector3<double> translation = Vector3<double>::Zero();
 
-  [[nodiscard]] Vector3<double> operator*(const Vector3<double>& point) const noexcept {
+  [[nodiscard]] CFP_INLINE Vector3<double> operator*(const Vector3<double>& point) const noexcept {
     return scale * (rotation * point) + translation;
   }
 };
@@ -58,10 +59,12 @@ struct AlignmentResult {
   Status status = Status::not_enough_data;
 };
 
+inline namespace CFP_ISA {
+
 /// argmin over (s, R, t) of sum |to_i − (s R from_i + t)|², s = 1 unless with_scale. With the centred points a_i (from)
-/// and b_i (to) and the SVD sum b_i a_iᵀ = U D Vᵀ: R = U S Vᵀ, S = diag(1, 1, det(U Vᵀ)), s = tr(D S) / sum |a_i|², t =
-/// mean(to) − s R mean(from). The scale is that of Umeyama, not the symmetric one of Horn. Points are scaled by their
-/// largest coordinate first, so that no finite input overflows. Allocates nothing.
+/// and b_i (to) and the SVD sum b_i a_iᵀ = U D Vᵀ, U and V rotations and the last singular value signed: R = U Vᵀ,
+/// s = tr(D) / sum |a_i|², t = mean(to) − s R mean(from). The scale is that of Umeyama, not the symmetric one of Horn.
+/// Points are scaled by their largest coordinate first, so that no finite input overflows. Allocates nothing.
 ///
 /// Degenerate input: no finite pair → identity and not_enough_data. Points that do not fix the rotation (fewer than
 /// three, or on one line) → one of the minimisers, a proper rotation, and degenerate; a scale that is not determined
@@ -110,14 +113,12 @@ template <typename Scalar>
     H += (scaled(to, i) - to_mean) * a.transpose();
     from_spread += a.squaredNorm();
   }
-  const Eigen::JacobiSVD<Matrix3<double>> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Vector3<double> sign(1, 1, 1);
-  if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0) sign.z() = -1;
+  const SVD3<double> H_svd = svd(H);  // U and V are rotations, the last singular value has the sign of det H
   Similarity& S = result.S_to_from;
-  S.rotation = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
-  const Vector3<double>& d = svd.singularValues();
+  S.rotation = H_svd.U * H_svd.V.transpose();
+  const Vector3<double>& d = H_svd.sigma;
   if (with_scale) {
-    const double scale = d.dot(sign) / from_spread;
+    const double scale = d.sum() / from_spread;
     if (scale > 0 && is_finite(scale)) S.scale = scale;
   }
   const Vector3<double> shift = to_mean - S.scale * (S.rotation * from_mean);
@@ -129,4 +130,5 @@ template <typename Scalar>
   return result;
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

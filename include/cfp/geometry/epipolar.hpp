@@ -107,13 +107,13 @@ template <typename Scalar>
 [[nodiscard]] Scalar sampson_distance(const Matrix3<Scalar>& F, const Vector2<Scalar>& x_prev,
                                       const Vector2<Scalar>& x_cur) noexcept {
   const Matrix3<Scalar> G = detail::unit_scale(F);
-  const Matrix3<Scalar> G_transposed = G.transpose();
   const Vector3<Scalar> line = epipolar_line(G, x_prev);
-  const Vector3<Scalar> line_prev = epipolar_line(G_transposed, x_cur);
-  const Scalar norm_sq =
-      line.x() * line.x() + line.y() * line.y() + line_prev.x() * line_prev.x() + line_prev.y() * line_prev.y();
+  const Vector3<Scalar> cur(x_cur.x(), x_cur.y(), Scalar(1));
+  const Scalar a_prev = G.col(0).dot(cur), b_prev = G.col(1).dot(cur);
+  const Scalar norm_sq = line.x() * line.x() + line.y() * line.y() + a_prev * a_prev + b_prev * b_prev;
+  const Scalar tolerance(Tolerance<Scalar>::degenerate);
   const Scalar noise = detail::line_noise(G) * (x_prev.squaredNorm() + Scalar(1)) +
-                       detail::line_noise(G_transposed) * (x_cur.squaredNorm() + Scalar(1));
+                       tolerance * tolerance * G.template leftCols<2>().squaredNorm() * cur.squaredNorm();
   return detail::ratio_distance(line.x() * x_cur.x() + line.y() * x_cur.y() + line.z(), norm_sq, noise);
 }
 
