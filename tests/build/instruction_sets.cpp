@@ -126,7 +126,7 @@ int main(int argc, char** argv) {
       std::printf("result %td: %.17g, with the other flags %.17g\n", &r - results.all().data(), r.value, expected);
   }
   std::fclose(file);
-  std::printf("%zu results, %d floats at once, %zu differences\n", results.all().size(), cfp::native_lanes<float>,
+  std::printf("%zu results, %d floats at once, %zu differences\n", results.all().size(), cfp::simd::native_lanes<float>,
               different);
   return writes || (read == results.all().size() && different == 0) ? 0 : 1;
 }

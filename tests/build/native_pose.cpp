@@ -91,7 +91,7 @@ int main(int argc, char** argv) {
   std::printf(
       "lanes: %d double, %d float; largest difference of a pose: %.2g in double, %.2g after rounds that end early, "
       "%.2g in float\n",
-      cfp::native_lanes<double>, cfp::native_lanes<float>, fine, early, coarse);
+      cfp::simd::native_lanes<double>, cfp::simd::native_lanes<float>, fine, early, coarse);
   return fine < 1e-8 && early < 1e-6 && coarse < 1e-4 ? 0 : 1;
 #else
   std::FILE* file = std::fopen(argv[1], "w");

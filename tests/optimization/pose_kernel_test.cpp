@@ -46,7 +46,7 @@ TEMPLATE_TEST_CASE(
     "Pose kernel: H and g equal those of numeric Jacobians, pixel and depth, packet, scalar and any camera",
     "[optimization]", float, double) {
   using Scalar = TestType;
-  using P = cfp::Packet<Scalar>;
+  using P = cfp::simd::Packet<Scalar>;
   const double tolerance = std::is_same_v<Scalar, float> ? 2e-4 : 1e-6;
   const cfp::PinholeCamera<double> camera{535.4, 539.2, 320.1, 247.6};
   const double baseline_fx = 40;
@@ -61,7 +61,7 @@ TEMPLATE_TEST_CASE(
     const Eigen::Vector3d r(random.uniform(-4, 4), random.uniform(-4, 4), stereo ? random.uniform(-4, 4) : 0.0);
     const Eigen::Vector3d measured = residual(T, X, camera, baseline_fx, stereo) - r;
 
-    const std::size_t lanes = static_cast<std::size_t>(cfp::lanes_of<P>);
+    const std::size_t lanes = static_cast<std::size_t>(cfp::simd::lanes_of<P>);
     std::vector<Scalar> storage[10];
     PoseColumns<Scalar> columns;
     Scalar** pointers[10] = {&columns.x,       &columns.y,           &columns.z,      &columns.u,     &columns.v,
@@ -114,7 +114,7 @@ TEMPLATE_TEST_CASE(
 
 TEST_CASE("Pose kernel: a point behind the camera keeps the error it last had in front and adds nothing to H and g",
           "[optimization]") {
-  using P = cfp::Packet<double>;
+  using P = cfp::simd::Packet<double>;
   const cfp::PinholeCamera<double> camera{500, 500, 320, 240};
   std::vector<double> x(8), y(8), z(8, 2.0), u(8, 0.01), v(8), information(8, 500.0 * 500.0), active(8), error(8);
   active[0] = 1;
@@ -122,7 +122,7 @@ TEST_CASE("Pose kernel: a point behind the camera keeps the error it last had in
   columns.x = x.data(), columns.y = y.data(), columns.z = z.data(), columns.u = u.data(), columns.v = v.data();
   columns.information = information.data(), columns.active = active.data(), columns.error = error.data();
   const cfp::SE3<double> front, behind{cfp::Matrix3<double>::Identity(), {0, 0, -3}};
-  const std::size_t lanes = static_cast<std::size_t>(cfp::lanes_of<P>);
+  const std::size_t lanes = static_cast<std::size_t>(cfp::simd::lanes_of<P>);
   PoseSystem first, second, third;
   cfp::detail::add_pinhole<P, false>(columns, 0, lanes, camera, 0, front, cfp::Trivial<P>{}, first);
   CHECK(first.cost == Approx(25.0));

@@ -80,16 +80,16 @@ TEST_CASE("Losses: an invalid scale or name is reported", "[optimization]") {
 
 TEMPLATE_TEST_CASE("Losses: a packet of residuals gives the scalar results", "[optimization]", float, double) {
   using Scalar = TestType;
-  using P = cfp::Packet<Scalar>;
-  constexpr int lanes = cfp::lanes_of<P>;
+  using P = cfp::simd::Packet<Scalar>;
+  constexpr int lanes = cfp::simd::lanes_of<P>;
   for (const cfp::LossType type : all_types) {
     for (Scalar base = 0; base < Scalar(100); base += Scalar(1.37)) {
       Scalar s[lanes], value[lanes], first[lanes], second[lanes];
       for (int i = 0; i < lanes; ++i) s[i] = base * static_cast<Scalar>(i + 1);
       cfp::with_loss<P>(type, P(Scalar(2.5)), [&](const auto& loss) {
-        cfp::store(value, loss.value(cfp::load<P>(s)));
-        cfp::store(first, loss.first(cfp::load<P>(s)));
-        cfp::store(second, loss.second(cfp::load<P>(s)));
+        cfp::simd::store(value, loss.value(cfp::simd::load<P>(s)));
+        cfp::simd::store(first, loss.first(cfp::simd::load<P>(s)));
+        cfp::simd::store(second, loss.second(cfp::simd::load<P>(s)));
       });
       const cfp::RobustLoss<Scalar> loss{type, Scalar(2.5)};
       for (int i = 0; i < lanes; ++i) {

@@ -9,12 +9,12 @@
 
 namespace {
 
-using cfp::Packet;
+using cfp::simd::Packet;
 
 /// Applies a generic lambda to whole packets and to single lanes, and checks that they agree to `ulps` roundings.
 template <typename T, typename Operation>
 void check_lanes(Operation operation, T low, T high, T ulps) {
-  constexpr int lanes = cfp::lanes_of<Packet<T>>;
+  constexpr int lanes = cfp::simd::lanes_of<Packet<T>>;
   cfp::Random random(11, "packet");
   for (int round = 0; round < 200; ++round) {
     T a[lanes], b[lanes], c[lanes], result[lanes];
@@ -23,7 +23,8 @@ void check_lanes(Operation operation, T low, T high, T ulps) {
       b[i] = static_cast<T>(random.uniform(low, high));
       c[i] = static_cast<T>(random.uniform(low, high));
     }
-    cfp::store(result, operation(cfp::load<Packet<T>>(a), cfp::load<Packet<T>>(b), cfp::load<Packet<T>>(c)));
+    cfp::simd::store(
+        result, operation(cfp::simd::load<Packet<T>>(a), cfp::simd::load<Packet<T>>(b), cfp::simd::load<Packet<T>>(c)));
     for (int i = 0; i < lanes; ++i) {
       const T expected = operation(a[i], b[i], c[i]);
       const T scale = std::abs(expected) + (ulps > 0 ? std::abs(a[i] * b[i]) : T(0));
@@ -47,24 +48,25 @@ TEMPLATE_TEST_CASE("Packet: every operation equals the scalar one in every lane"
   check_lanes<T>([](auto a, auto, auto) { return sqrt(a); }, T(0), T(9), T(2));
   check_lanes<T>([](auto a, auto, auto) { return abs(a); }, T(-9), T(9), T(0));
   check_lanes<T>([](auto a, auto, auto) { return log1p(a); }, T(0), T(9), T(1));
-  check_lanes<T>([](auto a, auto, auto) { return cfp::reciprocal(a); }, T(1), T(9), T(0));
-  check_lanes<T>([](auto a, auto, auto) { return cfp::reciprocal_sqrt(a); }, T(0.1), T(9), T(3));
-  check_lanes<T>([](auto a, auto b, auto c) { return cfp::multiply_add(a, b, c); }, T(-9), T(9), T(1));
-  check_lanes<T>([](auto a, auto b, auto c) { return cfp::select(a < b, b, c); }, T(-9), T(9), T(0));
-  check_lanes<T>([](auto a, auto b, auto c) { return cfp::select((a <= b) & (b > c), a, c); }, T(-9), T(9), T(0));
-  check_lanes<T>([](auto a, auto b, auto c) { return cfp::select((a >= b) | (b > c), a, c); }, T(-9), T(9), T(0));
+  check_lanes<T>([](auto a, auto, auto) { return cfp::simd::reciprocal(a); }, T(1), T(9), T(0));
+  check_lanes<T>([](auto a, auto, auto) { return cfp::simd::reciprocal_sqrt(a); }, T(0.1), T(9), T(3));
+  check_lanes<T>([](auto a, auto b, auto c) { return cfp::simd::multiply_add(a, b, c); }, T(-9), T(9), T(1));
+  check_lanes<T>([](auto a, auto b, auto c) { return cfp::simd::select(a < b, b, c); }, T(-9), T(9), T(0));
+  check_lanes<T>([](auto a, auto b, auto c) { return cfp::simd::select((a <= b) & (b > c), a, c); }, T(-9), T(9), T(0));
+  check_lanes<T>([](auto a, auto b, auto c) { return cfp::simd::select((a >= b) | (b > c), a, c); }, T(-9), T(9), T(0));
 }
 
 TEMPLATE_TEST_CASE("Packet: a comparison with NaN is false, and select drops the branch not taken", "[core]", float,
                    double) {
   using T = TestType;
   using P = Packet<T>;
-  constexpr int lanes = cfp::lanes_of<P>;
+  constexpr int lanes = cfp::simd::lanes_of<P>;
   const P nan(std::numeric_limits<T>::quiet_NaN());
-  for (const P& chosen : {cfp::select(nan < P(T(1)), nan, P(T(5))), cfp::select(nan >= P(T(1)), nan, P(T(5))),
-                          cfp::select(P(T(0)) <= P(T(0)), P(T(5)), nan)}) {
+  for (const P& chosen :
+       {cfp::simd::select(nan < P(T(1)), nan, P(T(5))), cfp::simd::select(nan >= P(T(1)), nan, P(T(5))),
+        cfp::simd::select(P(T(0)) <= P(T(0)), P(T(5)), nan)}) {
     T out[lanes];
-    cfp::store(out, chosen);
+    cfp::simd::store(out, chosen);
     for (const T x : out) CHECK(x == T(5));
   }
 }
@@ -72,11 +74,11 @@ TEMPLATE_TEST_CASE("Packet: a comparison with NaN is false, and select drops the
 TEMPLATE_TEST_CASE("Packet: partial loads read n numbers, the sum adds all lanes", "[core]", float, double) {
   using T = TestType;
   using P = Packet<T>;
-  for (std::size_t n = 0; n <= static_cast<std::size_t>(cfp::lanes_of<P>); ++n) {
+  for (std::size_t n = 0; n <= static_cast<std::size_t>(cfp::simd::lanes_of<P>); ++n) {
     const std::vector<T> values(n, T(3));  // exactly n: the address sanitizer sees a read beyond
     const T rest = T(0.5);
-    CHECK(cfp::reduce_add(cfp::load_partial<P>(values.data(), n, rest)) ==
-          T(3) * static_cast<T>(n) + rest * static_cast<T>(cfp::lanes_of<P> - static_cast<int>(n)));
+    CHECK(cfp::simd::reduce_add(cfp::simd::load_partial<P>(values.data(), n, rest)) ==
+          T(3) * static_cast<T>(n) + rest * static_cast<T>(cfp::simd::lanes_of<P> - static_cast<int>(n)));
   }
-  CHECK(cfp::reduce_add(P(T(2))) == T(2) * cfp::lanes_of<P>);
+  CHECK(cfp::simd::reduce_add(P(T(2))) == T(2) * cfp::simd::lanes_of<P>);
 }

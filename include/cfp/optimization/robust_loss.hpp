@@ -36,14 +36,14 @@ struct Huber {
 
   [[nodiscard]] Scalar value(const Scalar& s) const noexcept {
     // s / sqrt(s): no second root beside that of first(). The smallest number keeps infinity from meeting 0.
-    const Scalar root = s * (reciprocal_sqrt(s) + Scalar((std::numeric_limits<scalar_of<Scalar>>::min)()));
-    return select(s <= delta * delta, s, Scalar(2) * delta * root - delta * delta);
+    const Scalar root = s * (simd::reciprocal_sqrt(s) + Scalar((std::numeric_limits<simd::scalar_of<Scalar>>::min)()));
+    return simd::select(s <= delta * delta, s, Scalar(2) * delta * root - delta * delta);
   }
   [[nodiscard]] Scalar first(const Scalar& s) const noexcept {
-    return select(s <= delta * delta, Scalar(1), delta * reciprocal_sqrt(s));
+    return simd::select(s <= delta * delta, Scalar(1), delta * simd::reciprocal_sqrt(s));
   }
   [[nodiscard]] Scalar second(const Scalar& s) const noexcept {
-    return select(s <= delta * delta, Scalar(0), Scalar(-0.5) * first(s) / s);
+    return simd::select(s <= delta * delta, Scalar(0), Scalar(-0.5) * first(s) / s);
   }
 };
 
@@ -67,7 +67,7 @@ struct GemanMcClure {
 
   [[nodiscard]] Scalar value(const Scalar& s) const noexcept {
     // Two forms of one quotient: the first is exact at 0, the second at infinity.
-    return select(s <= delta * delta, s * share(s), delta * delta * (Scalar(1) - share(s)));
+    return simd::select(s <= delta * delta, s * share(s), delta * delta * (Scalar(1) - share(s)));
   }
   [[nodiscard]] Scalar first(const Scalar& s) const noexcept { return share(s) * share(s); }
   [[nodiscard]] Scalar second(const Scalar& s) const noexcept {
@@ -84,10 +84,10 @@ struct Truncated {
   Scalar delta = Scalar(1);
 
   [[nodiscard]] Scalar value(const Scalar& s) const noexcept {
-    return select(s <= delta * delta, s, Scalar(delta * delta));
+    return simd::select(s <= delta * delta, s, Scalar(delta * delta));
   }
   [[nodiscard]] Scalar first(const Scalar& s) const noexcept {
-    return select(s <= delta * delta, Scalar(1), Scalar(0));
+    return simd::select(s <= delta * delta, Scalar(1), Scalar(0));
   }
   [[nodiscard]] Scalar second(const Scalar&) const noexcept { return Scalar(0); }
 };

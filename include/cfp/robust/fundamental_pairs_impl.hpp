@@ -96,23 +96,23 @@ template <typename T>
 // distance is e / n.
 template <typename T>
 struct SampsonPacket {
-  using P = Packet<T>;
+  using P = simd::Packet<T>;
   P p0, p1, q0, q1, l0, l1, m0, m1, e, n2;
 
   SampsonPacket(const PairColumns<T>& in, std::size_t i, const Matrix3<T>& F) noexcept
-      : p0(cfp::load<P>(in.row[0] + i)),
-        p1(cfp::load<P>(in.row[1] + i)),
-        q0(cfp::load<P>(in.row[2] + i)),
-        q1(cfp::load<P>(in.row[3] + i)) {
+      : p0(simd::load<P>(in.row[0] + i)),
+        p1(simd::load<P>(in.row[1] + i)),
+        q0(simd::load<P>(in.row[2] + i)),
+        q1(simd::load<P>(in.row[3] + i)) {
     const auto line = [](const P& x, const P& y, T a, T b, T c) {
-      return multiply_add(P(a), x, multiply_add(P(b), y, P(c)));
+      return simd::multiply_add(P(a), x, simd::multiply_add(P(b), y, P(c)));
     };
     l0 = line(p0, p1, F(0, 0), F(0, 1), F(0, 2));
     l1 = line(p0, p1, F(1, 0), F(1, 1), F(1, 2));
     m0 = line(q0, q1, F(0, 0), F(1, 0), F(2, 0));
     m1 = line(q0, q1, F(0, 1), F(1, 1), F(2, 1));
-    e = multiply_add(q0, l0, multiply_add(q1, l1, line(p0, p1, F(2, 0), F(2, 1), F(2, 2))));
-    n2 = multiply_add(l0, l0, l1 * l1) + multiply_add(m0, m0, m1 * m1);
+    e = simd::multiply_add(q0, l0, simd::multiply_add(q1, l1, line(p0, p1, F(2, 0), F(2, 1), F(2, 2))));
+    n2 = simd::multiply_add(l0, l0, l1 * l1) + simd::multiply_add(m0, m0, m1 * m1);
   }
 };
 
@@ -121,19 +121,19 @@ struct SampsonPacket {
 template <typename T>
 [[nodiscard]] double msac_cost(const PairColumns<T>& in, const Matrix3<double>& F, double limit,
                                double bound) noexcept {
-  using P = Packet<T>;
+  using P = simd::Packet<T>;
   const Matrix3<T> f = F.template cast<T>();
   const P most(static_cast<T>(limit)), tiny(T(1e-30));
   const double stop = bound * limit;
   double sum = 0;
   for (std::size_t block = 0; block < in.size; block += PairArrays::block) {
     P cost(T(0));
-    for (std::size_t i = block; i < block + PairArrays::block; i += static_cast<std::size_t>(lanes_of<P>)) {
+    for (std::size_t i = block; i < block + PairArrays::block; i += static_cast<std::size_t>(simd::lanes_of<P>)) {
       const SampsonPacket<T> pair(in, i, f);
       const P d2 = pair.e * pair.e / (pair.n2 + tiny);
-      cost = multiply_add(cfp::load<P>(in.row[4] + i), select(d2 < most, d2, most), cost);
+      cost = simd::multiply_add(simd::load<P>(in.row[4] + i), simd::select(d2 < most, d2, most), cost);
     }
-    sum += static_cast<double>(reduce_add(cost));
+    sum += static_cast<double>(simd::reduce_add(cost));
     if (!(sum < stop)) break;
   }
   return sum / limit;
@@ -143,11 +143,11 @@ template <typename T>
 // so that no comparison takes such a pair for an inlier.
 template <typename T>
 void sampson_distances_sq(const PairColumns<T>& in, const Matrix3<T>& F, std::vector<T>& out) noexcept {
-  using P = Packet<T>;
+  using P = simd::Packet<T>;
   CFP_ASSERT(out.size() >= (in.size + PairArrays::block - 1) / PairArrays::block * PairArrays::block);
-  for (std::size_t i = 0; i < in.size; i += static_cast<std::size_t>(lanes_of<P>)) {
+  for (std::size_t i = 0; i < in.size; i += static_cast<std::size_t>(simd::lanes_of<P>)) {
     const SampsonPacket<T> pair(in, i, F);
-    store(out.data() + i, pair.e * pair.e / pair.n2);
+    simd::store(out.data() + i, pair.e * pair.e / pair.n2);
   }
 }
 
@@ -158,8 +158,8 @@ void sampson_distances_sq(const PairColumns<T>& in, const Matrix3<T>& F, std::ve
 // moments.
 template <typename T>
 double sampson_system(const PairColumns<T>& in, const Matrix3<double>& F, double scale,
-                                    NormalEquations<9>& out) noexcept {
-  using P = Packet<T>;
+                      NormalEquations<9>& out) noexcept {
+  using P = simd::Packet<T>;
   const Matrix3<T> f = F.template cast<T>();
   const P zero(T(0)), one(T(1)), tiny(T(1e-30)), inverse_scale(T(1 / scale));
   P moments[6][6], g[9], cost = zero;
@@ -167,20 +167,20 @@ double sampson_system(const PairColumns<T>& in, const Matrix3<double>& F, double
     for (P& m : row) m = zero;
   }
   for (P& h : g) h = zero;
-  for (std::size_t i = 0; i < in.size; i += static_cast<std::size_t>(lanes_of<P>)) {
+  for (std::size_t i = 0; i < in.size; i += static_cast<std::size_t>(simd::lanes_of<P>)) {
     const SampsonPacket<T> pair(in, i, f);
-    const P inverse_n2 = reciprocal(pair.n2 + tiny);
+    const P inverse_n2 = simd::reciprocal(pair.n2 + tiny);
     const P k = pair.e * inverse_n2;
     const P x = pair.e * k * inverse_scale;
-    const P s = reciprocal(x + one);
-    const P ws = cfp::load<P>(in.row[4] + i) * s;
-    cost = multiply_add(ws, x, cost);
+    const P s = simd::reciprocal(x + one);
+    const P ws = simd::load<P>(in.row[4] + i) * s;
+    cost = simd::multiply_add(ws, x, cost);
     const P weight = ws * s * inverse_n2, we = weight * pair.e;
     const P p[2] = {pair.p0, pair.p1}, wq[2] = {weight * pair.q0, weight * pair.q1}, m[2] = {k * pair.m0, k * pair.m1};
     const P qq[6] = {wq[0] * pair.q0, wq[0] * pair.q1, wq[0], wq[1] * pair.q1, wq[1], weight};
     const P pp[5] = {p[0] * p[0], p[0] * p[1], p[0], p[1] * p[1], p[1]};
     for (int r = 0; r < 6; ++r) {
-      for (int c = 0; c < 5; ++c) moments[r][c] = multiply_add(qq[r], pp[c], moments[r][c]);
+      for (int c = 0; c < 5; ++c) moments[r][c] = simd::multiply_add(qq[r], pp[c], moments[r][c]);
       moments[r][5] += qq[r];
     }
     const P a[3] = {we * (pair.q0 - k * pair.l0), we * (pair.q1 - k * pair.l1), we},
@@ -192,11 +192,12 @@ double sampson_system(const PairColumns<T>& in, const Matrix3<double>& F, double
   }
   constexpr int symmetric[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
   for (int r = 0; r < 9; ++r) {
-    out.g[r] = static_cast<double>(reduce_add(g[r])) / scale;
+    out.g[r] = static_cast<double>(simd::reduce_add(g[r])) / scale;
     for (int c = 0; c < 9; ++c)
-      out.H(r, c) = static_cast<double>(reduce_add(moments[symmetric[r / 3][c / 3]][symmetric[r % 3][c % 3]])) / scale;
+      out.H(r, c) =
+          static_cast<double>(simd::reduce_add(moments[symmetric[r / 3][c / 3]][symmetric[r % 3][c % 3]])) / scale;
   }
-  return static_cast<double>(reduce_add(cost));
+  return static_cast<double>(simd::reduce_add(cost));
 }
 
 }  // namespace CFP_ISA

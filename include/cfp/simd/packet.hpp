@@ -7,9 +7,8 @@
 ///   square<Packet<float>>(x, y);  square<float>(x, y);
 ///
 /// Built on Eigen's packet operations (internal, but the same from Eigen 3.4 to 5 and from SSE2 to AVX-512 and NEON);
-/// this is the only header that touches them. The width follows the flags of the including project and is part of the
-/// type's name, so that units built with different flags do not share code by mistake. Nothing asks for flags and
-/// nothing allocates.
+/// this is the only header that touches them. The width follows the flags of the including project. Nothing asks for
+/// flags and nothing allocates.
 #pragma once
 
 #include <cmath>
@@ -27,7 +26,8 @@
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
 #endif
 
-namespace cfp {
+namespace cfp::simd {
+inline namespace CFP_ISA {
 
 /// Numbers per register: 4 floats for SSE2 and NEON, 16 for AVX-512; 1 where there is no vector unit for T.
 template <typename T>
@@ -223,7 +223,8 @@ template <typename T, int Lanes>
   return Eigen::internal::predux(p.bits);
 }
 
-}  // namespace cfp
+}  // namespace CFP_ISA
+}  // namespace cfp::simd
 
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC diagnostic pop

@@ -32,7 +32,7 @@ template <typename Scalar, typename Input, typename Camera>
 [[nodiscard]] PoseResult refine_pose(const PoseObservations<Input>& observations, const Camera& camera,
                                      const SE3<double>& T_cam_world, const PoseOptions& options,
                                      PoseWorkspace<Scalar>& workspace, span<char> inliers = {}) {
-  return detail::refine_pose_with<Packet<Scalar>>(observations, camera, T_cam_world, options, workspace, inliers);
+  return detail::refine_pose_with<simd::Packet<Scalar>>(observations, camera, T_cam_world, options, workspace, inliers);
 }
 
 }  // namespace CFP_ISA

@@ -31,7 +31,7 @@ template <typename Camera>
 /// P: the packet, or the scalar, that walks over the columns.
 template <typename P, typename Camera>
 struct PoseModel {
-  using Scalar = scalar_of<P>;
+  using Scalar = simd::scalar_of<P>;
   const Camera& camera;
   const PoseOptions& options;
   PoseColumns<Scalar> columns;  // errors are those at last_pose
@@ -129,7 +129,7 @@ template <typename Scalar>
 template <typename P, typename Camera>
 SolverStatus run_rounds(PoseModel<P, Camera>& model, const SE3<double>& start, PoseResult& result, SE3<double>& pose,
                         NormalEquations<6>& equations) noexcept {
-  using Scalar = scalar_of<P>;
+  using Scalar = simd::scalar_of<P>;
   using Problem = DenseLeastSquares<6, SE3<double>, PoseModel<P, Camera>>;
   const PoseOptions& options = model.options;
   SolverStatus status = SolverStatus::not_enough_data;
@@ -174,7 +174,7 @@ template <typename Input>
 template <typename P, typename Input, typename Camera>
 PoseResult refine_pose_with(const PoseObservations<Input>& observations, const Camera& camera,
                             const SE3<double>& T_cam_world, const PoseOptions& options,
-                            PoseWorkspace<scalar_of<P>>& workspace, span<char> inliers) {
+                            PoseWorkspace<simd::scalar_of<P>>& workspace, span<char> inliers) {
   CFP_ASSERT(!invalid_field(options));
   PoseResult result;
   result.T_cam_world = T_cam_world;
@@ -187,7 +187,8 @@ PoseResult refine_pose_with(const PoseObservations<Input>& observations, const C
   const SE3<double> start{normalized_rotation(T_cam_world.rotation), Vector3<double>::Zero()};
   const Vector3<double> centre = -(start.rotation.transpose() * T_cam_world.translation);
   PoseModel<P, Camera> model{camera, options, {}, {}, {}};
-  load_columns(observations, camera, centre, static_cast<std::size_t>(lanes_of<P>), workspace, model.columns, result);
+  load_columns(observations, camera, centre, static_cast<std::size_t>(simd::lanes_of<P>), workspace, model.columns,
+               result);
   if (result.used < options.min_observations) {
     const bool no_weight = result.used == 0 && result.zero_weight > 0 && result.invalid == 0;
     result.status = no_weight ? SolverStatus::no_weight : SolverStatus::not_enough_data;
