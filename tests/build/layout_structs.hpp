@@ -1,7 +1,7 @@
 // Every public struct, one line each: CFP_LAYOUT(type, last data member) or, where the members are private or there are
 // none, CFP_LAYOUT_OPAQUE(type). check_layout_list.cmake names those that are missing.
-// Left out because they are registers, made to follow the flags, and never stored: cfp::simd::PacketMask, cfp::simd::BasicPacket,
-// of simd/packet.hpp.
+// Left out because they are registers, made to follow the flags, and never stored: PacketMask and BasicPacket of
+// simd/packet.hpp.
 #pragma once
 
 #include "cfp/cfp.hpp"
