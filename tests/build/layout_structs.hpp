@@ -26,6 +26,7 @@
   CFP_LAYOUT(cfp::ForegroundWorkspace<double>, labels)                   \
   CFP_LAYOUT_OPAQUE(cfp::Tolerance<float>)                               \
   CFP_LAYOUT_OPAQUE(cfp::Random)                                         \
+  CFP_LAYOUT_OPAQUE(cfp::OptionPath)                                     \
   CFP_LAYOUT_OPAQUE(cfp::span<const float>)                              \
   CFP_LAYOUT_OPAQUE(cfp::PointSpan<float, 2>)                            \
   CFP_LAYOUT_OPAQUE(cfp::PointSpan<double, 3>)                           \
