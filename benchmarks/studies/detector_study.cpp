@@ -1,8 +1,9 @@
 // What the detectors of the SLAM example find on a real recording, against two lists of boxes made elsewhere (NanoDet-m
 // 320's own program; YOLOv5x on the first ten frames): recall and precision of persons at IoU >= 0.5 over the score
-// threshold, time per frame. The default thresholds of examples/slam/detection/network_detector.hpp rest on it.
+// threshold, time per frame. The default threshold of FastestDet in examples/detection/network_detector.hpp rests on
+// it.
 //   cfp_detector_study [--pictures FOLDER]
-#include "../../examples/slam/detection/detector.hpp"
+#include "../../examples/detection/detector.hpp"
 
 #include <chrono>
 #include <cstdio>
@@ -30,7 +31,7 @@ struct Score {
 };
 
 // One-to-one, surest box first.
-void compare(const cfp_slam::Detections& reference, const cfp_slam::Detections& found, Score& score) {
+void compare(const cfp_examples::Detections& reference, const cfp_examples::Detections& found, Score& score) {
   std::vector<char> taken(reference.size(), 0);
   score.reference += static_cast<int>(reference.size());
   score.found += static_cast<int>(found.size());
@@ -47,7 +48,7 @@ void compare(const cfp_slam::Detections& reference, const cfp_slam::Detections& 
   }
 }
 
-cfp_slam::Detections people(const cfp_slam::Detector& detector, cfp_slam::Detections all, float min_score) {
+cfp_examples::Detections people(const cfp_examples::Detector& detector, cfp_examples::Detections all, float min_score) {
   const int person = detector.class_of("person");
   all.erase(std::remove_if(all.begin(), all.end(),
                            [&](const auto& d) { return d.class_id != person || !(d.score >= min_score); }),
@@ -76,8 +77,8 @@ int main(int argc, char** argv) {
         {image.time_s, fs::path(image.file).filename().string(), cv::imread((folder / image.file).string())});
     if (smoke && images.size() == 3) break;
   }
-  const auto nanodet_list = cfp_slam::make_detector((folder / "detections.txt").string()),
-             yolo_list = cfp_slam::make_detector((folder / "detections_yolov5x.txt").string());
+  const auto nanodet_list = cfp_examples::make_detector((folder / "detections.txt").string()),
+             yolo_list = cfp_examples::make_detector((folder / "detections_yolov5x.txt").string());
 
   std::printf(
       "persons at IoU >= 0.5; recall/precision against NanoDet's list (all frames) and YOLOv5x's (frames 0-9); %d "
@@ -85,14 +86,12 @@ int main(int argc, char** argv) {
       cv::getNumThreads());
   std::printf("%-36s %9s %7s   %s\n", "detector", "ms median", "score",
               "R/P of NanoDet's list   R/P of YOLOv5x's list");
-  for (const std::string& spec :
-       {(data / "detectors/nanodet.onnx").string(), (data / "detectors/FastestDet.onnx").string(),
-        (data / "detectors/yolo-fastest-1.1_body.cfg").string(), std::string("hog")}) {
-    cfp_slam::DetectorOptions options;
+  for (const std::string& spec : {(data / "detectors/FastestDet.onnx@352").string(), std::string("hog")}) {
+    cfp_examples::DetectorOptions options;
     const bool hog = spec == "hog";
     options.min_score = hog ? 0 : 0.1;
-    const auto detector = cfp_slam::make_detector(spec, options);
-    std::vector<cfp_slam::Detections> all;
+    const auto detector = cfp_examples::make_detector(spec, options);
+    std::vector<cfp_examples::Detections> all;
     std::vector<double> ms;
     for (const Image& image : images) {
       const auto start = std::chrono::steady_clock::now();
@@ -112,7 +111,7 @@ int main(int argc, char** argv) {
                   yolo.common, yolo.reference, yolo.common, yolo.found);
     }
     if (pictures.empty()) continue;
-    const auto drawn = cfp_slam::make_detector(spec);
+    const auto drawn = cfp_examples::make_detector(spec);
     for (const Image& image : images) {
       cv::Mat picture = image.bgr.clone();
       for (const auto& d : drawn->detect(image.bgr, image.time_s)) {

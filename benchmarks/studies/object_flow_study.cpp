@@ -20,9 +20,9 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
-#include "../../examples/slam/detection/simple_detectors.hpp"
-#include "../../examples/slam/input/sequence.hpp"
+#include "../../examples/detection/simple_detectors.hpp"
 #include "../../examples/slam/loop/flow.hpp"
+#include "../../examples/support/sequence.hpp"
 #include "../../examples/synthetic/sequence.hpp"
 #include "cfp/evaluation/calibration.hpp"
 #include "cfp/frame/first_stage.hpp"
@@ -240,23 +240,25 @@ int main(int argc, char** argv) {
     images.push_back(std::move(image));
   };
   for (const std::string& folder : folders) {
-    const cfp_slam::Sequence sequence(folder);
-    std::unique_ptr<cfp_slam::FileDetector> detections;
+    const cfp_examples::Sequence sequence(folder);
+    std::unique_ptr<cfp_examples::FileDetector> detections;
     images.clear();
     for (std::size_t i = 0; i < sequence.size(); ++i) {
-      const cfp_slam::SequenceFrame frame = sequence.load(i);
+      const cfp_examples::SequenceFrame frame = sequence.load(i);
       std::vector<cfp::Box<float>> boxes;
       for (const auto& b : sequence.true_boxes(i)) {
         if (b.pixels >= 2000 && b.visible_fraction >= 0.3) boxes.push_back(b.box);
       }
       if (!frame.usable) continue;
-      if (frame.labels.empty()) {
+      std::string note;
+      const cv::Mat labels = sequence.load_labels(i, note);
+      if (labels.empty()) {
         if (!detections)
-          detections = std::make_unique<cfp_slam::FileDetector>((sequence.folder() / "detections.txt").string(),
-                                                                cfp_slam::DetectorOptions{});
+          detections = std::make_unique<cfp_examples::FileDetector>((sequence.folder() / "detections.txt").string(),
+                                                                    cfp_examples::DetectorOptions{});
         for (const auto& d : detections->detect(frame.bgr, frame.time_s)) boxes.push_back(d.box);
       }
-      add(frame.bgr, frame.labels, boxes);
+      add(frame.bgr, labels, boxes);
     }
     const auto& c = sequence.calibration();
     judge(all, images, {float(c.fx), float(c.fy), float(c.cx), float(c.cy)});

@@ -1,7 +1,6 @@
 // cfp_synthetic: renders the eight sequences of the TUM fr3 protocol, with truth for everything.
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cstdio>
 #include <iostream>
 #include <memory>
@@ -12,6 +11,7 @@
 #include <CLI/CLI.hpp>
 #include <opencv2/core.hpp>
 
+#include "../support/progress.hpp"
 #include "writer.hpp"
 
 namespace {
@@ -27,16 +27,8 @@ std::vector<std::string> strings(const std::array<const char*, N>& names) {
 }
 
 void write_with_progress(const synthetic::Sequence& sequence, const std::filesystem::path& folder, int threads) {
-  using Clock = std::chrono::steady_clock;
-  const auto start = Clock::now();
-  const int frames = sequence.options().frames;
-  double rate = 0;
-  synthetic::write_sequence(sequence, folder, threads, [&](int done) {
-    rate = done / std::chrono::duration<double>(Clock::now() - start).count();
-    if (done % 10 == 0 || done == frames)
-      std::fprintf(stderr, "\r%s: %d / %d frames, %.1f per second ", folder.string().c_str(), done, frames, rate);
-  });
-  std::fprintf(stderr, "\n");
+  cfp_examples::Progress progress(folder.string(), static_cast<std::size_t>(sequence.options().frames));
+  synthetic::write_sequence(sequence, folder, threads, [&](int done) { progress(static_cast<std::size_t>(done)); });
 }
 
 }  // namespace

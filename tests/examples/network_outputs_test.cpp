@@ -1,5 +1,5 @@
 // The decoders against tensors made backwards from known boxes.
-#include "../../examples/slam/detection/network_outputs.hpp"
+#include "../../examples/detection/network_outputs.hpp"
 
 #include <cstring>
 #include <limits>
@@ -7,7 +7,7 @@
 #include "cfp/core/random.hpp"
 #include "support/catch.hpp"
 
-using namespace cfp_slam;
+using namespace cfp_examples;
 
 namespace {
 
@@ -27,16 +27,6 @@ std::vector<cv::Mat> blank(NetworkFamily family) {
       return {tensor({1, 3 * cells, 5 + classes})};
     case NetworkFamily::yolov8:
       return {tensor({1, 4 + classes, cells})};
-    case NetworkFamily::darknet:
-      return {tensor({240, 5 + classes}), tensor({960, 5 + classes})};
-    case NetworkFamily::nanodet: {
-      std::vector<cv::Mat> outputs;
-      for (const int stride : {16, 8, 32}) {
-        outputs.push_back(tensor({grid_cells(input, {stride}), 4 * nanodet_bins}));
-        outputs.push_back(tensor({1, grid_cells(input, {stride}), classes}));
-      }
-      return outputs;
-    }
     case NetworkFamily::fastestdet:
       return {tensor({1, 5 + classes, 16, 20})};
   }
@@ -51,12 +41,6 @@ Detections decode(NetworkFamily family, const std::vector<cv::Mat>& outputs, flo
       break;
     case NetworkFamily::yolov8:
       decode_yolov8(outputs[0], min_score, found);
-      break;
-    case NetworkFamily::darknet:
-      for (const cv::Mat& output : outputs) decode_darknet(output, input, min_score, found);
-      break;
-    case NetworkFamily::nanodet:
-      decode_nanodet(outputs, input, min_score, found);
       break;
     case NetworkFamily::fastestdet:
       decode_fastestdet(outputs[0], input, min_score, found);
@@ -83,26 +67,6 @@ void put(NetworkFamily family, std::vector<cv::Mat>& outputs, int at, const floa
       for (int c = 0; c < 4; ++c) data[c * cols + at] = box[c];
       data[(4 + id) * cols + at] = score;
       break;
-    case NetworkFamily::darknet: {
-      float* row = data + at * cols;
-      row[0] = cx / W, row[1] = cy / H, row[2] = w / W, row[3] = h / H, row[4] = 1, row[5 + id] = score;
-      break;
-    }
-    case NetworkFamily::nanodet: {
-      // Stride 8, cell (x, y): a distance between two bins is the share of the upper one.
-      const int x = static_cast<int>(cx / 8), y = static_cast<int>(cy / 8), cell = y * 40 + x;
-      const float px = (static_cast<float>(x) + 0.5F) * 8, py = (static_cast<float>(y) + 0.5F) * 8;
-      const float side[4] = {px - (cx - w / 2), py - (cy - h / 2), cx + w / 2 - px, cy + h / 2 - py};
-      for (int s = 0; s < 4; ++s) {
-        float* bins = outputs[2].ptr<float>() + cell * 4 * nanodet_bins + s * nanodet_bins;
-        std::fill(bins, bins + nanodet_bins, -1e4F);
-        const float share = side[s] / 8 - std::floor(side[s] / 8);
-        bins[static_cast<int>(side[s] / 8)] = std::log(1 - share);
-        bins[static_cast<int>(side[s] / 8) + 1] = std::log((std::max)(share, 1e-30F));
-      }
-      outputs[3].ptr<float>()[cell * classes + id] = score;
-      break;
-    }
     case NetworkFamily::fastestdet: {
       const int x = static_cast<int>(cx / 16), y = static_cast<int>(cy / 16), cell = y * 20 + x;
       const auto logit = [](float p) { return std::log(p / (1 - p)); };
@@ -115,8 +79,7 @@ void put(NetworkFamily family, std::vector<cv::Mat>& outputs, int at, const floa
   }
 }
 
-const NetworkFamily families[] = {NetworkFamily::yolov5, NetworkFamily::yolov8, NetworkFamily::darknet,
-                                  NetworkFamily::nanodet, NetworkFamily::fastestdet};
+const NetworkFamily families[] = {NetworkFamily::yolov5, NetworkFamily::yolov8, NetworkFamily::fastestdet};
 
 }  // namespace
 
@@ -146,14 +109,14 @@ TEST_CASE("Every decoder gives back the boxes its tensor was made from", "[detec
 TEST_CASE("A family is told from the shapes alone", "[detector]") {
   for (const NetworkFamily family : families) {
     INFO(to_string(family));
-    const NetworkLayout layout = recognise(blank(family), input, family == NetworkFamily::darknet);
+    const NetworkLayout layout = recognise(blank(family), input);
     CHECK(layout.family == family);
     CHECK(layout.classes == classes);
   }
-  CHECK(recognise({tensor({1, 25200, 85})}, {640, 640}, false).family == NetworkFamily::yolov5);
-  CHECK(recognise({tensor({1, 25200, 6})}, {640, 640}, false).classes == 1);
-  CHECK(recognise({tensor({1, 84, 8400})}, {640, 640}, false).family == NetworkFamily::yolov8);
-  CHECK(recognise({tensor({1, 84, 33600})}, {1280, 1280}, false).family == NetworkFamily::yolov8);
+  CHECK(recognise({tensor({1, 25200, 85})}, {640, 640}).family == NetworkFamily::yolov5);
+  CHECK(recognise({tensor({1, 25200, 6})}, {640, 640}).classes == 1);
+  CHECK(recognise({tensor({1, 84, 8400})}, {640, 640}).family == NetworkFamily::yolov8);
+  CHECK(recognise({tensor({1, 84, 33600})}, {1280, 1280}).family == NetworkFamily::yolov8);
 }
 
 TEST_CASE("Outputs of another kind are refused with their shapes", "[detector]") {
@@ -167,9 +130,9 @@ TEST_CASE("Outputs of another kind are refused with their shapes", "[detector]")
                                                     {cv::Mat(8400, 84, CV_8U)}};
   for (const auto& outputs : others) {
     INFO(shapes_of(outputs));
-    CHECK_THROWS_WITH(recognise(outputs, {640, 640}, false), Catch::Contains(shapes_of(outputs)));
+    CHECK_THROWS_WITH(recognise(outputs, {640, 640}), Catch::Contains(shapes_of(outputs)));
   }
-  CHECK_THROWS(recognise({tensor({300, 6}), tensor({300, 7})}, {320, 320}, true));
+  CHECK_THROWS(recognise({tensor({300, 6}), tensor({300, 7})}, {320, 320}));
 }
 
 TEST_CASE("Garbage in a tensor yields nothing but proper boxes", "[detector]") {

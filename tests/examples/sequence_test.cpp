@@ -1,4 +1,4 @@
-#include "../../examples/slam/input/sequence.hpp"
+#include "../../examples/support/sequence.hpp"
 
 #include <sys/stat.h>
 
@@ -9,7 +9,7 @@
 #include "support/data.hpp"
 #include "support/temporary_folder.hpp"
 
-using namespace cfp_slam;
+using namespace cfp_examples;
 using cfp_test::error_of;
 using cfp_test::TemporaryFolder;
 
@@ -64,7 +64,7 @@ TEST_CASE("A sound recording reads frame by frame, the same ahead or not", "[seq
   PrefetchingReader reader(sequence);
   for (const std::size_t i : {0U, 1U, 2U, 4U, 3U, 4U, 5U, 5U, 0U}) {
     const SequenceFrame frame = reader.load(i), again = sequence.load(i);
-    CHECK((frame.usable && frame.note.empty() && frame.labels.empty()));
+    CHECK((frame.usable && frame.note.empty()));
     CHECK(value_of(frame.bgr) == 10 * static_cast<int>(i) + 10);
     CHECK(value_of(frame.depth) == 1000 * static_cast<int>(i) + 1000);
     CHECK_THAT(frame.time_s, WithinAbs(static_cast<double>(i) / 10, 1e-9));
@@ -236,10 +236,12 @@ TEST_CASE("Labels, true boxes and truth come with the frames they belong to", "[
   folder.write("pseudo_groundtruth.txt", "0.1 1 2 3 0 0 0 1\n");
   const Sequence sequence(folder.path);
   CHECK((sequence.truth().size() == 1 && sequence.truth_file() == "pseudo_groundtruth.txt"));
-  CHECK((sequence.load(0).labels.empty() && sequence.load(0).usable &&
-         sequence.load(0).note.find("labels.txt:1: ") != std::string::npos));
-  CHECK(value_of(sequence.load(1).labels) == 2);
-  CHECK((sequence.load(2).labels.empty() && sequence.load(2).note.empty()));
+  std::string note;
+  CHECK((sequence.load_labels(0, note).empty() && sequence.load(0).usable));
+  CHECK(note.find("labels.txt:1: ") != std::string::npos);
+  note.clear();
+  CHECK(value_of(sequence.load_labels(1, note)) == 2);
+  CHECK((sequence.load_labels(2, note).empty() && note.empty()));
   CHECK((sequence.true_boxes(0).empty() && sequence.true_boxes(1).size() == 2 && sequence.true_boxes(2).size() == 1));
   CHECK((sequence.true_boxes(2)[0].identity == 7 && sequence.true_boxes(2)[0].box.y2 == 4));
 }

@@ -2,7 +2,10 @@
 
 #include <opencv2/imgcodecs.hpp>
 
-#include "../../examples/slam/detection/simple_detectors.hpp"
+#include "../../examples/detection/simple_detectors.hpp"
+#include "../../examples/slam/run_folder.hpp"
+#include "../../examples/slam_report/annotate.hpp"
+#include "../../examples/slam_report/read_run.hpp"
 #include "../../examples/synthetic/writer.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"
@@ -30,19 +33,24 @@ const std::filesystem::path& rendered() {
   return folder.path;
 }
 
-RunRecord run(const std::filesystem::path& folder, cfp::Variant variant = cfp::Variant::cfp, bool threads = false,
-              std::size_t pictures = 0) {
+using cfp_examples::FileDetector;
+using cfp_examples::NoDetector;
+using cfp_examples::Sequence;
+
+/// What the report reads of what the loop wrote.
+RunRecord run(const std::filesystem::path& folder, const std::string& variant = "cfp") {
+  const cfp_test::TemporaryFolder out;
   FileDetector detector((folder / "detections.txt").string(), {});
-  RunOptions options;
-  options.variant = variant;
-  options.threads = threads;
-  options.pictures = pictures;
-  return run_slam(Sequence(folder), detector, options, [](std::size_t) {});
+  RunSettings settings;
+  settings.recording = folder.string();
+  settings.variant = variant;
+  run_into(out.path, Sequence(folder), detector, settings, false, [](std::size_t) {});
+  return read_run(out.path);
 }
 
 std::size_t count(const RunRecord& run, Outcome outcome) {
   return static_cast<std::size_t>(
-      std::count_if(run.frames.begin(), run.frames.end(), [=](const FrameRecord& f) { return f.outcome == outcome; }));
+      std::count_if(run.frames.begin(), run.frames.end(), [=](const RunFrame& f) { return f.outcome == outcome; }));
 }
 
 /// The rendered sequence with other images in some places.
@@ -57,7 +65,8 @@ cfp_test::TemporaryFolder& changed(cfp_test::TemporaryFolder& folder, const Chan
 }  // namespace
 
 TEST_CASE("A sequence with walking people: every frame is tracked, to a centimetre", "[slam]") {
-  const RunRecord r = run(rendered(), cfp::Variant::cfp, false, 4);
+  RunRecord r = run(rendered());
+  add_pictures(r, r.recording, 4);
   CHECK(count(r, Outcome::tracked) == frames);
   REQUIRE(r.absolute.coverage.matched == frames);
   CHECK(r.absolute.translation_m.rmse < 0.01);
@@ -70,8 +79,16 @@ TEST_CASE("A sequence with walking people: every frame is tracked, to a centimet
 }
 
 TEST_CASE("Threads change the time, not a bit of the trajectory", "[slam]") {
-  const std::vector<cfp::StampedPose<double>> one = run(rendered()).trajectory(),
-                                              many = run(rendered(), cfp::Variant::cfp, true).trajectory();
+  std::vector<cfp::StampedPose<double>> trajectories[2];
+  for (const bool threads : {false, true}) {
+    FileDetector detector((rendered() / "detections.txt").string(), {});
+    RunOptions options;
+    options.threads = threads;
+    Observer nobody;
+    trajectories[threads] = run_slam(Sequence(rendered()), detector, options, nobody).trajectory;
+  }
+  const auto &one = trajectories[0], &many = trajectories[1];
+  REQUIRE(one.size() == frames);
   REQUIRE(one.size() == many.size());
   for (std::size_t k = 0; k < one.size(); ++k) {
     CHECK(one[k].T_world_cam.rotation == many[k].T_world_cam.rotation);
@@ -81,10 +98,10 @@ TEST_CASE("Threads change the time, not a bit of the trajectory", "[slam]") {
 
 TEST_CASE("Every variant runs the sequence to its end", "[slam]") {
   for (int v = 0; v <= static_cast<int>(cfp::Variant::plain); ++v) {
-    const RunRecord r = run(rendered(), static_cast<cfp::Variant>(v));
+    const RunRecord r = run(rendered(), cfp::to_string(static_cast<cfp::Variant>(v)));
     CAPTURE(r.variant);
     CHECK(r.frames.size() == frames);
-    for (const FrameRecord& f : r.frames) CHECK(cfp::is_usable(cfp::StampedPose<double>{f.time_s, f.T_world_cam}));
+    for (const RunFrame& f : r.frames) CHECK(cfp::is_usable(cfp::StampedPose<double>{f.time_s, f.T_world_cam}));
   }
 }
 
@@ -102,6 +119,39 @@ TEST_CASE("Frames that show nothing are lost, none is invented, and the map find
   CHECK(count(r, Outcome::tracked) == frames - 7);
   CHECK(r.trajectory().size() == frames - 6);
   CHECK(r.absolute.translation_m.rmse < 0.01);
+}
+
+TEST_CASE("The fine stage after a relocalisation rests on the inliers of the pose that it found", "[slam]") {
+  // From frame 24 on the camera stands on its head: nothing is where the motion model expects it, all is in the map.
+  cfp_test::TemporaryFolder folder;
+  changed(folder, [](std::size_t k, const std::filesystem::path& image) {
+    if (k < 24) return;
+    for (const std::filesystem::path& file : {image, image.parent_path().parent_path() / "depth" / image.filename()}) {
+      cv::Mat turned;
+      cv::flip(cv::imread(file.string(), cv::IMREAD_UNCHANGED), turned, -1);
+      cv::imwrite(file.string(), turned);
+    }
+  });
+  struct Confidence final : Observer {
+    void weighted(const cfp::StageResult<float>& result, const cfp::FrameState<float>&, const Frame&) override {
+      if (result.report.stage == cfp::Stage::fine) last = result.report.projection.confidence;
+    }
+    void finished(const FrameRecord& record) override {
+      outcomes.push_back(record.outcome);
+      confidence.push_back(last);
+      last = -1;
+    }
+    double last = -1;
+    std::vector<double> confidence;
+    std::vector<Outcome> outcomes;
+  } observer;
+  NoDetector detector;
+  RunOptions options;
+  options.threads = false;
+  run_slam(Sequence(folder.path), detector, options, observer);
+  REQUIRE(observer.outcomes.size() == frames);
+  REQUIRE(observer.outcomes[24] == Outcome::relocalised);
+  CHECK(observer.confidence[24] > 0.5 * observer.confidence[23]);
 }
 
 TEST_CASE("Damaged frames are skipped with their line; the others are tracked", "[slam]") {

@@ -1,4 +1,4 @@
-#include "../../examples/slam/report/claims.hpp"
+#include "../../examples/slam_report/claims.hpp"
 
 #include "support/catch.hpp"
 

@@ -1,6 +1,6 @@
-#include "../../examples/slam/report/report.hpp"
+#include "../../examples/slam_report/report.hpp"
 
-#include "../../examples/slam/report/picture.hpp"
+#include "../../examples/slam_report/picture.hpp"
 
 #include <cstdlib>
 #include <fstream>

@@ -1,21 +1,12 @@
-#include "../../examples/slam/report/summary_file.hpp"
+#include "../../examples/slam_report/summary.hpp"
 
 #include <limits>
 
-#include "../../examples/slam/report/experiment.hpp"
+#include "../../examples/slam_report/experiment.hpp"
 #include "support/catch.hpp"
 #include "support/fake_runs.hpp"
 
 using namespace cfp_slam;
-
-namespace {
-
-/// Field by field, NaN equal to NaN.
-bool same(const RunSummary& a, const RunSummary& b) { return to_json_line(a) == to_json_line(b); }
-
-RunSummary full_summary() { return summarize(cfp_test::fake_run({})); }
-
-}  // namespace
 
 TEST_CASE("Quantiles are those of the ranked finite values", "[slam]") {
   const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
@@ -85,69 +76,8 @@ TEST_CASE("A run without truth, frames or labels has no errors, not errors of ze
   }
   CHECK(std::isnan(summarize(RunRecord{}).median_ms[0]));
   auto blind = cfp_test::fake_run({});
-  for (FrameRecord& frame : blind.frames) frame.outcome = Outcome::lost;
+  for (RunFrame& frame : blind.frames) frame.outcome = Outcome::lost;
   cfp_test::evaluate(blind);
   CHECK(std::isnan(summarize(blind).ate_rmse_m));
   CHECK(coverage_percent(summarize(blind)) == 0);
-}
-
-TEST_CASE("A summary survives a line of JSON bit for bit", "[slam]") {
-  RunSummary s = full_summary();
-  s.variant = "with \"quotes\", \\ and\nlines\t{}:,";
-  s.detector = "Größe";
-  s.seed = 18446744073709551615ULL;
-  s.ate_rmse_m = 0.1 + 0.2;
-  s.ate_max_m = 5e-324;
-  s.rpe_sd_m = -1.7976931348623157e308;
-  s.rpe_rmse_deg = not_known;
-  const std::string line = to_json_line(s);
-  CHECK(line.back() == '\n');
-  CHECK(line.find('\n') == line.size() - 1);
-  const auto back = from_json_line(line);
-  REQUIRE(back.has_value());
-  CHECK(same(*back, s));
-  CHECK(back->variant == s.variant);
-  CHECK(back->ate_rmse_m == s.ate_rmse_m);
-  CHECK(back->ate_max_m == s.ate_max_m);
-  CHECK(std::isnan(back->rpe_rmse_deg));
-  CHECK(back->second_stage.auc == s.second_stage.auc);
-  RunSummary infinite = s;
-  infinite.ate_rmse_m = std::numeric_limits<double>::infinity();
-  CHECK(std::isnan(from_json_line(to_json_line(infinite))->ate_rmse_m));
-}
-
-TEST_CASE("A line that is cut off, incomplete or no summary is refused", "[slam]") {
-  const std::string line = to_json_line(full_summary());
-  for (std::size_t n = 0; n + 2 < line.size(); ++n) REQUIRE_FALSE(from_json_line(line.substr(0, n)).has_value());
-  for (const char* other :
-       {"", "{}", "[]", "null", "{\"sequence\": \"a\"}", "{\"sequence\"}", "x", "{\"a\": \"\\u00"}) {
-    CHECK_FALSE(from_json_line(other).has_value());
-  }
-  CHECK_FALSE(from_json_line(line + line).has_value());
-  std::string wrong = line;
-  wrong.replace(wrong.find("300"), 3, "-30");
-  CHECK_FALSE(from_json_line(wrong).has_value());
-  std::string more = line;
-  more.insert(1, "\"of a later version\": 1, ");
-  CHECK(from_json_line(more).has_value());
-}
-
-TEST_CASE("An experiment resumes from its file, a line cut off included", "[slam]") {
-  const auto file = std::filesystem::temp_directory_path() / "cfp_slam_summary_test.jsonl";
-  std::filesystem::remove(file);
-  CHECK(read_summaries(file).empty());
-  RunSummary s = full_summary();
-  append_summary(file, s);
-  s.seed = 2;
-  append_summary(file, s);
-  std::filesystem::resize_file(file, std::filesystem::file_size(file) - 100);
-  REQUIRE(read_summaries(file).size() == 1);
-  s.seed = 3;
-  append_summary(file, s);
-  const auto runs = read_summaries(file);
-  REQUIRE(runs.size() == 2);
-  CHECK(runs[0].seed == 1);
-  CHECK(runs[1].seed == 3);
-  CHECK(same(runs[1], s));
-  std::filesystem::remove(file);
 }

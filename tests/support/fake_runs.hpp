@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "../../examples/slam/record.hpp"
+#include "../../examples/slam_report/run_record.hpp"
 #include "cfp/core/random.hpp"
 
 namespace cfp_test {
@@ -43,7 +43,7 @@ inline void evaluate(cfp_slam::RunRecord& run) {
   run.relative = cfp::relative_pose_error(View(run.truth), View(estimate), relative, workspace);
 }
 
-inline void fake_boxes(const FakeRun& fake, std::size_t k, cfp::Random& random, cfp_slam::FrameRecord& frame,
+inline void fake_boxes(const FakeRun& fake, std::size_t k, cfp::Random& random, cfp_slam::RunFrame& frame,
                        cfp_slam::RunRecord& run) {
   const auto probability = [&](bool is_static, double sharpness) {
     return static_cast<float>(1 / (1 + std::exp(-(is_static ? 1.0 : -1.0) * sharpness - 1.2 * random.normal())));
@@ -68,7 +68,7 @@ inline void fake_boxes(const FakeRun& fake, std::size_t k, cfp::Random& random, 
         samples->probability.push_back(p);
         samples->is_static.push_back(is_static);
       }
-      ++frame.keypoint_histogram[(std::min)(static_cast<std::size_t>(10 * second), std::size_t{9})];
+      frame.box_keypoints.push_back({box.box.x1, box.box.y1, 31, is_static, first, second, second});
     }
   }
 }
@@ -84,7 +84,7 @@ inline cfp_slam::RunRecord fake_run(const FakeRun& fake) {
   const cfp::SE3<double> T_map_world = fake_truth(0).inverse();
   const double start_s = 1305031102.175304;
   for (std::size_t k = 0; k < fake.frames; ++k) {
-    cfp_slam::FrameRecord frame;
+    cfp_slam::RunFrame frame;
     const double t = static_cast<double>(k) / 30;
     frame.time_s = start_s + t;
     frame.image = "rgb/" + std::to_string(k) + ".png";
@@ -125,11 +125,9 @@ inline cfp_slam::RunRecord fake_run(const FakeRun& fake) {
       if (frame.keyframe) take(Module::bundle_adjustment, 18);
       if (weighted) {
         take(Module::detection, 17);
-        take(Module::boxes, 0.03);
         take(Module::flow, 3.8);
-        if (fake.variant != "cfp-minus") take(Module::objects, 0.9);
-        take(Module::keypoints_first, 0.35);
-        take(Module::keypoints_second, 0.6);
+        take(Module::coarse, fake.variant != "cfp-minus" ? 1.28 : 0.38);
+        take(Module::fine, 0.6);
       }
       take(Module::tracking, weighted ? 17.5 : 11);
     }
@@ -137,7 +135,7 @@ inline cfp_slam::RunRecord fake_run(const FakeRun& fake) {
   }
   run.keyframes = fake.frames / 12;
   run.map_points = 6 * fake.frames;
-  evaluate(run);
+  cfp_test::evaluate(run);
   return run;
 }
 

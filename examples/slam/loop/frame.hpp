@@ -12,10 +12,12 @@
 #include <opencv2/core.hpp>
 
 #include "cfp/geometry/camera.hpp"
+#include "cfp/geometry/radial_tangential_camera.hpp"
 #include "cfp/math/se3.hpp"
 
 namespace cfp_slam {
 
+using Camera = cfp::RadialTangentialCamera<float>;  // of the images
 using Descriptor = std::array<std::uint64_t, 4>;
 inline constexpr int no_point = -1;
 
@@ -25,17 +27,33 @@ inline Descriptor descriptor_row(const cv::Mat& descriptors, std::size_t row) {
   return d;
 }
 
+// The camera of the undistorted images: their size, and how sure a keypoint's position is per pyramid level.
+struct View {
+  cfp::PinholeCamera<float> camera;
+  cfp::PinholeCamera<double> exact;  // the same one, for the solvers
+  int width = 0, height = 0;
+  std::vector<float> sigmas;  // standard deviation in pixels, per level
+  double baseline_fx = 0;     // of the depth camera seen as a stereo camera, pixels times metres
+
+  [[nodiscard]] float sigma(const cv::KeyPoint& keypoint) const {
+    return sigmas[static_cast<std::size_t>(keypoint.octave)];
+  }
+  // Whether the point, in the camera's frame, is in the image, and where.
+  [[nodiscard]] bool sees(const cfp::Vector3<double>& point, cfp::Vector2<double>& pixel) const {
+    return exact.project(point, pixel) && pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < width && pixel.y() < height;
+  }
+};
+
 // Keypoint i of frame k: pixel in the image, pixel without distortion, depth, map point.
 struct Frame {
   double time_s = 0;
   std::vector<cv::KeyPoint> keypoints;
   std::vector<Descriptor> descriptors;
-  std::vector<std::array<float, 2>> pixels;  // undistorted
+  std::vector<std::array<float, 2>> pixels;  // undistorted; NaN where the lens model has no ray
   std::vector<float> depths_m;               // -1: none
   std::vector<float> static_probability;     // K after the last stage
-  std::vector<float>
-      map_point_probability;   // M of the point seen, whether it is in the map or known from the last frame only
-  std::vector<int> map_point;  // index into the map, or no_point
+  std::vector<float> map_point_probability;  // M of the point seen, in the map or known from the last frame only
+  std::vector<int> map_point;                // index into the map, or no_point
   cfp::SE3<double> T_cam_world;
   bool has_pose = false;
 
@@ -51,9 +69,9 @@ struct Frame {
 // The keypoints of a frame by image cell.
 class KeypointGrid {
  public:
-  void build(const Frame& frame, int width, int height) {
-    columns_ = width / cell + 1;
-    rows_ = height / cell + 1;
+  void build(const Frame& frame, const View& view) {
+    columns_ = view.width / cell + 1;
+    rows_ = view.height / cell + 1;
     start_.assign(static_cast<std::size_t>(columns_ * rows_) + 1, 0);
     items_.resize(frame.size());
     for (const auto& p : frame.pixels) ++start_[cell_of(p) + 1];
@@ -83,11 +101,12 @@ class KeypointGrid {
 
  private:
   static constexpr int cell = 20;
-  // Undistorted pixels may lie outside the image; they belong to the border's cells.
+  // Undistorted pixels may lie outside the image; they belong to the border's cells, those without a ray to the first.
   [[nodiscard]] std::size_t cell_of(const std::array<float, 2>& p) const {
-    const int c = std::clamp(static_cast<int>(p[0] / float(cell)), 0, columns_ - 1),
-              r = std::clamp(static_cast<int>(p[1] / float(cell)), 0, rows_ - 1);
-    return static_cast<std::size_t>(r * columns_ + c);
+    const auto index = [](float x, int cells) {
+      return x > 0 ? static_cast<std::size_t>(std::min(x / float(cell), float(cells - 1))) : std::size_t{0};
+    };
+    return index(p[1], rows_) * static_cast<std::size_t>(columns_) + index(p[0], columns_);
   }
 
   int columns_ = 0, rows_ = 0;

@@ -3,15 +3,17 @@
 // does not depend on how long the solver takes, the same images give the same poses however many threads there are.
 #pragma once
 
+#include <algorithm>
 #include <array>
-#include <chrono>
 #include <cstddef>
 #include <future>
+#include <memory>
 #include <unordered_map>
 #include <vector>
 
 #include "cfp/optimization/bundle/bundle_adjustment.hpp"
 #include "map.hpp"
+#include "observer.hpp"
 #include "options.hpp"
 
 namespace cfp_slam {
@@ -19,22 +21,20 @@ namespace cfp_slam {
 class LocalBundle {
  public:
   // Copies the problem around keyframe `newest` out of the map.
-  LocalBundle(const Map& map, int newest, const cfp::PinholeCamera<float>& camera, const std::vector<float>& sigmas,
-              double baseline_fx, const LocalBundleOptions& options)
-      : options_(options), baseline_fx_(baseline_fx), camera_{camera.fx, camera.fy, camera.cx, camera.cy} {
+  LocalBundle(const Map& map, int newest, const View& view, const LocalBundleOptions& options)
+      : options_(options), baseline_fx_(view.baseline_fx), camera_(view.exact) {
     choose_keyframes(map, newest);
     for (std::size_t k = 0; k < keyframes_.size(); ++k) {
       const Frame& frame = map.keyframe(keyframes_[k]).frame;
       poses_.push_back(frame.T_cam_world);
       for (std::size_t i = 0; i < frame.size(); ++i) {
         const auto known = point_slot_.find(frame.map_point[i]);
-        if (known != point_slot_.end()) add_observation(map, frame, i, static_cast<int>(k), known->second, sigmas);
+        if (known != point_slot_.end()) add_observation(map, frame, i, static_cast<int>(k), known->second, view);
       }
     }
   }
 
   void solve() {
-    const auto start = std::chrono::steady_clock::now();
     cfp::BundleProblem<cfp::PinholeCamera<double>, float> problem;
     problem.poses = poses_;
     problem.points = positions_;
@@ -46,8 +46,7 @@ class LocalBundle {
     options.levenberg_marquardt.max_iterations = options_.max_iterations;
     squared_errors_.resize(pose_index_.size());
     cfp::BundleWorkspace workspace;
-    result_ = cfp::adjust_bundle(problem, options, workspace, cfp::SingleThread{}, cfp::span<double>(squared_errors_));
-    milliseconds_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    cfp::adjust_bundle(problem, options, workspace, cfp::SingleThread{}, cfp::span<double>(squared_errors_));
   }
 
   // Writes poses and points back and forgets the observations that do not fit. What has gone from the map meanwhile
@@ -66,9 +65,6 @@ class LocalBundle {
         map.erase_observation(point, keyframes_[static_cast<std::size_t>(pose_index_[o])]);
     }
   }
-
-  [[nodiscard]] double milliseconds() const { return milliseconds_; }
-  [[nodiscard]] const cfp::BundleResult& result() const { return result_; }
 
  private:
   // Free: the newest keyframe and its neighbours, but never the first of all, which is the world's origin. Fixed:
@@ -94,14 +90,13 @@ class LocalBundle {
     for (std::size_t k = 0; k < free; ++k) fixed_[k] = keyframes_[k] == 0 ? char(1) : char(0);
   }
 
-  void add_observation(const Map& map, const Frame& frame, std::size_t i, int pose, int point,
-                       const std::vector<float>& sigmas) {
+  void add_observation(const Map& map, const Frame& frame, std::size_t i, int pose, int point, const View& view) {
     pose_index_.push_back(pose);
     point_index_.push_back(point);
     pixels_.push_back(frame.pixels[i]);
     const float z = frame.depths_m[i];
     u_right_.push_back(z > 0 ? frame.pixels[i][0] - static_cast<float>(baseline_fx_) / z : -1.0F);
-    sigma_.push_back(sigmas[static_cast<std::size_t>(frame.keypoints[i].octave)]);
+    sigma_.push_back(view.sigma(frame.keypoints[i]));
     weight_.push_back(frame.static_probability[i] * map.point(frame.map_point[i]).static_probability);
   }
 
@@ -117,8 +112,36 @@ class LocalBundle {
   std::vector<std::array<float, 2>> pixels_;
   std::vector<float> u_right_, sigma_, weight_;
   std::vector<double> squared_errors_;
-  cfp::BundleResult result_;
-  double milliseconds_ = 0;
+};
+
+// One bundle adjustment at a time, beside the tracking or at once.
+class BundleThread {
+ public:
+  void start(const Map& map, int newest, const View& view, const LocalBundleOptions& options, bool beside,
+             Observer& observer) {
+    bundle_ = std::make_unique<LocalBundle>(map, newest, view, options);
+    frames_since_ = 0;
+    solved_ = std::async(beside ? std::launch::async : std::launch::deferred, [bundle = bundle_.get(), &observer] {
+      const Part part(observer, Module::bundle_adjustment);
+      bundle->solve();
+    });
+    if (!beside) solved_.wait();
+  }
+
+  // Once per frame: whether a result is to be taken, `delay` frames after the start or `now`, whenever it was ready.
+  [[nodiscard]] bool is_due(bool now, int delay) { return bundle_ != nullptr && (now || ++frames_since_ >= delay); }
+
+  // Precondition: is_due.
+  void finish(Map& map) {
+    solved_.get();
+    bundle_->apply(map);
+    bundle_.reset();
+  }
+
+ private:
+  std::unique_ptr<LocalBundle> bundle_;
+  std::future<void> solved_;  // destroyed first: it waits for the thread
+  int frames_since_ = 0;
 };
 
 }  // namespace cfp_slam

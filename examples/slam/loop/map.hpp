@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bitset>
 #include <cstddef>
+#include <functional>
 #include <utility>
 #include <vector>
 

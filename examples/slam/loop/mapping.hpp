@@ -1,4 +1,4 @@
-// Keyframes: when to take one, which points it adds, which points go again.
+// What the map takes from a frame: what its points learn, when it becomes a keyframe, which points it adds, which go.
 #pragma once
 
 #include <algorithm>
@@ -6,16 +6,44 @@
 #include <cstddef>
 #include <vector>
 
-#include "features.hpp"
+#include "cfp/frame/static_probability.hpp"
+#include "last_frame_matching.hpp"
 #include "map.hpp"
 #include "options.hpp"
 
 namespace cfp_slam {
 
+// M of what the frame sees: from the fine stage where the last frame saw it, too, from K alone for what the local map
+// added. Points that have become dynamic go.
+inline void update_points(Map& map, Frame& frame, const LastFrameMatches& last,
+                          const cfp::StaticProbability<Camera>& probability) {
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    float& m = frame.map_point_probability[i];
+    if (!map.is_alive(frame.map_point[i])) {
+      frame.map_point[i] = no_point;
+      if (!(m >= 0)) m = frame.static_probability[i];
+      continue;
+    }
+    MapPoint& point = map.point(frame.map_point[i]);
+    ++point.found;
+    if (!last.matched(i) || !(m >= 0)) m = probability.updated_map_point(i, point.static_probability);
+    point.static_probability = m;
+    if (cfp::is_deletable(m, probability.options().map_point)) {
+      map.erase_point(frame.map_point[i]);
+      frame.map_point[i] = no_point;
+    }
+  }
+}
+
 class Mapping {
  public:
-  Mapping(const MappingOptions& options, const FeatureOptions& features, const cfp::PinholeCamera<float>& camera)
-      : options_(options), sigmas_(level_sigmas(features)), camera_(camera) {}
+  Mapping(const MappingOptions& options, const cfp::FrameOptions& probability)
+      : options_(options), probability_(probability) {}
+
+  // Whether keypoint i of a frame may become a map point.
+  [[nodiscard]] bool may_create(const Frame& frame, std::size_t i) const {
+    return frame.depths_m[i] > 0 && cfp::may_create_map_point(frame.static_probability[i], probability_);
+  }
 
   // The frame's map points must be its inliers. `reference` is the keyframe it shares most points with.
   [[nodiscard]] bool wants_keyframe(const Map& map, const Frame& frame, int reference, std::size_t inliers,
@@ -29,10 +57,8 @@ class Mapping {
         ++of_reference;
     }
     for (std::size_t i = 0; i < frame.size(); ++i) {
-      if (!(frame.depths_m[i] > 0 && frame.depths_m[i] < options_.close_m) ||
-          frame.static_probability[i] < options_.min_static_probability)
-        continue;
-      ++(map.is_alive(frame.map_point[i]) ? close : close_new);
+      if (may_create(frame, i) && frame.depths_m[i] < options_.close_m)
+        ++(map.is_alive(frame.map_point[i]) ? close : close_new);
     }
     return double(inliers) < options_.reference_share * double(of_reference) ||
            (close < options_.min_close && close_new > options_.new_close);
@@ -40,7 +66,7 @@ class Mapping {
 
   // Adds the frame as a keyframe; keypoints with depth that see no point yet and may be static make new ones, M = K.
   // Returns its index.
-  int insert(Map& map, const Frame& frame) const {
+  int insert(Map& map, const Frame& frame, const View& view) const {
     const int index = static_cast<int>(map.keyframes.size());
     map.keyframes.push_back({frame, {}});
     Frame& kept = map.keyframes.back().frame;
@@ -50,8 +76,7 @@ class Mapping {
         observe(map.point(kept.map_point[i]), kept, i, index, T_world_cam.translation);
       } else {
         kept.map_point[i] = no_point;
-        if (kept.depths_m[i] > 0 && kept.static_probability[i] >= options_.min_static_probability)
-          create(map, kept, i, index, T_world_cam);
+        if (may_create(kept, i)) create(map, kept, i, index, view);
       }
     }
     std::vector<int> neighbours = map.covisible(kept.map_point, 15);
@@ -78,8 +103,6 @@ class Mapping {
     first_young_ = kept > 0 ? first_still_young_ : map.points.size();
   }
 
-  [[nodiscard]] const std::vector<float>& sigmas() const { return sigmas_; }
-
  private:
   void observe(MapPoint& point, const Frame& frame, std::size_t i, int keyframe,
                const cfp::Vector3<double>& camera_centre) const {
@@ -89,13 +112,13 @@ class Mapping {
     point.descriptor = frame.descriptors[i];
   }
 
-  void create(Map& map, Frame& frame, std::size_t i, int keyframe, const cfp::SE3<double>& T_world_cam) const {
-    const cfp::Vector3<double> in_camera = frame.back_project(i, camera_);
+  void create(Map& map, Frame& frame, std::size_t i, int keyframe, const View& view) const {
+    const cfp::SE3<double> T_world_cam = frame.T_cam_world.inverse();
+    const cfp::Vector3<double> in_camera = frame.back_project(i, view.camera);
     MapPoint point;
     point.position = T_world_cam * in_camera;
     point.normal.setZero();
-    point.max_distance =
-        static_cast<float>(in_camera.norm()) * sigmas_[static_cast<std::size_t>(frame.keypoints[i].octave)];
+    point.max_distance = static_cast<float>(in_camera.norm()) * view.sigma(frame.keypoints[i]);
     point.static_probability = frame.static_probability[i];
     point.created_by = keyframe;
     observe(point, frame, i, keyframe, T_world_cam.translation);
@@ -105,8 +128,7 @@ class Mapping {
   }
 
   MappingOptions options_;
-  std::vector<float> sigmas_;
-  cfp::PinholeCamera<float> camera_;
+  cfp::FrameOptions probability_;
   std::size_t first_young_ = 0, first_still_young_ = 0;
 };
 

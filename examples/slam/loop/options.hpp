@@ -3,9 +3,8 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 
-#include "cfp/frame/options.hpp"
+#include "cfp/frame/frame_options.hpp"
 #include "cfp/optimization/pose/pose_problem.hpp"
 #include "flow.hpp"
 
@@ -26,7 +25,6 @@ struct MappingOptions {
   double reference_share = 0.75;  // fewer inliers than this share of the reference keyframe's points: take one
   float close_m = 3.2F;           // points whose depth says much about the position (ORB-SLAM2: 40 baselines)
   std::size_t min_close = 100, new_close = 70;  // fewer close ones tracked, and more to be had: take one
-  float min_static_probability = 0.3F;          // keypoints below make no points; the paper's deletion threshold of M
   double min_found_share = 0.25;                // points seen in a smaller share of the frames that should see them go
   std::size_t min_observations = 2;  // as do points in fewer keyframes than this, three keyframes after their own
 };
@@ -38,12 +36,12 @@ struct LocalBundleOptions {
 };
 
 struct TrackingOptions {
-  cfp::PipelineOptions pipeline;
+  cfp::FrameOptions probability;  // before the variant switches parts of it off
   FeatureOptions features;
   MappingOptions mapping;
   LocalBundleOptions bundle;
   cfp::PoseOptions pose;
-  std::uint64_t seed = 1;              // of the relocalisation; the pipeline has its own
+  std::uint64_t seed = 1;              // of the relocalisation; the probabilities have their own
   bool threads = true;                 // bundle adjustment beside the tracking
   double baseline_fx = 40;             // ORB-SLAM2's Camera.bf for this sensor
   std::size_t min_first_inliers = 10;  // for the first stage's pose
@@ -63,11 +61,8 @@ struct FrontEndOptions {
 struct RunOptions {
   cfp::Variant variant = cfp::Variant::cfp;
   std::uint64_t seed = 1;
-  bool threads = true;                   // false: everything on one thread; the trajectory is the same, bit for bit
-  std::size_t max_frames = 0;            // 0: all
-  std::size_t pictures = 0;              // annotated frames to keep for the report
-  std::filesystem::path picture_folder;  // every annotated frame goes here; empty: none is written
-  cfp::PipelineOptions pipeline;         // before the variant switches parts of it off
+  bool threads = true;         // false: everything on one thread; the trajectory is the same, bit for bit
+  std::size_t max_frames = 0;  // 0: all
   FrontEndOptions front_end;
   TrackingOptions tracking;
 };

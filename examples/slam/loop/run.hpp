@@ -1,19 +1,24 @@
-// One run of the SLAM loop over one sequence.
+// One run of the SLAM loop over one recording.
 #pragma once
 
 #include <cstddef>
-#include <functional>
+#include <vector>
 
-#include "../detection/detector_types.hpp"
-#include "../input/sequence.hpp"
-#include "../record.hpp"
+#include "../../detection/detector_types.hpp"
+#include "../../support/sequence.hpp"
+#include "observer.hpp"
 #include "options.hpp"
 
 namespace cfp_slam {
 
-// Runs the loop. `progress` is called with the number of frames done. Frames that cannot be used are skipped and say
-// why in their record; nothing is thrown for them. Throws what the detector throws.
-RunRecord run_slam(const Sequence& sequence, Detector& detector, const RunOptions& options,
-                   const std::function<void(std::size_t)>& progress);
+struct RunResult {
+  std::vector<cfp::StampedPose<double>> trajectory;  // camera to world, of the tracked and relocalised frames
+  std::size_t keyframes = 0, map_points = 0;
+};
+
+// Frames that cannot be used are skipped and say why in their record; nothing is thrown for them. Throws what the
+// detector throws.
+RunResult run_slam(const cfp_examples::Sequence& sequence, cfp_examples::Detector& detector, const RunOptions& options,
+                   Observer& observer);
 
 }  // namespace cfp_slam

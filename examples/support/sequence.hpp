@@ -4,9 +4,9 @@
 #pragma once
 
 #include <algorithm>
-#include <chrono>
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <future>
 #include <string>
 #include <utility>
@@ -15,21 +15,19 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "../../support/tum.hpp"
 #include "cfp/geometry/box.hpp"
 #include "cfp/geometry/radial_tangential_camera.hpp"
+#include "tum.hpp"
 
-namespace cfp_slam {
+namespace cfp_examples {
 
 struct SequenceFrame {
   double time_s = 0;
   std::string image;    // file of the colour image, relative to the folder
   cv::Mat bgr;          // 8-bit
   cv::Mat depth;        // 16-bit, units of camera.txt, 0 = none
-  cv::Mat labels;       // 8-bit: 0 static, 1 moving, 2 part of a person but still; empty: the recording has none
   bool usable = false;  // colour and depth are there, of the camera's size
   std::string note;     // what is wrong, with file and line
-  double reading_ms = 0;
 };
 
 // A person in truth (boxes.txt of cfp_synthetic).
@@ -48,8 +46,8 @@ class Sequence {
   // equal stamps the first line stays. Colour and depth are matched one to one, nearest first, when nearer than
   // max_difference_s, as by TUM's associate.py.
   explicit Sequence(std::filesystem::path folder, double max_difference_s = 0.02) : folder_(std::move(folder)) {
-    camera_ = std::filesystem::exists(folder_ / "camera.txt") ? cfp_examples::read_tum_camera(folder_ / "camera.txt")
-                                                              : cfp_examples::published_tum_camera(folder_);
+    camera_ = std::filesystem::exists(folder_ / "camera.txt") ? read_tum_camera(folder_ / "camera.txt")
+                                                              : published_tum_camera(folder_);
     List colors = read_list("rgb.txt");
     const List depths = read_list("depth.txt");
     drop_absent_ends(colors);
@@ -59,7 +57,7 @@ class Sequence {
     if (std::filesystem::exists(folder_ / "labels.txt")) match(read_list("labels.txt"), 0.001, &Frame::labels);
     for (const char* name : {"groundtruth.txt", "pseudo_groundtruth.txt"}) {
       if (!truth_file_.empty() || !std::filesystem::exists(folder_ / name)) continue;
-      truth_ = cfp_examples::read_tum_trajectory(folder_ / name);
+      truth_ = read_tum_trajectory(folder_ / name);
       truth_file_ = name;
     }
     if (std::filesystem::exists(folder_ / "boxes.txt")) read_true_boxes();
@@ -68,8 +66,8 @@ class Sequence {
   [[nodiscard]] std::size_t size() const { return frames_.size(); }
   [[nodiscard]] double time_s(std::size_t i) const { return frames_.at(i).color.time_s; }
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
-  [[nodiscard]] std::string name() const { return cfp_examples::folder_name(folder_); }
-  [[nodiscard]] const cfp_examples::TumCamera& calibration() const { return camera_; }
+  [[nodiscard]] std::string name() const { return folder_name(folder_); }
+  [[nodiscard]] const TumCamera& calibration() const { return camera_; }
   [[nodiscard]] cfp::RadialTangentialCamera<double> camera() const {
     return {camera_.fx, camera_.fy, camera_.cx, camera_.cy, camera_.k1, camera_.k2, camera_.p1, camera_.p2, camera_.k3};
   }
@@ -89,59 +87,64 @@ class Sequence {
 
   // Frame i < size(). The same from any thread, at any time, as long as the files are.
   [[nodiscard]] SequenceFrame load(std::size_t i) const {
-    const auto start = std::chrono::steady_clock::now();
     const Frame& frame = frames_.at(i);
     SequenceFrame out;
     out.time_s = frame.color.time_s;
     out.image = frame.color.file;
-    const auto note = [&](const char* list, const cfp_examples::TumImage& image, const std::string& what) {
-      out.note +=
-          (out.note.empty() ? "" : "; ") + (folder_ / list).string() + ":" + std::to_string(image.line) + ": " + what;
-    };
-    const auto read = [&](const char* list, const cfp_examples::TumImage& image, int flags, int type,
-                          const char* type_name, cv::Mat& picture) {
-      picture = read_image(folder_ / image.file, flags);
-      const std::string size = std::to_string(picture.cols) + "x" + std::to_string(picture.rows);
-      if (picture.empty()) {
-        note(list, image, image.file + " cannot be read");
-      } else if (picture.cols != camera_.width || picture.rows != camera_.height) {
-        note(list, image,
-             image.file + " is " + size + ", the camera's images are " + std::to_string(camera_.width) + "x" +
-                 std::to_string(camera_.height));
-        picture.release();
-      } else if (picture.type() != type) {
-        note(list, image, image.file + " is not " + type_name);
-        picture.release();
-      }
-    };
-    read("rgb.txt", frame.color, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION, CV_8UC3, "8-bit colour", out.bgr);
+    out.bgr = read("rgb.txt", frame.color, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION, CV_8UC3, "8-bit colour",
+                   out.note);
     if (frame.depth.line > 0) {
-      read("depth.txt", frame.depth, cv::IMREAD_UNCHANGED, CV_16UC1, "16-bit grey", out.depth);
+      out.depth = read("depth.txt", frame.depth, cv::IMREAD_UNCHANGED, CV_16UC1, "16-bit grey", out.note);
     } else {
-      note("rgb.txt", frame.color, "no depth image near its time");
+      add_note("rgb.txt", frame.color, "no depth image near its time", out.note);
     }
-    if (frame.labels.line > 0)
-      read("labels.txt", frame.labels, cv::IMREAD_UNCHANGED, CV_8UC1, "8-bit grey", out.labels);
     out.usable = !out.bgr.empty() && !out.depth.empty();
-    out.reading_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     return out;
   }
 
+  // 8-bit: 0 static, 1 moving, 2 part of a person but still. Empty: there are none for this frame, or `note` says why.
+  [[nodiscard]] cv::Mat load_labels(std::size_t i, std::string& note) const {
+    const TumImage& image = frames_.at(i).labels;
+    return image.line > 0 ? read("labels.txt", image, cv::IMREAD_UNCHANGED, CV_8UC1, "8-bit grey", note) : cv::Mat();
+  }
+
  private:
-  using List = std::vector<cfp_examples::TumImage>;
+  using List = std::vector<TumImage>;
   struct Frame {
-    cfp_examples::TumImage color, depth, labels;  // line 0: none
+    TumImage color, depth, labels;  // line 0: none
   };
+
+  void add_note(const char* list, const TumImage& image, const std::string& what, std::string& note) const {
+    note += (note.empty() ? "" : "; ") + (folder_ / list).string() + ":" + std::to_string(image.line) + ": " + what;
+  }
+
+  // The image of a list's line; empty, with a note, when it is none of this type and of the camera's size.
+  cv::Mat read(const char* list, const TumImage& image, int flags, int type, const char* type_name,
+               std::string& note) const {
+    cv::Mat picture = read_image(folder_ / image.file, flags);
+    const auto size_text = [](int width, int height) { return std::to_string(width) + "x" + std::to_string(height); };
+    std::string wrong;
+    if (picture.empty()) {
+      wrong = " cannot be read";
+    } else if (picture.cols != camera_.width || picture.rows != camera_.height) {
+      wrong = " is " + size_text(picture.cols, picture.rows) + ", the camera's images are " +
+              size_text(camera_.width, camera_.height);
+    } else if (picture.type() != type) {
+      wrong = std::string(" is not ") + type_name;
+    }
+    if (wrong.empty()) return picture;
+    add_note(list, image, image.file + wrong, note);
+    return {};
+  }
 
   // In order of time, one line per stamp.
   List read_list(const char* name) {
-    List list = cfp_examples::read_tum_list(folder_ / name);
-    const auto remark = [&](const cfp_examples::TumImage& image, const char* what) {
+    List list = read_tum_list(folder_ / name);
+    const auto remark = [&](const TumImage& image, const char* what) {
       notes_.push_back((folder_ / name).string() + ":" + std::to_string(image.line) + ": " + what);
     };
     for (const auto& image : list) {
-      if (!cfp::is_finite(image.time_s))
-        cfp_examples::bad_line(folder_ / name, image.line, "the timestamp is not finite");
+      if (!cfp::is_finite(image.time_s)) bad_line(folder_ / name, image.line, "the timestamp is not finite");
     }
     const auto earlier = [](const auto& a, const auto& b) { return a.time_s < b.time_s; };
     const auto unordered = std::is_sorted_until(list.begin(), list.end(), earlier);
@@ -170,7 +173,7 @@ class Sequence {
     list = List(first, last);
   }
 
-  void match(const List& list, double max_difference_s, cfp_examples::TumImage Frame::*member) {
+  void match(const List& list, double max_difference_s, TumImage Frame::*member) {
     std::vector<cfp::StampedPose<double>> colors, others;  // the association of the evaluation does for images, too
     for (const Frame& frame : frames_) colors.push_back({frame.color.time_s, {}});
     for (const auto& image : list) others.push_back({image.time_s, {}});
@@ -185,14 +188,12 @@ class Sequence {
 
   void read_true_boxes() {
     const auto file = folder_ / "boxes.txt";
-    cfp_examples::for_each_line(file, [&](int line, const std::vector<std::string>& words) {
-      if (words.size() != 8)
-        cfp_examples::bad_line(file, line, "expected 'timestamp identity x1 y1 x2 y2 visible_fraction pixels'");
+    for_each_line(file, [&](int line, const std::vector<std::string>& words) {
+      if (words.size() != 8) bad_line(file, line, "expected 'timestamp identity x1 y1 x2 y2 visible_fraction pixels'");
       double v[8];
       for (std::size_t i = 0; i < 8; ++i) {
-        v[i] = cfp_examples::parse_number(file, line, words[i], "box");
-        if (!(std::abs(v[i]) < (i == 0 ? 1e18 : 1e9)))
-          cfp_examples::bad_line(file, line, "'" + words[i] + "' out of range");
+        v[i] = parse_number(file, line, words[i], "box");
+        if (!(std::abs(v[i]) < (i == 0 ? 1e18 : 1e9))) bad_line(file, line, "'" + words[i] + "' out of range");
       }
       true_boxes_.push_back({v[0], int(v[1]), {float(v[2]), float(v[3]), float(v[4]), float(v[5])}, v[6], int(v[7])});
     });
@@ -215,7 +216,7 @@ class Sequence {
   }
 
   std::filesystem::path folder_;
-  cfp_examples::TumCamera camera_;
+  TumCamera camera_;
   std::vector<Frame> frames_;
   std::vector<cfp::StampedPose<double>> truth_;
   std::string truth_file_;
@@ -223,24 +224,29 @@ class Sequence {
   std::vector<std::string> notes_;
 };
 
-// Loads frame i + 1 in the background while frame i is worked on. The frames are those of Sequence::load.
+// Loads frame i + 1 in the background while frame i is worked on. The frames are those of `load`.
 class PrefetchingReader {
  public:
-  explicit PrefetchingReader(const Sequence& sequence) : sequence_(sequence) {}  // the sequence must stay
+  PrefetchingReader(std::size_t frames, std::function<SequenceFrame(std::size_t)> load)
+      : frames_(frames), load_(std::move(load)) {}
+  // The sequence must stay.
+  explicit PrefetchingReader(const Sequence& sequence)
+      : PrefetchingReader(sequence.size(), [&sequence](std::size_t i) { return sequence.load(i); }) {}
 
   SequenceFrame load(std::size_t i) {
-    SequenceFrame frame = ahead_.valid() && ahead_index_ == i ? ahead_.get() : sequence_.load(i);
-    if (i + 1 < sequence_.size()) {
+    SequenceFrame frame = ahead_.valid() && ahead_index_ == i ? ahead_.get() : load_(i);
+    if (i + 1 < frames_) {
       ahead_index_ = i + 1;
-      ahead_ = std::async([&sequence = sequence_, next = i + 1] { return sequence.load(next); });
+      ahead_ = std::async(std::launch::async, load_, i + 1);
     }
     return frame;
   }
 
  private:
-  const Sequence& sequence_;
+  std::size_t frames_;
+  std::function<SequenceFrame(std::size_t)> load_;
   std::size_t ahead_index_ = 0;
   std::future<SequenceFrame> ahead_;
 };
 
-}  // namespace cfp_slam
+}  // namespace cfp_examples

@@ -6,12 +6,13 @@
 #include <cmath>
 #include <cstddef>
 #include <string>
+#include <tuple>
 #include <vector>
 
-#include "../record.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/evaluation/trajectory_error.hpp"
 #include "html.hpp"
+#include "run_record.hpp"
 #include "statistics.hpp"
 #include "style.hpp"
 #include "summary.hpp"
@@ -20,6 +21,16 @@ namespace cfp_slam {
 
 inline constexpr std::array<const char*, 7> variant_names{"plain",     "cfp",    "cfp-minus", "no-mdc",
                                                           "no-dbscan", "no-ksp", "only-boxes"};
+
+// By sequence, variant and seed.
+inline void sort_runs(std::vector<RunRecord>& runs) {
+  const auto order = [](const RunRecord& run) {
+    const auto known = std::find(variant_names.begin(), variant_names.end(), run.variant) - variant_names.begin();
+    return std::make_tuple(run.sequence, known, run.seed);
+  };
+  std::stable_sort(runs.begin(), runs.end(),
+                   [&](const RunRecord& x, const RunRecord& y) { return order(x) < order(y); });
+}
 
 struct Series {
   const RunRecord* run = nullptr;
@@ -59,7 +70,7 @@ inline std::vector<std::size_t> drawing_order(const std::vector<Series>& all) {
   return order;
 }
 
-inline bool has_pose(const FrameRecord& frame) { return frame.outcome <= Outcome::relocalised; }
+inline bool has_pose(const RunFrame& frame) { return frame.outcome <= Outcome::relocalised; }
 
 // Numbers per time; entries that are not finite interrupt the curve.
 struct TimeSeries {
@@ -70,7 +81,7 @@ struct TimeSeries {
 inline double start_of(const std::vector<Series>& all) {
   double start = not_known;
   for (const Series& s : all) {
-    for (const FrameRecord& frame : s.run->frames) {
+    for (const RunFrame& frame : s.run->frames) {
       if (std::isfinite(frame.time_s) && !(start <= frame.time_s)) start = frame.time_s;
     }
   }
@@ -80,7 +91,7 @@ inline double start_of(const std::vector<Series>& all) {
 inline double end_of(const std::vector<Series>& all) {
   double end = start_of(all);
   for (const Series& s : all) {
-    for (const FrameRecord& frame : s.run->frames) {
+    for (const RunFrame& frame : s.run->frames) {
       if (std::isfinite(frame.time_s)) end = (std::max)(end, frame.time_s);
     }
   }
@@ -99,7 +110,7 @@ struct Positions {
 inline Positions positions_of(const RunRecord& run) {
   const cfp::Similarity S = has_error(run.absolute) ? run.absolute.S_truth_estimate : cfp::Similarity{};
   Positions out;
-  for (const FrameRecord& frame : run.frames) {
+  for (const RunFrame& frame : run.frames) {
     if (has_pose(frame)) {
       out.add(S * frame.T_world_cam.translation);
     } else {
@@ -133,7 +144,7 @@ inline TimeSeries error_over_time(const RunRecord& run, double start_s) {
   std::vector<double> error(estimate.size(), not_known);
   for (std::size_t k = 0; k < workspace.pose.size(); ++k) error[workspace.pose[k]] = workspace.translation_m[k];
   std::size_t pose = 0;
-  for (const FrameRecord& frame : run.frames) {
+  for (const RunFrame& frame : run.frames) {
     const bool posed = has_pose(frame);
     const double value = posed ? error[pose++] : not_known;
     if (posed && !std::isfinite(value)) continue;  // no truth at that time: not a gap of the run

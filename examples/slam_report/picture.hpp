@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "../record.hpp"
 #include "html.hpp"
 #include "page.hpp"
 #include "report_trajectory.hpp"
+#include "run_record.hpp"
 #include "series.hpp"
 #include "style.hpp"
 #include "summary.hpp"
@@ -28,7 +28,7 @@ inline const AnnotatedFrame* telling_picture(const std::vector<Series>& all, std
     for (const AnnotatedFrame& picture : s.run->pictures) {
       if (picture.jpeg.empty() || (picture.jpeg.size() + 2) / 3 * 4 > largest) continue;
       std::size_t score = s.run->variant == "cfp" ? 1001 : 1;
-      for (const FrameRecord& frame : s.run->frames) {
+      for (const RunFrame& frame : s.run->frames) {
         if (frame.time_s != picture.time_s) continue;
         for (const BoxRecord& box : frame.boxes) score += box.compensated ? 2 : 1;
       }
@@ -49,7 +49,7 @@ inline std::string summary_picture(const std::vector<RunRecord>& runs, std::size
     if (run.sequence == runs.front().sequence) same.push_back(&run);
   }
   const std::vector<Series> all = series_of(same);
-  const std::vector<View> views = trajectory_views(all);
+  const std::vector<TrajectoryView> views = trajectory_views(all);
   constexpr double margin = 16, column = 480, frame_height = 360, line = 22, right = margin + column + margin,
                    width = right + column + margin;
   const double content = (std::max)(views[0].plot.height(), frame_height);

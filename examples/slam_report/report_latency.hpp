@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "../record.hpp"
 #include "html.hpp"
 #include "published.hpp"
+#include "run_record.hpp"
 #include "series.hpp"
 #include "summary.hpp"
 #include "svg.hpp"
@@ -61,7 +61,7 @@ inline std::string latency_over_time(const std::vector<Series>& all) {
   std::vector<double> every;
   for (const Series& s : all) {
     TimeSeries curve;
-    for (const FrameRecord& frame : s.run->frames) {
+    for (const RunFrame& frame : s.run->frames) {
       const double value = frame.milliseconds[static_cast<std::size_t>(Module::tracking)];
       curve.time_s.push_back(frame.time_s - start);
       curve.value.push_back(value > 0 ? value : not_known);
@@ -85,12 +85,10 @@ inline std::string latency_section(const std::vector<Series>& all) {
   for (const Series& s : all) figures += latency_bars(s);
   if (figures.empty()) return {};
   return "<h3>Time</h3>\n<p class=\"note\">Bar and figure: median over the frames in which the module ran; whisker: "
-         "95th percentile. "
-         "Diamond and brackets: the paper's mean on an Intel i7, its detector on an RTX 3060. The paper's 17.93 ms for "
-         "the object "
-         "probability hold the optical flow, which has its own bar here. Reading, detection and bundle adjustment run "
-         "beside the "
-         "tracking thread.</p>\n"
+         "95th percentile. Diamond and brackets: the paper's mean on an Intel i7, its detector on an RTX 3060; 17.93 "
+         "ms "
+         "of its coarse stage hold the optical flow, which has its own bar here. Reading, detection and bundle "
+         "adjustment run beside the tracking thread.</p>\n"
          "<div class=\"grid\">\n" +
          figures + "</div>\n";
 }

@@ -11,20 +11,19 @@
 #include "network_detector.hpp"
 #include "simple_detectors.hpp"
 
-namespace cfp_slam {
+namespace cfp_examples {
 
 // spec, and what it makes:
 //   none                        no boxes
 //   hog                         OpenCV's built-in people detector
 //   FILE.txt                    boxes of a detections text file, by time stamp
-//   FILE.onnx[@SIZE]            a network; SIZE = 640 or 640x480 where the file does not state it
-//   FILE.cfg or FILE.weights    a Darknet network, both files side by side
+//   FILE.onnx[@SIZE]            a network and its input: 640, or WIDTHxHEIGHT; without it 640
 // Throws std::runtime_error that names the file and what is wrong with it.
 inline std::unique_ptr<Detector> make_detector(const std::string& spec, const DetectorOptions& options = {}) {
   if (spec == "none") return std::make_unique<NoDetector>();
   if (spec == "hog") return std::make_unique<HogDetector>(options);
   std::filesystem::path file = spec;
-  cv::Size input;
+  cv::Size input{640, 640};
   if (const std::size_t at = spec.rfind('@'); at != std::string::npos && !std::filesystem::exists(file)) {
     int width = 0, height = 0, end = 0;
     const std::string size = spec.substr(at + 1);
@@ -37,9 +36,8 @@ inline std::unique_ptr<Detector> make_detector(const std::string& spec, const De
   }
   const std::string extension = file.extension().string();
   if (extension == ".txt") return std::make_unique<FileDetector>(file.string(), options);
-  if (extension == ".onnx" || extension == ".cfg" || extension == ".weights")
-    return std::make_unique<NetworkDetector>(file, input, options);
-  throw std::runtime_error("no detector '" + spec + "': none, hog, FILE.txt, FILE.onnx, FILE.cfg or FILE.weights");
+  if (extension == ".onnx") return std::make_unique<NetworkDetector>(file, input, options);
+  throw std::runtime_error("no detector '" + spec + "': none, hog, FILE.txt or FILE.onnx");
 }
 
-}  // namespace cfp_slam
+}  // namespace cfp_examples

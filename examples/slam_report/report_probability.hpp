@@ -6,36 +6,37 @@
 #include <cmath>
 #include <cstddef>
 #include <string>
-#include <tuple>
 #include <vector>
 
-#include "../record.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/evaluation/calibration.hpp"
 #include "html.hpp"
+#include "run_record.hpp"
 #include "series.hpp"
 #include "summary.hpp"
 #include "svg.hpp"
 
 namespace cfp_slam {
 
-inline constexpr std::size_t histogram_bins = std::tuple_size_v<decltype(FrameRecord::keypoint_histogram)>;
+inline constexpr std::size_t histogram_bins = 10;
+using Histogram = std::array<double, histogram_bins>;
 
-inline std::array<double, histogram_bins> histogram_of(const RunRecord& run) {
-  std::array<double, histogram_bins> sum{};
-  for (const FrameRecord& frame : run.frames) {
-    for (std::size_t b = 0; b < histogram_bins; ++b) sum[b] += static_cast<double>(frame.keypoint_histogram[b]);
+// K of the keypoints inside boxes, ten bins over [0, 1].
+inline void add_to(Histogram& histogram, const RunFrame& frame) {
+  for (const BoxKeypoint& keypoint : frame.box_keypoints) {
+    const double bin = static_cast<double>(keypoint.static_probability()) * histogram_bins;
+    if (bin >= 0) ++histogram[std::min(static_cast<std::size_t>(bin), histogram_bins - 1)];
   }
-  return sum;
 }
 
 // Share of the in-box keypoints per tenth of K, all variants in one plot.
 inline std::string histogram_plot(const std::vector<Series>& all) {
   Range share;
   share.add(0);
-  std::vector<std::array<double, histogram_bins>> shares;
+  std::vector<Histogram> shares;
   for (const Series& s : all) {
-    auto h = histogram_of(*s.run);
+    Histogram h{};
+    for (const RunFrame& frame : s.run->frames) add_to(h, frame);
     double total = 0;
     for (const double n : h) total += n;
     for (double& n : h) {
@@ -70,16 +71,14 @@ inline std::string histogram_over_time(const Series& series, double start_s, dou
   const auto& frames = series.run->frames;
   const std::size_t columns = (std::min)(most_columns, frames.size());
   if (columns == 0 || !(end_s > start_s)) return {};
-  std::vector<std::array<double, histogram_bins>> cells(columns);
+  std::vector<Histogram> cells(columns);
   double total = 0;
-  for (const FrameRecord& frame : frames) {
+  for (const RunFrame& frame : frames) {
     const double place = (frame.time_s - start_s) / (end_s - start_s);
     if (!(place >= 0 && place <= 1)) continue;
     const std::size_t column = (std::min)(static_cast<std::size_t>(place * static_cast<double>(columns)), columns - 1);
-    for (std::size_t b = 0; b < histogram_bins; ++b) {
-      cells[column][b] += static_cast<double>(frame.keypoint_histogram[b]);
-      total += static_cast<double>(frame.keypoint_histogram[b]);
-    }
+    add_to(cells[column], frame);
+    total += static_cast<double>(frame.box_keypoints.size());
   }
   if (!(total > 0)) return {};
   Range time, unit;
@@ -115,7 +114,7 @@ inline std::string objects_over_time(const Series& series, double start_s, doubl
   Plot plot("O of the boxes over time, " + series.name, linear_axis(time, "time [s]"),
             linear_axis(unit, "O, 1 = static"), 480, 200);
   std::string detected, compensated;
-  for (const FrameRecord& frame : series.run->frames) {
+  for (const RunFrame& frame : series.run->frames) {
     for (const BoxRecord& box : frame.boxes) {
       if (!box.object_known || !std::isfinite(frame.time_s) || !std::isfinite(box.object_probability)) continue;
       const std::string point = plot.point(frame.time_s - start_s, box.object_probability);

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "../record.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/evaluation/calibration.hpp"
+#include "run_record.hpp"
 #include "statistics.hpp"
 
 namespace cfp_slam {
@@ -74,7 +74,7 @@ inline std::string shown_detector(const std::string& detector) {
 // out, so that the figure is what it costs when it is needed.
 inline std::vector<double> milliseconds_of(const RunRecord& run, Module module) {
   std::vector<double> values;
-  for (const FrameRecord& frame : run.frames) {
+  for (const RunFrame& frame : run.frames) {
     const double ms = frame.milliseconds[static_cast<std::size_t>(module)];
     if (ms > 0 && std::isfinite(ms)) values.push_back(ms);
   }
@@ -96,12 +96,12 @@ inline RunSummary summarize(const RunRecord& run) {
   s.detector = run.detector;
   s.seed = run.seed;
   s.frames = run.frames.size();
-  for (const FrameRecord& frame : run.frames) {
+  for (const RunFrame& frame : run.frames) {
     ++(frame.outcome == Outcome::tracked       ? s.tracked
        : frame.outcome == Outcome::relocalised ? s.relocalised
        : frame.outcome == Outcome::lost        ? s.lost
                                                : s.skipped);
-    s.fallbacks += frame.health.fallback != cfp::WeightFallback::none;
+    s.fallbacks += frame.fallback;
   }
   s.keyframes = run.keyframes;
   s.map_points = run.map_points;

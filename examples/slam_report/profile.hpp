@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "../record.hpp"
+#include "run_record.hpp"
 #include "summary.hpp"
 
 namespace cfp_slam {
@@ -55,25 +55,23 @@ inline std::vector<Saving> savings_of(const RunSummary& s, int features) {
   // kept.
   savings.push_back({"--features " + std::to_string(features / 2) + ": keypoints, their matching and their poses",
                      without(Module::features, 0.75 * median(Module::features)) +
-                         (median(Module::matching) + median(Module::pose) + median(Module::keypoints_second)) / 2});
+                         (median(Module::matching) + median(Module::pose) + median(Module::fine)) / 2});
   if (median(Module::detection) > 0)
     savings.push_back(
         {"a smaller network, or --detector FILE.txt from an earlier pass", without(Module::detection, 0)});
   if (median(Module::flow) > 0) {
     savings.push_back({"half the flow points (FlowOptions)", without(Module::flow, median(Module::flow) / 2)});
     savings.push_back({"--variant cfp-minus: no optical flow, no object probability",
-                       without(Module::flow, 0) + median(Module::objects)});
+                       without(Module::flow, 0) + 0.8 * median(Module::coarse)});  // nearly all of it is F
+    savings.push_back({"FundamentalRansacOptions::confidence 0.95: fewer samples for F", median(Module::coarse) / 2});
   }
-  if (median(Module::objects) > 0)
-    savings.push_back({"FundamentalRansacOptions::confidence 0.95: fewer samples for F", median(Module::objects) / 2});
-  if (median(Module::keypoints_second) > 0)
-    savings.push_back({"--variant no-ksp: no second stage", median(Module::keypoints_second)});
+  if (median(Module::fine) > 0) savings.push_back({"--variant no-ksp: no second stage", median(Module::fine)});
   std::stable_sort(savings.begin(), savings.end(),
                    [](const Saving& a, const Saving& b) { return a.milliseconds > b.milliseconds; });
   return savings;
 }
 
-inline std::string profile_text(const RunRecord& run, double target_fps, int features) {
+inline std::string profile_text(const RunRecord& run, double target_fps) {
   const RunSummary s = summarize(run);
   char line[256];
   std::string out = "  where the time of a frame goes (ms; modules beside the tracking thread are marked *)\n";
@@ -97,7 +95,7 @@ inline std::string profile_text(const RunRecord& run, double target_fps, int fea
                 "  %.1f ms per frame is %.1f ms too much for %g frames/s. What gives time back, about:\n", now,
                 now - budget, target_fps);
   out += line;
-  for (const Saving& saving : savings_of(s, features)) {
+  for (const Saving& saving : savings_of(s, run.features)) {
     if (saving.milliseconds < 0.01) continue;
     std::snprintf(line, sizeof line, "    %6.2f ms  %s%s\n", saving.milliseconds, saving.what.c_str(),
                   now - saving.milliseconds <= budget ? "  <- enough" : "");

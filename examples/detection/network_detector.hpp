@@ -1,5 +1,4 @@
-// A detection network through OpenCV's dnn module: ONNX or Darknet, its family told from its outputs
-// (network_outputs.hpp).
+// A detection network (ONNX) through OpenCV's dnn module, its family told from its outputs (network_outputs.hpp).
 #pragma once
 
 #include <algorithm>
@@ -17,10 +16,9 @@
 
 #include "coco_names.hpp"
 #include "detector_types.hpp"
-#include "network_input_size.hpp"
 #include "network_outputs.hpp"
 
-namespace cfp_slam {
+namespace cfp_examples {
 
 // input.x = scale_x * image.x + left, and so for y.
 struct InputMapping {
@@ -73,36 +71,26 @@ inline std::vector<std::string> network_classes(const std::filesystem::path& mod
 // in its caller's thread.
 class NetworkDetector final : public Detector {
  public:
-  // model: .onnx, or .cfg / .weights with the other one of the same stem beside it. input: 0 x 0 takes the size the
-  // file states.
   NetworkDetector(const std::filesystem::path& model, cv::Size input, const DetectorOptions& options)
       : Detector(model.filename().string(), {}), input_(input), options_(options) {
     const std::string file = model.string();
-    const std::string extension = model.extension().string();
-    const bool darknet = extension == ".cfg" || extension == ".weights";
+    if (!std::filesystem::is_regular_file(model)) throw std::runtime_error(file + ": no such file");
     try {
-      if (darknet) {
-        const auto cfg = std::filesystem::path(model).replace_extension(".cfg"),
-                   weights = std::filesystem::path(model).replace_extension(".weights");
-        for (const auto& part : {cfg, weights}) require_file(part);
-        net_ = cv::dnn::readNetFromDarknet(cfg.string(), weights.string());
-        if (input_.empty()) input_ = darknet_input_size(cfg);
-      } else {
-        require_file(model);
-        net_ = cv::dnn::readNetFromONNX(file);
-        if (input_.empty()) input_ = onnx_input_size(model);
-      }
-      if (input_.empty()) throw std::runtime_error("does not state its input size: write FILE@WIDTHxHEIGHT");
+      net_ = cv::dnn::readNetFromONNX(file);
       output_names_ = net_.getUnconnectedOutLayersNames();
       const int shape[] = {1, 3, input_.height, input_.width};
       blob_.create(4, shape, CV_32F);
       blob_.setTo(0);
       forward();
-      const NetworkLayout layout = recognise(outputs_, input_, darknet);
+    } catch (const cv::Exception& error) {
+      throw std::runtime_error(file + ": OpenCV " CV_VERSION " cannot use this network with an input of " +
+                               std::to_string(input.width) + "x" + std::to_string(input.height) +
+                               " (FILE@SIZE for another): " + error.err);
+    }
+    try {
+      const NetworkLayout layout = recognise(outputs_, input_);
       family_ = layout.family;
       classes_ = network_classes(model, layout.classes);
-    } catch (const cv::Exception& error) {
-      throw std::runtime_error(file + ": OpenCV " CV_VERSION " cannot use this network: " + error.err);
     } catch (const std::exception& error) {
       const std::string what = error.what();
       throw std::runtime_error(what.find(model.stem().string()) != std::string::npos ? what : file + ": " + what);
@@ -112,12 +100,14 @@ class NetworkDetector final : public Detector {
   Detections detect(const cv::Mat& bgr, double) override {
     Detections found;
     if (bgr.empty()) return found;
-    const bool letterbox = family_ == NetworkFamily::yolov5 || family_ == NetworkFamily::yolov8;
-    const float min_score = options_.min_score > 0 ? float(options_.min_score) : default_score();
+    const bool fastestdet = family_ == NetworkFamily::fastestdet;
+    // The default of FastestDet: benchmarks/studies/detector_study.cpp.
+    const float min_score = options_.min_score > 0 ? float(options_.min_score) : (fastestdet ? 0.6F : 0.4F);
     InputMapping mapping;
     try {
-      mapping = fit_image(bgr, input_, letterbox, fitted_);
-      make_blob();
+      mapping = fit_image(bgr, input_, !fastestdet, fitted_);
+      // As the families are trained: the YOLOs on RGB, FastestDet on BGR.
+      cv::dnn::blobFromImage(fitted_, blob_, 1 / 255.0, input_, {}, !fastestdet, false, CV_32F);
       forward();
     } catch (const cv::Exception& error) {
       throw std::runtime_error(name_ + ": " + error.err);
@@ -128,12 +118,6 @@ class NetworkDetector final : public Detector {
         break;
       case NetworkFamily::yolov8:
         decode_yolov8(outputs_[0], min_score, found);
-        break;
-      case NetworkFamily::darknet:
-        for (const cv::Mat& output : outputs_) decode_darknet(output, input_, min_score, found);
-        break;
-      case NetworkFamily::nanodet:
-        decode_nanodet(outputs_, input_, min_score, found);
         break;
       case NetworkFamily::fastestdet:
         decode_fastestdet(outputs_[0], input_, min_score, found);
@@ -150,43 +134,9 @@ class NetworkDetector final : public Detector {
   [[nodiscard]] cv::Size input() const { return input_; }
 
  private:
-  static void require_file(const std::filesystem::path& file) {
-    if (!std::filesystem::is_regular_file(file)) throw std::runtime_error(file.string() + ": no such file");
-  }
-
-  // As the families are trained: NanoDet on BGR less ImageNet's mean over its deviation, FastestDet on BGR / 255, the
-  // YOLOs on RGB / 255.
-  void make_blob() {
-    if (family_ != NetworkFamily::nanodet) {
-      cv::dnn::blobFromImage(fitted_, blob_, 1 / 255.0, input_, {}, family_ != NetworkFamily::fastestdet, false,
-                             CV_32F);
-      return;
-    }
-    cv::dnn::blobFromImage(fitted_, blob_, 1, input_, {103.53, 116.28, 123.675}, false, false, CV_32F);
-    const double deviation[] = {57.375, 57.12, 58.395};
-    for (int c = 0; c < 3; ++c) {
-      cv::Mat plane(input_, CV_32F, blob_.ptr<float>(0, c));
-      plane *= 1 / deviation[c];
-    }
-  }
-
   void forward() {
     net_.setInput(blob_);
     net_.forward(outputs_, output_names_);
-  }
-
-  // Chosen by benchmarks/studies/detector_study.cpp, except for YOLOv5 and YOLOv8, of which no network is at hand.
-  [[nodiscard]] float default_score() const {
-    switch (family_) {
-      case NetworkFamily::nanodet:
-        return 0.4F;
-      case NetworkFamily::fastestdet:
-        return 0.6F;
-      case NetworkFamily::darknet:
-        return 0.5F;
-      default:
-        return 0.4F;
-    }
   }
 
   cv::Size input_;
@@ -198,4 +148,4 @@ class NetworkDetector final : public Detector {
   cv::Mat fitted_, blob_;
 };
 
-}  // namespace cfp_slam
+}  // namespace cfp_examples

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <stdexcept>
@@ -16,17 +15,15 @@
 
 #include "detector_types.hpp"
 
-namespace cfp_slam {
+namespace cfp_examples {
 
 enum class NetworkFamily {
-  yolov5,   // 1 x N x (5 + C): cx cy w h objectness, class scores; N = 3 per grid cell
-  yolov8,   // 1 x (4 + C) x N: cx cy w h, class scores; N = 1 per grid cell
-  darknet,  // OpenCV's Region layers, N x (5 + C) each: cx cy w h as shares of the input, class scores times objectness
-  nanodet,  // per stride N x C scores and N x 32: a distribution over 0..7 strides for each side's distance
+  yolov5,      // 1 x N x (5 + C): cx cy w h objectness, class scores; N = 3 per grid cell
+  yolov8,      // 1 x (4 + C) x N: cx cy w h, class scores; N = 1 per grid cell
   fastestdet,  // 1 x (5 + C) x H x W: objectness, tanh offset, sigmoid size, class scores
 };
 constexpr const char* to_string(NetworkFamily family) {
-  constexpr const char* names[] = {"YOLOv5", "YOLOv8", "Darknet", "NanoDet", "FastestDet"};
+  constexpr const char* names[] = {"YOLOv5", "YOLOv8", "FastestDet"};
   return names[static_cast<int>(family)];
 }
 
@@ -66,62 +63,23 @@ struct NetworkLayout {
   int classes;
 };
 
-constexpr int nanodet_bins = 8;
-
-// NanoDet's outputs in pairs: scores and distances of one stride.
-struct NanodetLevel {
-  OutputTable scores, distances;
-  int stride;
-};
-inline std::vector<NanodetLevel> nanodet_levels(const std::vector<cv::Mat>& outputs, cv::Size input) {
-  std::vector<NanodetLevel> levels;
-  for (const int stride : {8, 16, 32, 64}) {
-    NanodetLevel level{{}, {}, stride};
-    for (const cv::Mat& m : outputs) {
-      if (!is_table(m) || table_of(m).rows != grid_cells(input, {stride})) continue;
-      (table_of(m).cols == 4 * nanodet_bins ? level.distances : level.scores) = table_of(m);
-    }
-    if (level.distances.data != nullptr && level.scores.data != nullptr) levels.push_back(level);
-  }
-  return levels;
-}
-
 // Throws std::runtime_error with the shapes when they fit no family. The numbers of rows must be those of the input's
 // grids, so a network that suppresses by itself (1 x 300 x 6, say) is not mistaken for one of these.
-inline NetworkLayout recognise(const std::vector<cv::Mat>& outputs, cv::Size input, bool darknet) {
-  const auto fail = [&]() -> NetworkLayout {
-    throw std::runtime_error("outputs " + shapes_of(outputs) + " for an input of " + std::to_string(input.width) + "x" +
-                             std::to_string(input.height) +
-                             " are of no known kind (YOLOv5, YOLOv8, NanoDet, FastestDet, Darknet)");
+inline NetworkLayout recognise(const std::vector<cv::Mat>& outputs, cv::Size input) {
+  const auto on_grid = [&](int n, int per_cell) {
+    return n == per_cell * grid_cells(input, {8, 16, 32}) || n == per_cell * grid_cells(input, {8, 16, 32, 64});
   };
-  if (outputs.empty()) return fail();
-  if (darknet) {
-    for (const cv::Mat& m : outputs) {
-      if (!is_table(m) || table_of(m).cols < 6 || table_of(m).cols != table_of(outputs[0]).cols) return fail();
-    }
-    return {NetworkFamily::darknet, table_of(outputs[0]).cols - 5};
-  }
   if (outputs.size() == 1 && is_table(outputs[0])) {
     const OutputTable t = table_of(outputs[0]);
-    const auto on_grid = [&](int n, int per_cell) {
-      return n == per_cell * grid_cells(input, {8, 16, 32}) || n == per_cell * grid_cells(input, {8, 16, 32, 64});
-    };
     if (t.cols > 5 && on_grid(t.rows, 3)) return {NetworkFamily::yolov5, t.cols - 5};
     if (t.rows > 4 && on_grid(t.cols, 1)) return {NetworkFamily::yolov8, t.rows - 4};
-    return fail();
-  }
-  if (outputs.size() == 1) {
+  } else if (outputs.size() == 1) {
     const cv::Mat& m = outputs[0];
     if (m.dims == 4 && m.size[0] == 1 && m.size[1] > 5 && m.type() == CV_32F && m.isContinuous())
       return {NetworkFamily::fastestdet, m.size[1] - 5};
-    return fail();
   }
-  const auto levels = nanodet_levels(outputs, input);
-  if (levels.size() * 2 != outputs.size()) return fail();
-  for (const NanodetLevel& level : levels) {
-    if (level.scores.cols != levels[0].scores.cols) return fail();
-  }
-  return {NetworkFamily::nanodet, levels[0].scores.cols};
+  throw std::runtime_error("outputs " + shapes_of(outputs) + " for an input of " + std::to_string(input.width) + "x" +
+                           std::to_string(input.height) + " are of no known kind (YOLOv5, YOLOv8, FastestDet)");
 }
 
 // The largest of n values and its index; NaN is never the largest.
@@ -166,42 +124,6 @@ inline void decode_yolov8(const cv::Mat& output, float min_score, Detections& fo
   }
 }
 
-inline void decode_darknet(const cv::Mat& output, cv::Size input, float min_score, Detections& found) {
-  const OutputTable t = table_of(output);
-  const auto width = static_cast<float>(input.width), height = static_cast<float>(input.height);
-  for (int r = 0; r < t.rows; ++r) {
-    const float* v = t.row(r);
-    const auto [score, id] = largest(v + 5, t.cols - 5);
-    keep(found, centred(v[0] * width, v[1] * height, v[2] * width, v[3] * height), id, score, min_score);
-  }
-}
-
-inline void decode_nanodet(const std::vector<cv::Mat>& outputs, cv::Size input, float min_score, Detections& found) {
-  for (const NanodetLevel& level : nanodet_levels(outputs, input)) {
-    const int across = (input.width + level.stride - 1) / level.stride;
-    const auto stride = static_cast<float>(level.stride);
-    for (int r = 0; r < level.scores.rows; ++r) {
-      const auto [score, id] = largest(level.scores.row(r), level.scores.cols);
-      if (!(score >= min_score)) continue;
-      std::array<float, 4> side{};  // expected distance to left, top, right, bottom
-      for (std::size_t s = 0; s < 4; ++s) {
-        const float* bins = level.distances.row(r) + s * nanodet_bins;
-        const float top = *std::max_element(bins, bins + nanodet_bins);
-        float sum = 0, moment = 0;
-        for (int b = 0; b < nanodet_bins; ++b) {
-          const float e = std::exp(bins[b] - top);
-          sum += e;
-          moment += e * static_cast<float>(b);
-        }
-        side[s] = stride * moment / sum;
-      }
-      const float cx = (static_cast<float>(r % across) + 0.5F) * stride,
-                  cy = (static_cast<float>(r / across) + 0.5F) * stride;
-      keep(found, {cx - side[0], cy - side[1], cx + side[2], cy + side[3]}, id, score, min_score);
-    }
-  }
-}
-
 inline void decode_fastestdet(const cv::Mat& output, cv::Size input, float min_score, Detections& found) {
   const int rows = output.size[2], cols = output.size[3], cells = rows * cols;
   const auto channel = [&](int c, int cell) {
@@ -236,4 +158,4 @@ inline void suppress(Detections& found, float max_overlap) {
   found.resize(kept);
 }
 
-}  // namespace cfp_slam
+}  // namespace cfp_examples

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "../record.hpp"
 #include "html.hpp"
+#include "run_record.hpp"
 #include "series.hpp"
 #include "statistics.hpp"
 #include "summary.hpp"
@@ -56,12 +56,12 @@ inline std::string summary_table(const std::vector<Series>& all) {
 // Truth and variants in metres and one scale, the longest direction of the motion to the right: first the view that
 // shows most, along the shortest direction, then the one from the side. What is farther from the truth than twice its
 // extent (at least 1 m) is cut off: one variant that flew away must not shrink the rest to a dot.
-struct View {
+struct TrajectoryView {
   std::string title;
   Plot plot;
   bool cut_off = false;
 };
-inline std::vector<View> trajectory_views(const std::vector<Series>& all) {
+inline std::vector<TrajectoryView> trajectory_views(const std::vector<Series>& all) {
   const double start = start_of(all), end = end_of(all);
   Positions truth;
   std::vector<Positions> estimates;
@@ -96,7 +96,7 @@ inline std::vector<View> trajectory_views(const std::vector<Series>& all) {
   }
 
   constexpr std::array<const char*, 3> names{"x [m]", "y [m]", "z [m]"};
-  std::vector<View> views;
+  std::vector<TrajectoryView> views;
   for (const std::size_t up : {axes[1], axes[2]}) {
     const std::size_t right = axes[0];
     const std::string title = std::string("Trajectory, ") + names[right][0] + " and " + names[up][0];
@@ -136,7 +136,7 @@ inline std::string outcome_plot(const std::vector<Series>& all) {
   bool any = false;
   for (const Series& s : all) {
     names.push_back(s.name);
-    for (const FrameRecord& frame : s.run->frames) any = any || frame.outcome != Outcome::tracked;
+    for (const RunFrame& frame : s.run->frames) any = any || frame.outcome != Outcome::tracked;
   }
   if (!any) return {};
   Range time;
@@ -173,8 +173,8 @@ inline std::string outcome_plot(const std::vector<Series>& all) {
 inline std::string notes_of(const std::vector<Series>& all) {
   std::string rows;
   for (const Series& s : all) {
-    std::vector<const FrameRecord*> noted;
-    for (const FrameRecord& frame : s.run->frames) {
+    std::vector<const RunFrame*> noted;
+    for (const RunFrame& frame : s.run->frames) {
       if (!frame.note.empty()) noted.push_back(&frame);
     }
     constexpr std::size_t shown = 20;
@@ -198,7 +198,7 @@ inline std::string notes_of(const std::vector<Series>& all) {
 
 inline std::string trajectory_section(const std::vector<Series>& all) {
   std::string views;
-  for (const View& view : trajectory_views(all)) {
+  for (const TrajectoryView& view : trajectory_views(all)) {
     views += figure(view.title, view.plot.svg(), view.cut_off ? "Poses far from the truth are cut off." : "");
   }
   return summary_table(all) + "<div class=\"grid\">\n" + views + error_plot(all) + outcome_plot(all) + "</div>\n" +

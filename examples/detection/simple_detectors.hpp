@@ -13,10 +13,10 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/objdetect.hpp>
 
-#include "../../support/detections_file.hpp"
+#include "../support/detections_file.hpp"
 #include "detector_types.hpp"
 
-namespace cfp_slam {
+namespace cfp_examples {
 
 class NoDetector final : public Detector {
  public:
@@ -30,7 +30,7 @@ class FileDetector final : public Detector {
  public:
   FileDetector(const std::string& file, const DetectorOptions& options) : Detector(file, {}), options_(options) {
     std::ifstream stream(file);
-    cfp_examples::DetectionsFile content = cfp_examples::read_detections(stream, file);
+    DetectionsFile content = read_detections(stream, file);
     if (!content.error.empty()) throw std::runtime_error(content.error);
     classes_ = std::move(content.classes);
     frames_ = std::move(content.frames);
@@ -55,7 +55,7 @@ class FileDetector final : public Detector {
 
  private:
   DetectorOptions options_;
-  std::vector<cfp_examples::DetectionFrame> frames_;
+  std::vector<DetectionFrame> frames_;
 };
 
 // Histograms of oriented gradients with the linear support vector machine that OpenCV carries: upright, wholly visible
@@ -93,4 +93,4 @@ class HogDetector final : public Detector {
   cv::Mat gray_;
 };
 
-}  // namespace cfp_slam
+}  // namespace cfp_examples

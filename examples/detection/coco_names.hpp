@@ -1,7 +1,7 @@
 // The 80 classes of the COCO data set in the order in which detectors trained on it number them.
 #pragma once
 
-namespace cfp_slam {
+namespace cfp_examples {
 
 inline constexpr const char* coco_names[] = {
     "person",         "bicycle",    "car",           "motorcycle",    "airplane",     "bus",           "train",
@@ -17,4 +17,4 @@ inline constexpr const char* coco_names[] = {
     "toaster",        "sink",       "refrigerator",  "book",          "clock",        "vase",          "scissors",
     "teddy bear",     "hair drier", "toothbrush"};
 
-}  // namespace cfp_slam
+}  // namespace cfp_examples

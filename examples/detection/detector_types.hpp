@@ -10,7 +10,7 @@
 
 #include "cfp/detection/box_tracker_types.hpp"
 
-namespace cfp_slam {
+namespace cfp_examples {
 
 using Detections = std::vector<cfp::Detection<float>>;
 
@@ -47,4 +47,4 @@ struct DetectorOptions {
   double max_overlap = 0.5;  // of two boxes of a class with a larger IoU the surer one stays
 };
 
-}  // namespace cfp_slam
+}  // namespace cfp_examples

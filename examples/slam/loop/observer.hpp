@@ -1,0 +1,35 @@
+// What the loop tells about its work. It measures and writes nothing itself: clocks and recordings are observers.
+#pragma once
+
+#include "cfp/frame/static_probability.hpp"
+#include "frame.hpp"
+#include "record.hpp"
+
+namespace cfp_slam {
+
+class Observer {
+ public:
+  virtual ~Observer() = default;
+  // A module's work on a frame, or a part of it: both are called on the thread that does it, never by two at a time for
+  // one module.
+  virtual void begin(Module) {}
+  virtual void end(Module) {}
+  // A stage (report.stage) has given its weights; after the fine one the frame has its M.
+  virtual void weighted(const cfp::StageResult<float>&, const cfp::FrameState<float>&, const Frame&) {}
+  virtual void finished(const FrameRecord&) {}
+};
+
+// A module's work from here to the end of the scope.
+class Part {
+ public:
+  Part(Observer& observer, Module module) : observer_(observer), module_(module) { observer_.begin(module_); }
+  ~Part() { observer_.end(module_); }
+  Part(const Part&) = delete;
+  Part& operator=(const Part&) = delete;
+
+ private:
+  Observer& observer_;
+  Module module_;
+};
+
+}  // namespace cfp_slam
