@@ -9,8 +9,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "../slam_runs/run_record.hpp"
 #include "../support/tum.hpp"
-#include "run_record.hpp"
 
 namespace cfp_slam {
 

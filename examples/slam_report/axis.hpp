@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <initializer_list>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,6 +14,9 @@
 namespace cfp_slam {
 
 struct Range {
+  Range(std::initializer_list<double> values = {}) {
+    for (const double v : values) add(v);
+  }
   double low = 0, high = 0;
   bool empty = true;
   void add(double value) {
@@ -74,14 +78,6 @@ struct Axis {
     return (std::min)((std::max)(0.0, share), 1.0);  // in this order not a number is 0
   }
 };
-
-// One row per name, the first on top: row k from k to k + 1.
-inline Axis row_axis(const std::vector<std::string>& names) {
-  const double n = static_cast<double>((std::max)(names.size(), std::size_t{1}));
-  Axis axis{n, 0, {}, false, {}};
-  for (std::size_t k = 0; k < names.size(); ++k) axis.marks.push_back({static_cast<double>(k) + 0.5, names[k]});
-  return axis;
-}
 
 inline Axis linear_axis(Range range, std::string label, int tick_count = 6) {
   if (range.empty) range.add(0);

@@ -36,14 +36,11 @@ inline Table calibration_table(const std::vector<RunSummary>& runs, const std::s
                     range_text({s.median, s.minimum, s.maximum, s.known, s.known}, decimals), Rank::none};
       };
       table.rows.push_back(
-          {{variant, "", Rank::none},
-           {probability_names[k], "", Rank::none},
-           cell(spread([](const CalibrationSummary& c) { return c.auc; }), 4),
+          {variant, probability_names[k], cell(spread([](const CalibrationSummary& c) { return c.auc; }), 4),
            cell(spread([](const CalibrationSummary& c) { return c.brier; }), 4),
            cell(spread([](const CalibrationSummary& c) { return c.ece; }), 4),
-           {number(100 * spread([](const CalibrationSummary& c) { return c.static_fraction; }).median, 1) + " %", "",
-            Rank::none},
-           {number(samples.median, 0), "", Rank::none}});
+           number(100 * spread([](const CalibrationSummary& c) { return c.static_fraction; }).median, 1) + " %",
+           number(samples.median, 0)});
     }
   }
   table.note = table.rows.empty() ? "No sequence with labels."

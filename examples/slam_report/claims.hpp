@@ -208,9 +208,9 @@ inline Table claims_table(const std::vector<RunSummary>& runs, const std::string
   table.header = {"claim", "verdict", "figures (ATE RMSE in m)"};
   table.words = true;
   for (const Claim& claim : check_claims(runs)) {
-    table.rows.push_back({{claim.statement, "", Rank::none},
+    table.rows.push_back({claim.statement,
                           {to_string(claim.verdict), "", claim.verdict == Verdict::not_met ? Rank::best : Rank::none},
-                          {claim.figures.empty() ? "–" : claim.figures, "", Rank::none}});
+                          claim.figures.empty() ? "–" : claim.figures});
   }
   table.note =
       "A variant whose coverage is more than 2 points below the best one has lost the camera and counts as worse than "

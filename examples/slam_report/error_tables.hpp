@@ -52,22 +52,22 @@ inline Table error_table(const std::vector<RunSummary>& runs, const ErrorKind& k
   }
   table.header.insert(table.header.end(), {"cfp better than plain", "n"});
   for (const std::string& sequence : sequences_of(runs)) {
-    std::vector<Cell> row{{shown_name(sequence), "", Rank::none}};
+    std::vector<Cell> row{shown_name(sequence)};
     std::vector<double> medians, coverages;
     std::size_t n = 0;
     for (const char* variant : compared_variants) {
       const Spread rmse = spread_of(runs, sequence, variant, kind.rmse);
       const Spread coverage = spread_of(values_of(runs, sequence, variant, coverage_percent));
       row.push_back(cell_of(rmse, kind.decimals));
-      row.push_back({number(spread_of(runs, sequence, variant, kind.sd).median, kind.decimals), "", Rank::none});
-      row.push_back({number(coverage.median, 1) + (coverage.known > 0 ? " %" : ""), "", Rank::none});
+      row.push_back(number(spread_of(runs, sequence, variant, kind.sd).median, kind.decimals));
+      row.push_back(number(coverage.median, 1) + (coverage.known > 0 ? " %" : ""));
       medians.push_back(rmse.median);
       coverages.push_back(coverage.median);
       n = (std::max)(n, rmse.total);
     }
     const double better = improvement_percent(medians[0], medians[2]);
-    row.push_back({number(better, 1) + (std::isfinite(better) ? " %" : ""), "", Rank::none});
-    row.push_back({number(n), "", Rank::none});
+    row.push_back(number(better, 1) + (std::isfinite(better) ? " %" : ""));
+    row.push_back(number(n));
     rank({&row[1], &row[4], &row[7]}, comparable(medians, coverages), kind.decimals);
     table.rows.push_back(row);
   }
@@ -111,7 +111,7 @@ inline Table ablation_table(const std::vector<RunSummary>& runs, const std::stri
   const std::vector<std::string> variants = variants_of(runs);
   table.header.insert(table.header.end(), variants.begin(), variants.end());
   for (const std::string& sequence : sequences_of(runs)) {
-    std::vector<Cell> row{{shown_name(sequence), "", Rank::none}};
+    std::vector<Cell> row{shown_name(sequence)};
     std::vector<double> medians, coverages;
     for (const std::string& variant : variants) {
       const Spread rmse = spread_of(runs, sequence, variant, &RunSummary::ate_rmse_m);

@@ -6,31 +6,32 @@
 #include <string>
 #include <vector>
 
+#include "../slam_runs/run_record.hpp"
 #include "experiment.hpp"
 #include "html.hpp"
 #include "published.hpp"
-#include "run_record.hpp"
 #include "statistics.hpp"
 #include "summary.hpp"
 #include "table.hpp"
 
 namespace cfp_slam {
 
-inline Table latency_table(const std::vector<RunSummary>& runs, const std::string& protocol) {
+inline Table latency_table(const std::vector<RunSummary>& runs, const std::vector<std::string>& wanted,
+                           const std::string& title, const std::string& protocol) {
   Table table;
-  table.title = "Table V: time per frame, ms";
+  table.title = title;
   table.protocol = protocol;
   table.header = {"module"};
   std::vector<std::string> variants;
-  for (const char* variant : compared_variants) {
+  for (const std::string& variant : wanted) {
     if (values_of(runs, "", variant, [](const RunSummary&) { return 0.0; }).empty()) continue;
-    variants.emplace_back(variant);
-    table.header.insert(table.header.end(), {std::string(variant) + " median", std::string(variant) + " p95"});
+    variants.push_back(variant);
+    table.header.insert(table.header.end(), {variant + " median", variant + " p95"});
   }
   table.header.insert(table.header.end(), {"paper, CFP-SLAM- (mean)", "paper, CFP-SLAM (mean)"});
   for (std::size_t m = 0; m < module_count; ++m) {
     const Module module = static_cast<Module>(m);
-    std::vector<Cell> row{{to_string(module), "", Rank::none}};
+    std::vector<Cell> row{to_string(module)};
     bool any = false;
     for (const std::string& variant : variants) {
       const Spread median =
@@ -40,12 +41,12 @@ inline Table latency_table(const std::vector<RunSummary>& runs, const std::strin
       row.push_back({number(median.median, 2),
                      range_text({median.median, median.minimum, median.maximum, median.known, median.known}, 2),
                      Rank::none});
-      row.push_back({number(p95.median, 2), "", Rank::none});
+      row.push_back(number(p95.median, 2));
     }
     for (const char* variant : {"cfp-minus", "cfp"}) {
       const double paper = paper_milliseconds(module, variant);
       any = any || std::isfinite(paper);
-      row.push_back({number(paper, module == Module::tracking && paper > 30 ? 1 : 2), "", Rank::none});
+      row.push_back(number(paper, module == Module::tracking && paper > 30 ? 1 : 2));
     }
     if (any) table.rows.push_back(row);
   }

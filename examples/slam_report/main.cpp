@@ -11,10 +11,10 @@
 
 #include <CLI/CLI.hpp>
 
+#include "../slam_runs/read_run.hpp"
 #include "annotate.hpp"
 #include "picture.hpp"
 #include "profile.hpp"
-#include "read_run.hpp"
 #include "report.hpp"
 #include "tables.hpp"
 

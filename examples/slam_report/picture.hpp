@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "../slam_runs/run_record.hpp"
 #include "html.hpp"
 #include "page.hpp"
 #include "report_trajectory.hpp"
-#include "run_record.hpp"
 #include "series.hpp"
 #include "style.hpp"
 #include "summary.hpp"

@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "run_record.hpp"
+#include "../slam_runs/run_record.hpp"
 #include "summary.hpp"
 
 namespace cfp_slam {

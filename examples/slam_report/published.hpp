@@ -10,7 +10,7 @@
 #include <limits>
 #include <string_view>
 
-#include "run_record.hpp"
+#include "../slam_runs/run_record.hpp"
 
 namespace cfp_slam {
 

@@ -10,12 +10,12 @@
 #include <string>
 #include <vector>
 
+#include "../slam_runs/run_record.hpp"
 #include "html.hpp"
 #include "page.hpp"
 #include "report_latency.hpp"
 #include "report_probability.hpp"
 #include "report_trajectory.hpp"
-#include "run_record.hpp"
 #include "series.hpp"
 
 namespace cfp_slam {

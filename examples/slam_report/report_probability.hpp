@@ -8,13 +8,14 @@
 #include <string>
 #include <vector>
 
+#include "../slam_runs/run_record.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/evaluation/calibration.hpp"
 #include "html.hpp"
-#include "run_record.hpp"
 #include "series.hpp"
 #include "summary.hpp"
 #include "svg.hpp"
+#include "table.hpp"
 
 namespace cfp_slam {
 
@@ -31,8 +32,7 @@ inline void add_to(Histogram& histogram, const RunFrame& frame) {
 
 // Share of the in-box keypoints per tenth of K, all variants in one plot.
 inline std::string histogram_plot(const std::vector<Series>& all) {
-  Range share;
-  share.add(0);
+  Range share{0};
   std::vector<Histogram> shares;
   for (const Series& s : all) {
     Histogram h{};
@@ -46,9 +46,7 @@ inline std::string histogram_plot(const std::vector<Series>& all) {
     shares.push_back(h);
   }
   if (!(share.high > 0)) return {};
-  Range unit;
-  unit.add(0);
-  unit.add(1);
+  Range unit{0, 1};
   share.add(share.high * 1.05);
   Plot plot("K of the keypoints inside boxes", linear_axis(unit, "K, 1 = static"),
             linear_axis(share, "share of the keypoints"));
@@ -65,52 +63,8 @@ inline std::string histogram_plot(const std::vector<Series>& all) {
   return figure("K of the keypoints inside boxes, whole sequence", plot.svg());
 }
 
-// One column per stretch of time, one cell per tenth of K, the darker the more keypoints.
-inline std::string histogram_over_time(const Series& series, double start_s, double end_s) {
-  constexpr std::size_t most_columns = 140;
-  const auto& frames = series.run->frames;
-  const std::size_t columns = (std::min)(most_columns, frames.size());
-  if (columns == 0 || !(end_s > start_s)) return {};
-  std::vector<Histogram> cells(columns);
-  double total = 0;
-  for (const RunFrame& frame : frames) {
-    const double place = (frame.time_s - start_s) / (end_s - start_s);
-    if (!(place >= 0 && place <= 1)) continue;
-    const std::size_t column = (std::min)(static_cast<std::size_t>(place * static_cast<double>(columns)), columns - 1);
-    add_to(cells[column], frame);
-    total += static_cast<double>(frame.box_keypoints.size());
-  }
-  if (!(total > 0)) return {};
-  Range time, unit;
-  time.add(0);
-  time.add(end_s - start_s);
-  unit.add(0);
-  unit.add(1);
-  Plot plot("K over time, " + series.name, linear_axis(time, "time [s]"), linear_axis(unit, "K, 1 = static"), 480, 200);
-  // One shape per strength of the colour. The square root keeps small shares visible.
-  constexpr int strengths = 12;
-  std::array<std::string, strengths + 1> shapes;
-  const double step = (end_s - start_s) / static_cast<double>(columns);
-  for (std::size_t c = 0; c < columns; ++c) {
-    double sum = 0;
-    for (const double n : cells[c]) sum += n;
-    for (std::size_t b = 0; b < histogram_bins && sum > 0; ++b) {
-      const auto strength = static_cast<std::size_t>(std::lround(strengths * std::sqrt(cells[c][b] / sum)));
-      shapes[strength] += plot.box(step * static_cast<double>(c), static_cast<double>(b) / histogram_bins,
-                                   step * static_cast<double>(c + 1), static_cast<double>(b + 1) / histogram_bins);
-    }
-  }
-  for (std::size_t k = 1; k < shapes.size(); ++k)
-    plot.shape(shapes[k], series.css("bar"), static_cast<double>(k) / strengths);
-  return figure("K inside boxes over time: " + series.name, plot.svg(), {}, "s" + number(series.style));
-}
-
 inline std::string objects_over_time(const Series& series, double start_s, double end_s) {
-  Range time, unit;
-  time.add(0);
-  time.add(end_s - start_s);
-  unit.add(0);
-  unit.add(1);
+  const Range time{0, end_s - start_s}, unit{0, 1};
   Plot plot("O of the boxes over time, " + series.name, linear_axis(time, "time [s]"),
             linear_axis(unit, "O, 1 = static"), 480, 200);
   std::string detected, compensated;
@@ -129,13 +83,13 @@ inline std::string objects_over_time(const Series& series, double start_s, doubl
 
 // Reliability: a number that means what it says lies on the diagonal.
 inline std::string reliability_plot(const Series& series) {
-  Range unit;
-  unit.add(0);
-  unit.add(1);
+  Range unit{0, 1};
   Plot plot("Reliability, " + series.name, linear_axis(unit, "static probability"),
             linear_axis(unit, "share that is static"), 480, 380);
   plot.curve({0, 1}, {0, 1}, "guide");
-  std::string rows, key;
+  Table table;
+  table.header = {"", "AUC", "Brier", "ECE", "static", "samples"};
+  std::string key;
   const auto samples = labelled(*series.run);
   constexpr std::array<std::size_t, 4> styles{3, 1, 2, 4};
   for (std::size_t k = 0; k < samples.size(); ++k) {
@@ -162,50 +116,31 @@ inline std::string reliability_plot(const Series& series) {
     }
     key += "<span><svg viewBox=\"0 0 26 10\"><path class=\"curve " + colour + "\" d=\"M1 5H25\"/></svg>" +
            probability_names[k] + "</span>";
-    rows += std::string("<tr><th scope=\"row\">") + probability_names[k] + "</th><td>" + number(c.auc, 4) +
-            "</td><td>" + number(c.brier, 4) + "</td><td>" + number(c.ece, 4) + "</td><td>" +
-            number(100 * c.static_fraction, 1) + " %</td><td>" + number(c.samples) + "</td></tr>\n";
+    const auto cell = [](const std::string& text) { return Cell{text, "", Rank::none}; };
+    table.rows.push_back({cell(probability_names[k]), cell(number(c.auc, 4)), cell(number(c.brier, 4)),
+                          cell(number(c.ece, 4)), cell(number(100 * c.static_fraction, 1) + " %"),
+                          cell(number(c.samples))});
   }
-  if (rows.empty()) return {};
-  return figure("Reliability: " + series.name,
-                "<div class=\"legend\">" + key + "</div>" + plot.svg() +
-                    "<div "
-                    "class=\"scroll\"><table><thead><tr><th></th><th>AUC</th><th>Brier</th><th>ECE</th><th>static</"
-                    "th><th>samples</th></tr>"
-                    "</thead><tbody>\n" +
-                    rows + "</tbody></table></div>",
+  if (table.rows.empty()) return {};
+  return figure("Reliability: " + series.name, "<div class=\"legend\">" + key + "</div>" + plot.svg() + to_html(table),
                 {}, "s" + number(series.style));
 }
 
-// The curves over time fill a screen per variant: folded away when there are many.
 inline std::string probability_section(const std::vector<Series>& all) {
   const double start = start_of(all), end = end_of(all);
-  std::string figures = histogram_plot(all), keypoints, objects;
+  std::string figures = histogram_plot(all), objects;
   for (const Series& s : all) {
     figures += reliability_plot(s);
-    keypoints += histogram_over_time(s, start, end);
     objects += objects_over_time(s, start, end);
   }
-  if (figures.empty() && keypoints.empty() && objects.empty()) {
+  if (figures.empty() && objects.empty())
     return "<h3>Static probability</h3>\n<p class=\"note\">No boxes, so no probabilities.</p>\n";
-  }
-  std::string out =
-      "<h3>Static probability</h3>\n<p class=\"note\">1 = static throughout. K: keypoint, M: map point, O: object. "
-      "Reliability: what means "
-      "what it says lies on the diagonal; a dot's area grows with the samples in its tenth. AUC 1, Brier 0, ECE 0 are "
-      "best.</p>\n"
-      "<div class=\"grid\">\n" +
-      figures + "</div>\n";
-  if (!(keypoints + objects).empty()) {
-    out += std::string("<details") + (all.size() <= 3 ? " open" : "") +
-           "><summary>K and O over time, per variant</summary>\n<p class=\"note\">K: the stronger the colour, the "
-           "larger the share of the "
-           "frame's in-box keypoints. O: dots are detected boxes, crosses compensated ones; boxes without an O are "
-           "left out.</p>\n"
-           "<div class=\"grid\">\n" +
-           keypoints + objects + "</div></details>\n";
-  }
-  return out;
+  return "<h3>Static probability</h3>\n<p class=\"note\">1 = static throughout. K: keypoint, M: map point, O: object; "
+         "dots are detected boxes, crosses compensated ones. Reliability: what means what it says lies on the "
+         "diagonal; "
+         "a dot's area grows with the samples in its tenth. AUC 1, Brier 0, ECE 0 are best.</p>\n<div "
+         "class=\"grid\">\n" +
+         figures + objects + "</div>\n";
 }
 
 }  // namespace cfp_slam

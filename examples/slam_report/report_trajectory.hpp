@@ -8,49 +8,42 @@
 #include <string>
 #include <vector>
 
+#include "../slam_runs/run_record.hpp"
 #include "html.hpp"
-#include "run_record.hpp"
 #include "series.hpp"
 #include "statistics.hpp"
 #include "summary.hpp"
 #include "svg.hpp"
+#include "table.hpp"
 
 namespace cfp_slam {
 
-inline std::string row_of(const Series& series) {
-  const RunSummary s = summarize(*series.run);
+inline Table summary_table(const std::vector<Series>& all) {
+  Table table;
+  table.header = {"variant",   "ATE rmse [m]", "median",           "max",
+                  "RPE [m/s]", "RPE [°/s]",    "matched poses",    "lost / skipped / relocalised",
+                  "gap [s]",   "alignment",    "ms, median / p95", "keyframes / map points"};
   const std::size_t tracking = static_cast<std::size_t>(Module::tracking);
-  std::string row = "<tr><th scope=\"row\">" + escape(series.name) + "</th>";
-  const auto cell = [&row](const std::string& text) { row += "<td>" + text + "</td>"; };
-  cell("<b>" + number(s.ate_rmse_m, 4) + "</b>");
-  cell(number(s.ate_median_m, 4));
-  cell(number(s.ate_max_m, 4));
-  cell(number(s.rpe_rmse_m, 4));
-  cell(number(s.rpe_rmse_deg, 3));
-  cell(s.expected > 0 ? number(s.matched) + " of " + number(s.expected) + " (" + number(coverage_percent(s), 1) + " %)"
-                      : "–");
-  cell(number(s.lost) + " / " + number(s.skipped) + " / " + number(s.relocalised));
-  cell(number(s.largest_gap_s, 2));
-  cell(s.expected > 0 ? escape(s.alignment) : "–");
-  cell(number(s.median_ms[tracking], 1) + " / " + number(s.p95_ms[tracking], 1));
-  cell(number(s.keyframes) + " / " + number(s.map_points));
-  return row + "</tr>\n";
-}
-
-inline std::string summary_table(const std::vector<Series>& all) {
-  std::string out =
-      "<div class=\"scroll\"><table><thead><tr><th>variant</th><th>ATE rmse [m]</th><th>median</th><th>max</th><th>RPE "
-      "rmse [m/s]</th>"
-      "<th>RPE rmse [°/s]</th><th>coverage: matched poses</th><th>lost / skipped / relocalised frames</th><th>largest "
-      "gap [s]</th>"
-      "<th>alignment</th><th>ms per frame, median / p95</th><th>keyframes / map points</th></tr></thead><tbody>\n";
-  for (const Series& s : all) out += row_of(s);
-  return out +
-         "</tbody></table></div>\n<p class=\"note\">ATE: distance of the matched poses to the truth after the "
-         "alignment named. RPE: rmse "
-         "over all intervals of one second. A lost frame has no pose and none is invented: read every error beside its "
-         "coverage. "
-         "ms: the tracking thread, the detector only as far as it was waited for.</p>\n";
+  for (const Series& series : all) {
+    const RunSummary s = summarize(*series.run);
+    const bool judged = s.expected > 0;
+    const std::string matched =
+        number(s.matched) + " of " + number(s.expected) + " (" + number(coverage_percent(s), 1) + " %)";
+    std::vector<Cell> row;
+    for (const std::string& text :
+         {series.name, number(s.ate_rmse_m, 4), number(s.ate_median_m, 4), number(s.ate_max_m, 4),
+          number(s.rpe_rmse_m, 4), number(s.rpe_rmse_deg, 3), judged ? matched : "–",
+          number(s.lost) + " / " + number(s.skipped) + " / " + number(s.relocalised), number(s.largest_gap_s, 2),
+          judged ? s.alignment : "–", number(s.median_ms[tracking], 1) + " / " + number(s.p95_ms[tracking], 1),
+          number(s.keyframes) + " / " + number(s.map_points)})
+      row.push_back(text);
+    table.rows.push_back(row);
+  }
+  table.note =
+      "ATE: distance of the matched poses to the truth after the alignment named. RPE: rmse over all intervals of one "
+      "second. A lost frame has no pose and none is invented: read every error beside its coverage. ms: the tracking "
+      "thread, the detector only as far as it was waited for.";
+  return table;
 }
 
 // Truth and variants in metres and one scale, the longest direction of the motion to the right: first the view that
@@ -130,70 +123,24 @@ inline std::string error_plot(const std::vector<Series>& all) {
   return figure("Translation error over time", plot.svg(), "A curve is interrupted where frames have no pose.");
 }
 
-inline std::string outcome_plot(const std::vector<Series>& all) {
-  const double start = start_of(all), end = end_of(all) - start;
-  std::vector<std::string> names;
-  bool any = false;
-  for (const Series& s : all) {
-    names.push_back(s.name);
-    for (const RunFrame& frame : s.run->frames) any = any || frame.outcome != Outcome::tracked;
-  }
-  if (!any) return {};
-  Range time;
-  time.add(0);
-  time.add(end);
-  const double height = Plot::top + Plot::bottom + 20 * static_cast<double>(all.size());
-  Plot plot("Frames without a pose", linear_axis(time, "time [s]"), row_axis(names), 480, height, 110);
-  for (std::size_t k = 0; k < all.size(); ++k) {
-    const double row = static_cast<double>(k);
-    const auto& frames = all[k].run->frames;
-    for (std::size_t i = 0; i < frames.size();) {
-      std::size_t next = i + 1;
-      while (next < frames.size() && frames[next].outcome == frames[i].outcome) ++next;
-      const double from = frames[i].time_s - start,
-                   to = (next < frames.size() ? frames[next].time_s : frames[next - 1].time_s) - start;
-      if (frames[i].outcome != Outcome::tracked && std::isfinite(from) && std::isfinite(to)) {
-        // At least 2 units wide: one frame in a thousand must still be seen.
-        plot.shape(plot.box(from, row + 0.15, (std::max)(to, from + end / 200), row + 0.85),
-                   to_string(frames[i].outcome));
-      }
-      i = next;
-    }
-  }
-  const std::string key =
-      "<div class=\"legend\"><span><svg viewBox=\"0 0 26 10\"><rect class=\"lost\" width=\"26\" "
-      "height=\"10\"/></svg>lost</span>"
-      "<span><svg viewBox=\"0 0 26 10\"><rect class=\"skipped\" width=\"26\" height=\"10\"/></svg>skipped</span>"
-      "<span><svg viewBox=\"0 0 26 10\"><rect class=\"relocalised\" width=\"26\" "
-      "height=\"10\"/></svg>relocalised</span></div>";
-  return figure("Frames without a pose, and where the map was found again", key + plot.svg());
-}
-
-// Why frames were lost or skipped: one line per reason and variant.
+// Which frames have no pose or are the first again, and why.
 inline std::string notes_of(const std::vector<Series>& all) {
-  std::string rows;
+  Table table;
+  table.header = {"variant", "time [s]", "frame"};
+  table.words = true;
   for (const Series& s : all) {
-    std::vector<const RunFrame*> noted;
-    for (const RunFrame& frame : s.run->frames) {
-      if (!frame.note.empty()) noted.push_back(&frame);
-    }
     constexpr std::size_t shown = 20;
-    for (std::size_t i = 0; i < (std::min)(noted.size(), shown); ++i) {
-      rows += "<tr><th scope=\"row\">" + escape(s.name) + "</th><td>" + number(noted[i]->time_s, 3) +
-              "</td><td class=\"words\">" + to_string(noted[i]->outcome) + ": " + escape(noted[i]->note) +
-              "</td></tr>\n";
+    std::size_t noted = 0;
+    for (const RunFrame& frame : s.run->frames) {
+      if (frame.outcome == Outcome::tracked || ++noted > shown) continue;
+      table.rows.push_back({s.name, number(frame.time_s, 3),
+                            std::string(to_string(frame.outcome)) + (frame.note.empty() ? "" : ": " + frame.note)});
     }
-    if (noted.size() > shown) {
-      rows += "<tr><th scope=\"row\">" + escape(s.name) + "</th><td></td><td class=\"words\">and " +
-              number(noted.size() - shown) + " more</td></tr>\n";
-    }
+    if (noted > shown) table.rows.push_back({s.name, {}, "and " + number(noted - shown) + " more"});
   }
-  if (rows.empty()) return {};
-  return "<details><summary>Why frames were skipped or lost</summary><div "
-         "class=\"scroll\"><table><thead><tr><th>variant</th><th>time "
-         "[s]</th>"
-         "<th>reason</th></tr></thead><tbody>\n" +
-         rows + "</tbody></table></div></details>\n";
+  return table.rows.empty() ? ""
+                            : "<details><summary>Frames that were skipped, lost or found again</summary>" +
+                                  to_html(table) + "</details>\n";
 }
 
 inline std::string trajectory_section(const std::vector<Series>& all) {
@@ -201,8 +148,7 @@ inline std::string trajectory_section(const std::vector<Series>& all) {
   for (const TrajectoryView& view : trajectory_views(all)) {
     views += figure(view.title, view.plot.svg(), view.cut_off ? "Poses far from the truth are cut off." : "");
   }
-  return summary_table(all) + "<div class=\"grid\">\n" + views + error_plot(all) + outcome_plot(all) + "</div>\n" +
-         notes_of(all);
+  return to_html(summary_table(all)) + "<div class=\"grid\">\n" + views + error_plot(all) + "</div>\n" + notes_of(all);
 }
 
 }  // namespace cfp_slam

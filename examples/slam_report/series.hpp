@@ -9,10 +9,10 @@
 #include <tuple>
 #include <vector>
 
+#include "../slam_runs/run_record.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/evaluation/trajectory_error.hpp"
 #include "html.hpp"
-#include "run_record.hpp"
 #include "statistics.hpp"
 #include "style.hpp"
 #include "summary.hpp"

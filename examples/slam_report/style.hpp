@@ -35,22 +35,16 @@ inline std::string series_css(bool dark) {
 
 // Style rules of everything that a Plot draws, light and dark.
 inline std::string plot_style() {
-  std::string css =
-      ":root{--ground:#fff;--ink:#1b2028;--soft:#5c6673;--line:#d9dee5;--grid:#e9ecf0;--card:#f6f8fa;--good:#137333;--"
-      "bad:#b3261e}\n" +
-      series_css(false) + R"(text{fill:var(--soft)}
-.value{fill:var(--ink)}
+  std::string css = ":root{--ground:#fff;--ink:#1b2028;--soft:#5c6673;--line:#d9dee5;--grid:#e9ecf0;--card:#f6f8fa}\n" +
+                    series_css(false) + R"(text{fill:var(--soft)}
 .grid-line{stroke:var(--grid);stroke-width:1}
 .frame{fill:none;stroke:var(--line)}
 .curve{fill:none;stroke:var(--c);stroke-width:1.7;stroke-linecap:round;stroke-linejoin:round}
 .truth{fill:none;stroke:var(--ink);stroke-width:5;stroke-linejoin:round;stroke-linecap:round;opacity:.28}
 .guide{stroke:var(--soft);stroke-width:1;stroke-dasharray:4 3;fill:none}
 .bar{fill:var(--c)}
-.whisker{stroke:var(--ink);stroke-width:1.2}
-.paper{fill:none;stroke:var(--ink);stroke-width:1.6}
 .dot{fill:var(--c)}
 .dots{fill:none;stroke:var(--c);stroke-width:4;stroke-linecap:round}.crosses{fill:none;stroke:var(--c);stroke-width:1.3}
-.lost{fill:var(--bad)}.skipped{fill:var(--soft)}.relocalised{fill:var(--good)}
 )";
   for (std::size_t k = 0; k < series_styles.size(); ++k) {
     css += ".curve.c" + number(k) + "{stroke-dasharray:" + series_styles[k].dashes + "}\n";

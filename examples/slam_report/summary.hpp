@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "../slam_runs/run_record.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/evaluation/calibration.hpp"
-#include "run_record.hpp"
 #include "statistics.hpp"
 
 namespace cfp_slam {

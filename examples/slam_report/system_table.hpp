@@ -82,7 +82,7 @@ class SystemTable {
   }
 
   void add_published(const PublishedRow& row, const std::string& name, bool ranked) {
-    std::vector<Cell> cells{{name, "", Rank::none}, {row.evidence, "", Rank::none}};
+    std::vector<Cell> cells{name, row.evidence};
     bool any = false;
     for (const auto& sequence : sequences_) {
       const PublishedError& e = row.error[sequence.first];
@@ -100,7 +100,7 @@ class SystemTable {
 
   // Not ranked below 95 % coverage: the published figures come from systems that held the camera.
   void add_ours(const std::vector<RunSummary>& runs, const char* variant, double RunSummary::*rmse, int decimals) {
-    std::vector<Cell> cells{{std::string("ours: ") + variant, "", Rank::none}, {"measured", "", Rank::none}};
+    std::vector<Cell> cells{std::string("ours: ") + variant, "measured"};
     std::size_t n = 0;
     for (const auto& sequence : sequences_) {
       const Spread spread = spread_of(runs, sequence.second, variant, rmse);

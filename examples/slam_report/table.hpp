@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "html.hpp"
@@ -14,6 +15,10 @@ namespace cfp_slam {
 enum class Rank { none, best, second };
 
 struct Cell {
+  Cell(std::string text_ = {}, std::string range_ = {}, Rank rank_ = Rank::none)
+      : text(std::move(text_)), range(std::move(range_)), rank(rank_) {}
+  Cell(const char* text_) : text(text_) {}
+
   std::string text;
   std::string range;  // spread, coverage: beside the figure, less prominent
   Rank rank = Rank::none;
@@ -81,7 +86,7 @@ inline std::string in_lines(std::string range) {
 }
 
 inline std::string to_html(const Table& table) {
-  std::string out = "<h3>" + escape(table.title) + "</h3>\n";
+  std::string out = table.title.empty() ? "" : "<h3>" + escape(table.title) + "</h3>\n";
   if (!table.protocol.empty()) out += "<p class=\"note\">" + escape(table.protocol) + "</p>\n";
   out += "<div class=\"scroll\"><table" + std::string(table.words ? " class=\"words\"" : "") + "><thead><tr>";
   for (const std::string& h : table.header) out += "<th>" + escape(h) + "</th>";

@@ -25,7 +25,8 @@ inline std::vector<Table> tables_of(const std::vector<RunSummary>& runs, const s
   }
   out.push_back(ablation_table(runs, protocol));
   if (published) out.push_back(published_ablation_table(runs, protocol));
-  out.push_back(latency_table(runs, protocol));
+  out.push_back(latency_table(runs, {compared_variants.begin(), compared_variants.end()}, "Table V: time per frame, ms",
+                              protocol));
   out.push_back(calibration_table(runs, protocol));
   out.push_back(claims_table(runs, protocol));
   return out;

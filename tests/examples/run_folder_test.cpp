@@ -1,6 +1,6 @@
-#include "../../examples/slam/run_folder.hpp"
+#include "../../examples/slam_runs/run_folder.hpp"
 
-#include "../../examples/slam_report/read_run.hpp"
+#include "../../examples/slam_runs/read_run.hpp"
 #include "support/catch.hpp"
 #include "support/temporary_folder.hpp"
 

@@ -3,9 +3,9 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "../../examples/detection/simple_detectors.hpp"
-#include "../../examples/slam/run_folder.hpp"
+#include "../../examples/slam_runs/run_folder.hpp"
 #include "../../examples/slam_report/annotate.hpp"
-#include "../../examples/slam_report/read_run.hpp"
+#include "../../examples/slam_runs/read_run.hpp"
 #include "../../examples/synthetic/writer.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"
@@ -82,7 +82,7 @@ TEST_CASE("Threads change the time, not a bit of the trajectory", "[slam]") {
   std::vector<cfp::StampedPose<double>> trajectories[2];
   for (const bool threads : {false, true}) {
     FileDetector detector((rendered() / "detections.txt").string(), {});
-    RunOptions options;
+    Options options;
     options.threads = threads;
     Observer nobody;
     trajectories[threads] = run_slam(Sequence(rendered()), detector, options, nobody).trajectory;
@@ -146,7 +146,7 @@ TEST_CASE("The fine stage after a relocalisation rests on the inliers of the pos
     std::vector<Outcome> outcomes;
   } observer;
   NoDetector detector;
-  RunOptions options;
+  Options options;
   options.threads = false;
   run_slam(Sequence(folder.path), detector, options, observer);
   REQUIRE(observer.outcomes.size() == frames);

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "../../examples/slam_report/run_record.hpp"
+#include "../../examples/slam_runs/run_record.hpp"
 #include "cfp/core/random.hpp"
 
 namespace cfp_test {

@@ -14,7 +14,6 @@
 #include "../../support/sequence.hpp"
 #include "cfp/geometry/undistort.hpp"
 #include "cfp/interop/opencv.hpp"
-#include "features.hpp"
 #include "flow.hpp"
 #include "observer.hpp"
 #include "options.hpp"
@@ -34,7 +33,7 @@ struct FrameFeatures {
 class FrontEnd {
  public:
   // The observer must stay.
-  FrontEnd(const Camera& camera, double depth_units_per_metre, const FrontEndOptions& options, Observer& observer)
+  FrontEnd(const Camera& camera, double depth_units_per_metre, const Options& options, Observer& observer)
       : options_(options),
         camera_(camera),
         metres_per_unit_(1 / depth_units_per_metre),
@@ -49,12 +48,12 @@ class FrontEnd {
     cv::cvtColor(images.bgr, gray, cv::COLOR_BGR2GRAY);
     const auto launch = options_.threads ? std::launch::async : std::launch::deferred;
     std::future<void> detection, flow;
-    if (options_.use_detector)
+    if (options_.use_detector())
       detection = std::async(launch, [&] {
         const Part part(observer_, Module::detection);
         features.detections = detector.detect(images.bgr, images.time_s);
       });
-    if (options_.use_flow)
+    if (options_.use_flow())
       flow = std::async(launch, [&] {
         const Part part(observer_, Module::flow);
         flow_.track(gray, last_keypoints_, last_boxes_);
@@ -90,10 +89,10 @@ class FrontEnd {
     }
   }
 
-  FrontEndOptions options_;
+  Options options_;
   Camera camera_;
   double metres_per_unit_;
-  FeatureExtractor extract_;
+  cfp_examples::FeatureExtractor extract_;
   FlowTracker flow_;
   Observer& observer_;
   std::vector<cv::KeyPoint> last_keypoints_;

@@ -13,7 +13,7 @@ namespace cfp_slam {
 
 class LocalMap {
  public:
-  explicit LocalMap(const FeatureOptions& features) : features_(features) {}
+  explicit LocalMap(const cfp_examples::FeatureOptions& features) : features_(features) {}
 
   // The frame needs a pose. `wide`: it is new, and may be less exact.
   void search(Frame& frame, const KeypointGrid& grid, Map& map, const View& view, bool wide) {
@@ -84,7 +84,7 @@ class LocalMap {
     }
   }
 
-  FeatureOptions features_;
+  cfp_examples::FeatureOptions features_;
   int reference_ = 0;
   std::vector<int> points_;
   std::vector<char> seen_;

@@ -37,8 +37,7 @@ inline void update_points(Map& map, Frame& frame, const LastFrameMatches& last,
 
 class Mapping {
  public:
-  Mapping(const MappingOptions& options, const cfp::FrameOptions& probability)
-      : options_(options), probability_(probability) {}
+  explicit Mapping(const Options& options) : options_(options.mapping), probability_(options.probability) {}
 
   // Whether keypoint i of a frame may become a map point.
   [[nodiscard]] bool may_create(const Frame& frame, std::size_t i) const {

@@ -4,20 +4,12 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "../../support/orb_features.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/optimization/pose/pose_problem.hpp"
 #include "flow.hpp"
 
 namespace cfp_slam {
-
-struct FeatureOptions {
-  int count = 1000;           // keypoints kept
-  int candidates = 3000;      // corners to choose from
-  int levels = 8;             // of the image pyramid
-  float scale_factor = 1.2F;  // between them
-  int fast_threshold = 12;    // grey levels
-  int cell = 40;              // pixels, at the level's own scale
-};
 
 struct MappingOptions {
   int min_gap = 3;                // frames between keyframes, at least; the bundle adjustment is handed over within it
@@ -35,36 +27,25 @@ struct LocalBundleOptions {
   int max_iterations = 10;
 };
 
-struct TrackingOptions {
+struct Options {
+  cfp::Variant variant = cfp::Variant::cfp;
+  std::uint64_t seed = 1;
+  bool threads = true;            // false: everything on one thread; the trajectory is the same, bit for bit
+  std::size_t max_frames = 0;     // 0: all
   cfp::FrameOptions probability;  // before the variant switches parts of it off
-  FeatureOptions features;
+  cfp_examples::FeatureOptions features;
+  FlowOptions flow;
+  cfp::PoseOptions pose;
   MappingOptions mapping;
   LocalBundleOptions bundle;
-  cfp::PoseOptions pose;
-  std::uint64_t seed = 1;              // of the relocalisation; the probabilities have their own
-  bool threads = true;                 // bundle adjustment beside the tracking
   double baseline_fx = 40;             // ORB-SLAM2's Camera.bf for this sensor
-  std::size_t min_first_inliers = 10;  // for the first stage's pose
+  std::size_t min_first_inliers = 10;  // for the pose of the coarse weights
   std::size_t min_inliers = 20;        // for a tracked frame
   std::size_t min_initial_points = 100;
   float search_radius = 15;  // pixels at level 0, around a point of the last frame
-};
 
-struct FrontEndOptions {
-  FeatureOptions features;
-  FlowOptions flow;
-  bool use_flow = true;      // false: the object stage is off and needs none
-  bool use_detector = true;  // false: no boxes are asked for
-  bool threads = true;       // flow and detector beside the features
-};
-
-struct RunOptions {
-  cfp::Variant variant = cfp::Variant::cfp;
-  std::uint64_t seed = 1;
-  bool threads = true;         // false: everything on one thread; the trajectory is the same, bit for bit
-  std::size_t max_frames = 0;  // 0: all
-  FrontEndOptions front_end;
-  TrackingOptions tracking;
+  [[nodiscard]] bool use_detector() const { return probability.use_boxes; }
+  [[nodiscard]] bool use_flow() const { return use_detector() && probability.coarse.use_object_probability; }
 };
 
 }  // namespace cfp_slam

@@ -9,13 +9,13 @@
 #include "cfp/frame/weigh_keypoints.hpp"
 #include "cfp/optimization/pose/pose_refinement.hpp"
 #include "last_frame_matching.hpp"
+#include "options.hpp"
 
 namespace cfp_slam {
 
 class PoseSolver {
  public:
-  PoseSolver(const cfp::PoseOptions& options, const cfp::FrameOptions& probability)
-      : options_(options), probability_(probability) {}
+  explicit PoseSolver(const Options& options) : options_(options) {}
 
   // Refines the frame's pose. weight: of the keypoints. Returns the number of inliers that count; the pose is left
   // alone when the refinement fails. Outliers lose their map point when `prune`.
@@ -30,14 +30,14 @@ class PoseSolver {
     observations.depths = depths_;
     observations.baseline_fx = view.baseline_fx;
     inlier_.resize(keypoint_.size());
-    const cfp::PoseResult result =
-        cfp::refine_pose(observations, view.exact, frame.T_cam_world, options_, workspace_, cfp::span<char>(inlier_));
+    const cfp::PoseResult result = cfp::refine_pose(observations, view.exact, frame.T_cam_world, options_.pose,
+                                                    workspace_, cfp::span<char>(inlier_));
     if (!cfp::is_solved(result.status)) return 0;
     frame.T_cam_world = result.T_cam_world;
     std::size_t count = 0;
     for (std::size_t o = 0; o < keypoint_.size(); ++o) {
       if (inlier_[o] != 0) {
-        count += cfp::counts_as_inlier(weights_[o], probability_) ? 1U : 0U;
+        count += cfp::counts_as_inlier(weights_[o], options_.probability) ? 1U : 0U;
       } else if (prune) {
         frame.map_point[keypoint_[o]] = no_point;
       }
@@ -68,8 +68,7 @@ class PoseSolver {
     }
   }
 
-  cfp::PoseOptions options_;
-  cfp::FrameOptions probability_;
+  Options options_;
   cfp::PoseWorkspace<double> workspace_;
   std::vector<std::array<double, 3>> points_;
   std::vector<std::array<double, 2>> pixels_;

@@ -18,7 +18,7 @@ struct RunResult {
 
 // Frames that cannot be used are skipped and say why in their record; nothing is thrown for them. Throws what the
 // detector throws.
-RunResult run_slam(const cfp_examples::Sequence& sequence, cfp_examples::Detector& detector, const RunOptions& options,
+RunResult run_slam(const cfp_examples::Sequence& sequence, cfp_examples::Detector& detector, const Options& options,
                    Observer& observer);
 
 }  // namespace cfp_slam

@@ -28,15 +28,15 @@ namespace cfp_slam {
 class Tracking {
  public:
   // The observer must stay.
-  Tracking(const Camera& camera, const View& view, const TrackingOptions& options, Observer& observer)
+  Tracking(const Camera& camera, const View& view, const Options& options, Observer& observer)
       : options_(options),
         view_(view),
         observer_(observer),
         probability_(camera, options.probability),
-        refine_pose_(options.pose, options.probability),
+        refine_pose_(options),
         relocalize_(options.seed),
         local_map_(options.features),
-        mapping_(options.mapping, options.probability) {}
+        mapping_(options) {}
 
   // `record` comes with time and image; the rest is filled in.
   void track(FrameFeatures&& features, FrameRecord& record) {
@@ -240,7 +240,7 @@ class Tracking {
     return frame.T_cam_world * last_.T_cam_world.inverse();
   }
 
-  TrackingOptions options_;
+  Options options_;
   View view_;
   Observer& observer_;
   cfp::StaticProbability<Camera> probability_;

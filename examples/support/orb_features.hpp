@@ -10,9 +10,16 @@
 
 #include <opencv2/features2d.hpp>
 
-#include "options.hpp"
+namespace cfp_examples {
 
-namespace cfp_slam {
+struct FeatureOptions {
+  int count = 1000;           // keypoints kept
+  int candidates = 3000;      // corners to choose from
+  int levels = 8;             // of the image pyramid
+  float scale_factor = 1.2F;  // between them
+  int fast_threshold = 12;    // grey levels
+  int cell = 40;              // pixels, at the level's own scale
+};
 
 class FeatureExtractor {
  public:
@@ -82,4 +89,4 @@ inline std::vector<float> level_sigmas(const FeatureOptions& options) {
   return sigmas;
 }
 
-}  // namespace cfp_slam
+}  // namespace cfp_examples

@@ -1,5 +1,5 @@
-// What a run leaves behind, as text files in a folder of its own (README.md tells every column): trajectory.txt,
-// frames.txt, boxes.txt, keypoints.txt and, when all is done, run.txt with the settings and the figures of the whole.
+// An observer of the loop that writes what it sees as text files: frames.txt, boxes.txt, keypoints.txt (README.md tells
+// every column).
 #pragma once
 
 #include <array>
@@ -10,16 +10,14 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <iterator>
 #include <locale>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "../slam/loop/observer.hpp"
 #include "../support/tum.hpp"
-#include "loop/run.hpp"
 
 namespace cfp_slam {
 
@@ -133,81 +131,5 @@ class RunWriter final : public Observer {
   std::vector<Inside> inside_;  // the keypoints in boxes of the frame under way
   std::size_t frame_ = 0;
 };
-
-// What decides a run's figures. Two runs with the same settings are the same run.
-struct RunSettings {
-  std::string recording, detector, variant = "cfp";  // the recording's whole path; the detector as make_detector has it
-  std::uint64_t seed = 1;
-  std::size_t frames = 0;  // 0: all
-  int features = 1000;
-  double min_score = 0;
-
-  [[nodiscard]] std::string text() const {
-    std::ostringstream out;
-    out.imbue(std::locale::classic());
-    out.precision(17);
-    out << "recording " << recording << "\ndetector " << detector << "\nvariant " << variant << "\nseed " << seed
-        << "\nframes " << frames << "\nfeatures " << features << "\nmin_score " << min_score << '\n';
-    return out.str();
-  }
-};
-
-inline cfp::Variant variant_of(const std::string& name) {
-  for (int v = 0; v <= static_cast<int>(cfp::Variant::plain); ++v) {
-    if (name == cfp::to_string(static_cast<cfp::Variant>(v))) return static_cast<cfp::Variant>(v);
-  }
-  throw std::runtime_error("no variant '" + name + "': cfp, cfp-minus, no-mdc, no-dbscan, no-ksp, only-boxes, plain");
-}
-
-inline std::string file_text(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
-
-// OUT/<recording's name>/<variant>_<seed>. A second recording whose folder has the same name gets <name>_2, and so on:
-// recording.txt says whose a folder is.
-inline std::filesystem::path run_folder(const std::filesystem::path& out, const RunSettings& settings) {
-  for (int n = 1;; ++n) {
-    const std::string name = cfp_examples::folder_name(settings.recording) + (n > 1 ? "_" + std::to_string(n) : "");
-    const std::filesystem::path folder = out / name;
-    if (!std::filesystem::exists(folder / "recording.txt")) {
-      std::filesystem::create_directories(folder);
-      std::ofstream(folder / "recording.txt", std::ios::binary) << settings.recording;
-    }
-    if (file_text(folder / "recording.txt") == settings.recording)
-      return folder / (settings.variant + "_" + std::to_string(settings.seed));
-  }
-}
-
-// Whether the folder holds a whole run with these settings.
-inline bool is_done(const std::filesystem::path& folder, const RunSettings& settings) {
-  return file_text(folder / "run.txt").rfind(settings.text(), 0) == 0;
-}
-
-// Runs the loop and writes its files. An interrupted run has no run.txt.
-inline void run_into(const std::filesystem::path& folder, const cfp_examples::Sequence& sequence,
-                     cfp_examples::Detector& detector, const RunSettings& settings, bool threads,
-                     const std::function<void(std::size_t)>& progress) {
-  RunOptions options;
-  options.variant = variant_of(settings.variant);
-  options.seed = settings.seed;
-  options.threads = threads;
-  options.max_frames = settings.frames;
-  options.front_end.features.count = settings.features;
-  options.front_end.features.candidates = 3 * settings.features;
-  std::filesystem::create_directories(folder);
-  std::filesystem::remove(folder / "run.txt");
-  RunWriter writer(folder, progress);
-  const RunResult result = run_slam(sequence, detector, options, writer);
-  writer.close();
-  {
-    std::ofstream out = open_text(folder / "trajectory.txt", "timestamp tx ty tz qx qy qz qw");
-    for (const auto& pose : result.trajectory) out << cfp_examples::tum_line(pose) << '\n';
-    if (!out.flush()) throw std::runtime_error("cannot write " + (folder / "trajectory.txt").string());
-  }
-  std::ofstream out(folder / "run.txt", std::ios::binary);
-  out << settings.text() << "keyframes " << result.keyframes << "\nmap_points " << result.map_points << '\n';
-  if (!out.flush()) throw std::runtime_error("cannot write " + (folder / "run.txt").string());
-}
 
 }  // namespace cfp_slam
