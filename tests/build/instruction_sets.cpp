@@ -1,132 +1,158 @@
-// The batch functions on seeded arrays. Compiled once for each set of vector flags; `write FILE` keeps the results of
-// one build, `compare FILE` holds another build to them: equal up to rounding, and exactly where the result is a
-// choice.
-#include <cmath>
-#include <cstdio>
-#include <cstring>
-#include <limits>
-#include <vector>
+// The library's calls on given inputs. Compiled once for each set of vector flags, CFP_VARIANT, and linked into one
+// program: instruction_sets_main.cpp.
+#include "instruction_sets.hpp"
 
-#include "cfp/clustering/depth_foreground.hpp"
-#include "cfp/core/random.hpp"
-#include "cfp/geometry/epipolar.hpp"
-#include "cfp/geometry/reprojection.hpp"
-#include "cfp/math/chi_squared.hpp"
-#include "cfp/math/order_statistic.hpp"
-#include "cfp/probability/distance_sigmoid.hpp"
-#include "cfp/probability/object.hpp"
-#include "cfp/simd/packet.hpp"
+#include <cmath>
+#include <limits>
+
+#include "cfp/cfp.hpp"
 
 namespace {
 
-struct Result {
-  double value, tolerance;  // absolute; 0: equal bits
-};
+using cfp::span;
+using cfp_isa_test::Inputs;
+using cfp_isa_test::Result;
 
-class Results {
- public:
-  /// `scale`: the size of what the result is summed from.
+struct Results {
+  std::vector<Result> all;
   template <typename Scalar>
-  void add(Scalar value, double scale) {
-    all_.push_back(
-        {static_cast<double>(value), 64.0 * static_cast<double>(std::numeric_limits<Scalar>::epsilon()) * scale});
+  void add(const char* what, Scalar value, double tolerance) {
+    all.push_back({what, static_cast<double>(value), tolerance});
+  }
+  template <typename Values>
+  void add_all(const char* what, const Values& values, double tolerance) {
+    for (const auto value : values) add(what, value, tolerance);
   }
   template <typename Scalar>
-  void add(const std::vector<Scalar>& values, double scale) {
-    for (const Scalar value : values) add(value, scale);
+  void add(const char* what, const cfp::SE3<Scalar>& T, double tolerance) {
+    for (int i = 0; i < 9; ++i) add(what, T.rotation.data()[i], tolerance);
+    for (int i = 0; i < 3; ++i) add(what, T.translation[i], tolerance);
   }
-  [[nodiscard]] const std::vector<Result>& all() const { return all_; }
-
- private:
-  std::vector<Result> all_;
 };
+
+/// Rounding of sums of numbers of this size.
+template <typename Scalar>
+double rounding(double scale) {
+  return 64.0 * static_cast<double>(std::numeric_limits<Scalar>::epsilon()) * scale;
+}
 
 template <typename Scalar>
-void run(Results& results) {
-  using cfp::span;
-  const std::size_t n = 1003;  // a partial chunk at the end
-  cfp::Random random(5, "instruction sets");
-  const cfp::PinholeCamera<Scalar> camera{Scalar(535.4), Scalar(539.2), Scalar(320.1), Scalar(247.6)};
+void formulas(const Inputs<Scalar>& in, Results& results) {
+  const std::size_t n = in.previous.size();
+  std::vector<Scalar> distances(n), k(n), scratch(n);
   cfp::Vector6<double> xi;
   xi << 0.05, -0.02, 0.03, 0.01, -0.02, 0.005;
   const cfp::SE3<double> T = cfp::se3_exp(xi);
-  const cfp::Matrix3<Scalar> F =
-      cfp::fundamental_from_pose(cfp::PinholeCamera<double>{535.4, 539.2, 320.1, 247.6}, T).cast<Scalar>();
-  std::vector<cfp::Vector2<Scalar>> previous, current;
-  std::vector<Scalar> depth, projection(n), epipolar(n), k(n), scratch(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    previous.push_back({Scalar(random.uniform(0, 640)), Scalar(random.uniform(0, 480))});
-    const double du = 20 * random.normal(), dv = 20 * random.normal();
-    current.push_back(previous.back() + cfp::Vector2<Scalar>(Scalar(du), Scalar(dv)));
-    depth.push_back(random.uniform() < 0.1 ? Scalar(0) : Scalar(random.uniform(0.6, 6)));
-  }
-  cfp::reprojection_distances(camera, T.cast<Scalar>(), previous, depth, current, projection);
-  cfp::epipolar_distances(F, previous, current, epipolar);
-  results.add(projection, 1000);
-  results.add(epipolar, 1000);
+  const cfp::PinholeCamera<double> camera{535.4, 539.2, 320.1, 247.6};
+  const cfp::PinholeCamera<Scalar> own{Scalar(535.4), Scalar(539.2), Scalar(320.1), Scalar(247.6)};
+  const cfp::Matrix3<Scalar> F = cfp::fundamental_from_pose(camera, T).template cast<Scalar>();
+  cfp::reprojection_distances(own, T.template cast<Scalar>(), in.previous, in.depth, in.current, distances);
+  results.add_all("reprojection distance", distances, rounding<Scalar>(1000));
+  cfp::epipolar_distances(F, in.previous, in.current, distances);
+  results.add_all("epipolar distance", distances, rounding<Scalar>(1000));
 
-  std::vector<Scalar> drawn(n);
-  for (Scalar& d : drawn) d = Scalar(std::abs(random.normal()));
+  const std::vector<Scalar>& drawn = in.drawn;
   const auto model = cfp::fit_constraint(drawn, cfp::ConstraintOptions{}, scratch);
-  results.add(model.threshold_px, 0);
-  results.add(model.minimum_px, 0);
-  results.add(model.calculation_confidence, 1);
+  results.add("threshold", model.threshold_px, 0);
+  results.add("minimum", model.minimum_px, 0);
+  results.add("calculation confidence", model.calculation_confidence, rounding<Scalar>(1));
   cfp::static_probabilities(model, drawn, k);
-  results.add(k, 1);
-  for (const Scalar d : drawn) results.add(cfp::chi_squared_survival(d, 2), 1);
-  results.add(cfp::object_probability(drawn, cfp::ObjectProbabilityOptions{}, scratch).static_probability, 1);
+  results.add_all("static probability", k, rounding<Scalar>(1));
+  for (const Scalar d : drawn) results.add("chi-squared", cfp::chi_squared_survival(d, 2), rounding<Scalar>(1));
+  const auto object = cfp::object_probability(drawn, cfp::ObjectProbabilityOptions{}, scratch);
+  results.add("object probability", object.static_probability, rounding<Scalar>(1));
   for (const double q : {0.1, 0.5, 0.95}) {
-    scratch = drawn;
-    results.add(cfp::order_statistic(span<Scalar>(scratch), cfp::quantile_rank(q, n) - 1), 0);
+    scratch = in.drawn;
+    results.add("order statistic", cfp::order_statistic(span<Scalar>(scratch), cfp::quantile_rank(q, n) - 1), 0);
   }
-
-  std::vector<Scalar> depths(n);
-  for (Scalar& z : depths)
-    z = Scalar(random.uniform() < 0.5 ? 2 + 0.12 * random.normal() : 3.5 + 0.05 * random.normal());
   std::vector<char> foreground(n);
-  cfp::ForegroundWorkspace<Scalar> work;
-  cfp::depth_foreground(depths, cfp::ForegroundOptions{}, work, foreground);
-  for (const char f : foreground) results.add(Scalar(f), 0);
+  cfp::ForegroundWorkspace<Scalar> workspace;
+  cfp::depth_foreground(in.two_depths, cfp::ForegroundOptions{}, workspace, foreground);
+  results.add_all("foreground", foreground, 0);
 }
 
-bool can_run() {
-#if defined(__AVX512F__)
-  return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq");
-#elif defined(__AVX2__)
-  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-#else
-  return true;
-#endif
+template <typename Scalar>
+void solvers(const Inputs<Scalar>& in, Results& results) {
+  // Rounds that go on until rounding shows, and, in double, those that end early.
+  constexpr bool is_double = sizeof(Scalar) == sizeof(double);
+  cfp::PoseOptions to_the_end;
+  to_the_end.handover_decrease = 0, to_the_end.min_decrease = is_double ? 1e-10 : 1e-3;
+  cfp::PoseWorkspace<Scalar> workspace;
+  const auto refine = [&](const auto& scene, const cfp::PoseOptions& options, double tolerance) {
+    const auto result = cfp::refine_pose(scene.observations(), scene.camera, scene.start, options, workspace);
+    results.add("refined pose", result.T_cam_world, tolerance);
+    results.add("refinement's status", static_cast<int>(result.status), 0);
+  };
+  for (const auto& scene : in.poses) {
+    refine(scene, to_the_end, is_double ? 1e-8 : 1e-4);
+    if (!is_double) continue;
+    refine(scene, {}, 1e-6);
+    refine(scene, cfp::orb_slam2_pose_options(), 1e-6);
+  }
+  cfp::FundamentalRansacWorkspace f_workspace;
+  std::vector<char> inlier(in.views.prev.size());
+  const auto F = cfp::fundamental_ransac(cfp::PointPairs{in.views.prev, in.views.cur}, cfp::FundamentalRansacOptions{},
+                                         f_workspace, inlier);
+  for (int i = 0; i < 9; ++i) results.add("fundamental", std::abs(F.F.data()[i]), 1e-4);
+}
+
+template <typename Scalar>
+void frames(const Inputs<Scalar>& in, Results& results) {
+  cfp::StaticProbability<cfp::PinholeCamera<Scalar>> probability(in.frames.front().camera);
+  double time_s = 0;
+  for (const auto& scene : in.frames) {
+    std::vector<cfp::Detection<Scalar>> detections;
+    for (const auto& box : scene.boxes) detections.push_back({box, 0, Scalar(0.8)});
+    std::vector<Scalar> m(scene.keypoints.size(), Scalar(1));
+    cfp::Frame<Scalar> frame;
+    frame.timestamp_s = time_s += 1.0 / 30;
+    frame.keypoints = scene.previous_keypoints;
+    frame.depths = scene.previous_depths;
+    frame.detections = span<const cfp::Detection<Scalar>>(detections);
+    (void)probability.coarse(frame);
+    frame.timestamp_s = time_s += 1.0 / 30;
+    frame.keypoints = scene.keypoints;
+    frame.depths = scene.depths;
+    frame.flow = {scene.previous_keypoints, scene.keypoints};
+    results.add_all("coarse weight", probability.coarse(frame).weight, 1e-3);
+    const cfp::PoseEstimate pose{scene.T_cur_prev, 300};
+    results.add_all("fine weight", probability.fine(pose, scene.match, span<Scalar>(m)).weight, 1e-3);
+    results.add_all("map point", m, 1e-3);
+  }
+}
+
+void map(const cfp_test::AbsolutePoseScene<double>& scene, Results& results) {
+  cfp::PnpRansacWorkspace workspace;
+  std::vector<char> inlier(scene.world.size());
+  const cfp::PinholeCamera<double> camera{535.4, 539.2, 320.1, 247.6};
+  const auto pose =
+      cfp::pnp_ransac(scene.world, scene.pixels, scene.weights, camera, cfp::PnpRansacOptions{}, workspace, inlier);
+  results.add("pose without a start", pose.T_cam_world, 1e-3);
+}
+
+void bundles(const std::vector<cfp_test::BaScene>& scenes, Results& results) {
+  cfp::BundleWorkspace workspace;
+  for (cfp_test::BaScene scene : scenes) {
+    (void)cfp::adjust_bundle(scene.problem(), {}, workspace);
+    for (const cfp::SE3<double>& pose : scene.poses) results.add("bundle adjustment", pose, 1e-8);
+  }
+}
+
+template <typename Scalar>
+void everything(const Inputs<Scalar>& in, Results& results) {
+  formulas(in, results);
+  solvers(in, results);
+  frames(in, results);
 }
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  const bool writes = argc == 3 && std::strcmp(argv[1], "write") == 0;
-  if (!writes && !(argc == 3 && std::strcmp(argv[1], "compare") == 0)) return 2;
-  if (!can_run()) {
-    std::printf("CFP_SKIPPED: this processor lacks the instruction set\n");
-    return 0;
-  }
+std::vector<Result> CFP_VARIANT(const cfp_isa_test::AllInputs& in);
+std::vector<Result> CFP_VARIANT(const cfp_isa_test::AllInputs& in) {
   Results results;
-  run<float>(results);
-  run<double>(results);
-  std::FILE* file = std::fopen(argv[2], writes ? "w" : "r");
-  if (file == nullptr) return 2;
-  std::size_t different = 0, read = 0;
-  for (const Result& r : results.all()) {
-    if (writes) {
-      std::fprintf(file, "%a\n", r.value);
-      continue;
-    }
-    double expected = 0;
-    read += std::fscanf(file, "%la", &expected) == 1 ? 1U : 0U;
-    if (std::abs(r.value - expected) <= r.tolerance) continue;
-    if (++different <= 10)
-      std::printf("result %td: %.17g, with the other flags %.17g\n", &r - results.all().data(), r.value, expected);
-  }
-  std::fclose(file);
-  std::printf("%zu results, %d floats at once, %zu differences\n", results.all().size(), cfp::simd::native_lanes<float>,
-              different);
-  return writes || (read == results.all().size() && different == 0) ? 0 : 1;
+  everything(in.single, results);
+  everything(in.twofold, results);
+  map(in.map, results);
+  bundles(in.bundles, results);
+  return results.all;
 }

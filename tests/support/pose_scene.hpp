@@ -11,6 +11,7 @@
 #include "cfp/geometry/camera.hpp"
 #include "cfp/math/se3.hpp"
 #include "cfp/optimization/pose/pose_refinement.hpp"
+#include "support/random_direction.hpp"
 
 namespace cfp_test {
 
@@ -54,11 +55,6 @@ struct PlainCamera {
     return pinhole.project(p, pixel, J);
   }
 };
-
-inline cfp::Vector3<double> random_direction(cfp::Random& random) {
-  cfp::Vector3<double> d(random.normal(), random.normal(), random.normal());
-  return d / d.norm();
-}
 
 template <typename Scalar>
 PoseScene<Scalar> make_pose_scene(std::uint64_t seed, const PoseSceneOptions& options = {}) {

@@ -12,6 +12,7 @@
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/point_pairs.hpp"
 #include "cfp/math/se3.hpp"
+#include "support/random_direction.hpp"
 
 namespace cfp_test {
 
@@ -39,10 +40,6 @@ struct TwoViewScene {
   Points prev, cur;                         // measured
   std::vector<char> is_inlier;
 };
-
-inline cfp::Vector3<double> random_direction(cfp::Random& random) {
-  return cfp::Vector3<double>(random.normal(), random.normal(), random.normal()).normalized();
-}
 
 template <typename Scalar>
 TwoViewScene<Scalar> make_two_view_scene(cfp::Random& random, const TwoViewOptions& options) {
@@ -90,7 +87,7 @@ inline cfp::Matrix3<double> scaled_fundamental(const cfp::Matrix3<double>& F, co
       .normalized();
 }
 
-/// Median Sampson distance (px) of the exact true pairs under F: the quality measure of BASELINES.
+/// Median Sampson distance (px) of the exact true pairs under F: how good F is.
 template <typename Scalar>
 double median_sampson_of_truth(const TwoViewScene<Scalar>& scene, const cfp::Matrix3<Scalar>& F) {
   std::vector<double> distances;
