@@ -9,12 +9,14 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "cfp/optimization/bundle/bundle_problem.hpp"
+#include "support/numbers.hpp"
 
 namespace ba_files {
 
@@ -69,7 +71,6 @@ inline Problem read_bal(const std::string& file) {
   std::size_t line_number = 0;
   std::istringstream fields;
   const auto next = [&](const std::string& what) {
-    double value = 0;
     std::string field;
     while (!(fields >> field)) {
       if (!std::getline(in, line))
@@ -78,12 +79,10 @@ inline Problem read_bal(const std::string& file) {
       fields.clear();
       fields.str(line);
     }
-    char* end = nullptr;
-    value = std::strtod(field.c_str(), &end);
-    if (end != field.c_str() + field.size() || !cfp::is_finite(value)) {
+    const std::optional<double> value = cfp_examples::read_number(field);
+    if (!value || !cfp::is_finite(*value))
       fail(file, "line " + std::to_string(line_number) + ": " + what + " is not a number: '" + field + "'");
-    }
-    return value;
+    return *value;
   };
   const auto count = [&](const std::string& what, double limit) {
     const double value = next(what);

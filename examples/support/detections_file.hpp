@@ -9,11 +9,13 @@
 #include <cmath>
 #include <cstddef>
 #include <istream>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "cfp/detection/box_tracker_types.hpp"
+#include "numbers.hpp"
 
 namespace cfp_examples {
 
@@ -40,18 +42,22 @@ inline DetectionsFile read_detections(std::istream& input, const std::string& na
   for (std::string line; std::getline(input, line);) {
     ++number;
     line.resize(std::min(line.size(), line.find('#')));
-    std::istringstream fields(line);
-    double timestamp = 0;
-    std::string label, rest;
-    cfp::Detection<double> d;
-    if (!(fields >> rest)) continue;  // nothing but blanks or a comment
-    fields = std::istringstream(line);
-    if (!(fields >> timestamp) || !std::isfinite(timestamp)) return fail(number, "no timestamp: '" + rest + "'");
-    if (!(fields >> label)) return fail(number, "no class after the timestamp");
-    if (!(fields >> d.score)) return fail(number, "no score after class '" + label + "'");
-    if (!(fields >> d.box.x1 >> d.box.y1 >> d.box.x2 >> d.box.y2))
+    std::istringstream split(line);
+    std::vector<std::string> words;
+    for (std::string word; split >> word;) words.push_back(word);
+    if (words.empty()) continue;  // nothing but blanks or a comment
+    const auto value = [&](std::size_t i) { return i < words.size() ? read_number(words[i]) : std::nullopt; };
+    if (!value(0) || !std::isfinite(*value(0))) return fail(number, "no timestamp: '" + words[0] + "'");
+    if (words.size() < 2) return fail(number, "no class after the timestamp");
+    if (!value(2)) return fail(number, "no score after class '" + words[1] + "'");
+    if (!value(3) || !value(4) || !value(5) || !value(6))
       return fail(number, "four numbers x1 y1 x2 y2 must follow the score");
-    if (fields >> rest) return fail(number, "surplus '" + rest + "' after the box");
+    if (words.size() > 7) return fail(number, "surplus '" + words[7] + "' after the box");
+    const double timestamp = *value(0);
+    const std::string& label = words[1];
+    cfp::Detection<double> d;
+    d.score = *value(2);
+    d.box = {*value(3), *value(4), *value(5), *value(6)};
     if (!cfp::is_proper(d.box)) return fail(number, "the box needs x1 < x2 and y1 < y2");
     if (!file.frames.empty() && timestamp < file.frames.back().timestamp)
       return fail(number, "the timestamp is before that of the line above");

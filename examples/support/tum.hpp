@@ -3,11 +3,10 @@
 #pragma once
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -17,6 +16,7 @@
 #include <Eigen/Geometry>
 
 #include "cfp/evaluation/trajectory.hpp"
+#include "numbers.hpp"
 
 namespace cfp_examples {
 
@@ -44,12 +44,9 @@ void for_each_line(const std::filesystem::path& file, const Visit& visit) {
 }
 
 inline double parse_number(const std::filesystem::path& file, int line, const std::string& word, const char* meaning) {
-  double value = 0;
-  const char* const first = word.data() + (word.size() > 1 && word[0] == '+' ? 1 : 0);
-  const auto [end, error] = std::from_chars(first, word.data() + word.size(), value);
-  if (error != std::errc() || end != word.data() + word.size())
-    bad_line(file, line, "'" + word + "' is no number (" + meaning + ")");
-  return value;
+  const std::optional<double> value = read_number(word);
+  if (!value) bad_line(file, line, "'" + word + "' is no number (" + meaning + ")");
+  return *value;
 }
 
 /// `timestamp tx ty tz qx qy qz qw`, camera to world. Quaternions are normalised; a line whose quaternion is zero, or
@@ -89,9 +86,8 @@ inline std::string fixed_text(double value, int decimals) {
 inline std::string tum_line(const cfp::StampedPose<double>& pose) {
   const Eigen::Quaterniond q(pose.T_world_cam.rotation);
   const auto& t = pose.T_world_cam.translation;
-  char text[256];
-  std::snprintf(text, sizeof text, "%.6f %.9f %.9f %.9f %.9f %.9f %.9f %.9f", pose.time_s, t.x(), t.y(), t.z(), q.x(),
-                q.y(), q.z(), q.w());
+  std::string text = fixed(pose.time_s, 6);
+  for (const double value : {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()}) text += ' ' + fixed(value, 9);
   return text;
 }
 

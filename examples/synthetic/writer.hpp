@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <initializer_list>
 #include <mutex>
 #include <stdexcept>
 #include <string>
@@ -21,11 +21,11 @@
 
 namespace synthetic {
 
-template <typename... Values>
-std::string text(const char* format, Values... values) {
-  char buffer[256];
-  std::snprintf(buffer, sizeof buffer, format, values...);
-  return buffer;
+/// The values behind blanks, all with the same number of decimals.
+inline std::string columns(std::initializer_list<double> values, int decimals) {
+  std::string text;
+  for (const double value : values) text += ' ' + cfp_examples::fixed(value, decimals);
+  return text;
 }
 
 /// Writes the sequence into a folder, which is made when missing. progress(frames done) is called from the rendering
@@ -46,7 +46,7 @@ inline void write_sequence(const Sequence& sequence, const std::filesystem::path
       try {
         sequence.render(k, renderer, frame);
         people[static_cast<std::size_t>(k)] = frame.truth.people;
-        const std::string name = text("%.6f.png", sequence.stamp_of(k));
+        const std::string name = cfp_examples::fixed(sequence.stamp_of(k), 6) + ".png";
         // Noise does not compress: the fastest level costs a few per cent of space and half the time.
         const std::vector<int> fast{cv::IMWRITE_PNG_COMPRESSION, 1};
         if (!cv::imwrite((folder / "rgb" / name).string(), frame.color, fast) ||
@@ -73,9 +73,10 @@ inline void write_sequence(const Sequence& sequence, const std::filesystem::path
       truth(folder / "groundtruth.txt"), boxes(folder / "boxes.txt"), detections(folder / "detections.txt"),
       camera(folder / "camera.txt");
   const ImageCamera& c = options.camera;
-  camera << "# fx fy cx cy width height depth_units_per_metre; images are undistorted\n"
-         << text("%.6g %.6g %.6g %.6g %d %d %.6g\n", c.fx, c.fy, c.cx, c.cy, c.width, c.height,
-                 options.sensor.depth_units_per_metre);
+  camera << "# fx fy cx cy width height depth_units_per_metre; images are undistorted\n";
+  for (const double value : {c.fx, c.fy, c.cx, c.cy, double(c.width), double(c.height)})
+    camera << cfp_examples::general(value, 6) << ' ';
+  camera << cfp_examples::general(options.sensor.depth_units_per_metre, 6) << '\n';
   rgb << "# color images: timestamp filename\n";
   depth << "# depth maps, 16-bit, 0 = none: timestamp filename\n";
   labels << "# labels, 8-bit, 0 = static, 1 = moving, 2 = part of a person but still: timestamp filename\n";
@@ -84,7 +85,7 @@ inline void write_sequence(const Sequence& sequence, const std::filesystem::path
   detections << "# simulated detector: timestamp class score x1 y1 x2 y2\n";
   Detector detector(options.detector, options.seed);
   for (int k = 0; k < options.frames; ++k) {
-    const std::string stamp = text("%.6f", sequence.stamp_of(k));
+    const std::string stamp = cfp_examples::fixed(sequence.stamp_of(k), 6);
     rgb << stamp << " rgb/" << stamp << ".png\n";
     depth << stamp << " depth/" << stamp << ".png\n";
     labels << stamp << " labels/" << stamp << ".png\n";
@@ -93,15 +94,14 @@ inline void write_sequence(const Sequence& sequence, const std::filesystem::path
     for (std::size_t who = 0; who < seen.size(); ++who) {
       const Sighting& s = seen[who];
       if (s.pixels > 0) {
-        boxes << stamp
-              << text(" %d %.0f %.0f %.0f %.0f %.3f %d\n", static_cast<int>(who) + 1, s.box.x1, s.box.y1, s.box.x2,
-                      s.box.y2, s.visible, s.pixels);
+        boxes << stamp << ' ' << std::to_string(who + 1) << columns({s.box.x1, s.box.y1, s.box.x2, s.box.y2}, 0)
+              << columns({s.visible}, 3) << ' ' << std::to_string(s.pixels) << '\n';
       }
     }
     for (const Detection& d :
          detector.detect(seen, sequence.rotation_rate(k), options.blur_samples > 1, c.width, c.height)) {
-      detections << stamp
-                 << text(" person %.4f %.2f %.2f %.2f %.2f\n", d.score, d.box.x1, d.box.y1, d.box.x2, d.box.y2);
+      detections << stamp << " person" << columns({d.score}, 4) << columns({d.box.x1, d.box.y1, d.box.x2, d.box.y2}, 2)
+                 << '\n';
     }
   }
   for (std::ofstream* file : {&rgb, &depth, &labels, &truth, &boxes, &detections, &camera}) {
