@@ -18,6 +18,7 @@
 #include "cfp/optimization/bundle/bundle_adjustment.hpp"
 #include "cfp/optimization/bundle/two_threads.hpp"
 #include "support/ba_scene.hpp"
+#include "support/data.hpp"
 #ifdef CFP_HAVE_CERES
 #include "support/ba_ceres.hpp"
 #endif
@@ -216,8 +217,7 @@ void scaling(int repetitions) {
 }
 
 void real_data(const std::string& name, int repetitions) {
-  const char* root = std::getenv("CFP_TEST_DATA");
-  const std::filesystem::path file = std::filesystem::path(root != nullptr ? root : CFP_DATA_DEFAULT) / "ba" / name;
+  const std::filesystem::path file = cfp_test::data_folder("ba") / name;
   if (!std::filesystem::exists(file)) {
     std::printf("\n%s is not there; set CFP_TEST_DATA\n", file.string().c_str());
     return;

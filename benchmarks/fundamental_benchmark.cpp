@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "cfp/robust/fundamental_ransac.hpp"
+#include "support/data.hpp"
 #include "support/interleaved.hpp"
 #include "support/two_view_scene.hpp"
 
@@ -97,8 +98,7 @@ Scene read_labelled(const std::string& file) {
 /// Real matches in 20 random orders each. Accuracy: the median Sampson distance of the pairs labelled as matches, which
 /// holds their own noise, too.
 void real_data(int repetitions) {
-  const char* root = std::getenv("CFP_TEST_DATA");
-  const std::string folder = std::string(root != nullptr ? root : CFP_DATA_DEFAULT) + "/two_view/";
+  const std::string folder = cfp_test::data_folder("two_view/").string();
   for (const char* name : {"head", "johnssonb", "kampa", "physics", "unihouse", "valbonne"}) {
     const Scene whole = read_labelled(folder + name + "_pts.txt");
     if (whole.prev.empty()) {

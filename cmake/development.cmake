@@ -6,6 +6,8 @@ endif()
 option(CFP_WARNINGS_AS_ERRORS "Treat warnings in cfp's own targets as errors" ON)
 set(CFP_SANITIZE "" CACHE STRING "Sanitizers for cfp's own targets, for example address,undefined")
 
+set(CFP_TEST_DATA "$ENV{CFP_TEST_DATA}" CACHE PATH "Folder of the real recordings; without it, the tests that need one are skipped")
+
 add_library(cfp_development INTERFACE)
 target_link_libraries(cfp_development INTERFACE cfp::cfp)
 if(MSVC)

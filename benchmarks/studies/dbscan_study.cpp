@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "cfp/clustering/depth_foreground.hpp"
+#include "support/data.hpp"
 #include "support/k_distance.hpp"
 #include "support/person_scene.hpp"
 #ifdef CFP_HAVE_OPENCV
@@ -205,6 +206,6 @@ int main(int argc, char* argv[]) {
 #ifdef CFP_HAVE_OPENCV
   std::printf(
       "\nTable 5: real depth frames, limits between person and background read by hand (support/real_boxes.hpp)\n");
-  cfp_study::print_real_boxes(argc > 3 ? argv[3] : CFP_DATA_DEFAULT);
+  cfp_study::print_real_boxes(argc > 3 ? argv[3] : cfp_test::data_folder("").string());
 #endif
 }

@@ -7,7 +7,6 @@
 
 #include <chrono>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -15,6 +14,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "../../examples/support/tum.hpp"
+#include "support/data.hpp"
 
 namespace {
 
@@ -59,8 +59,7 @@ cfp_examples::Detections people(const cfp_examples::Detector& detector, cfp_exam
 }  // namespace
 
 int main(int argc, char** argv) {
-  const char* root = std::getenv("CFP_TEST_DATA");
-  const fs::path data = root != nullptr ? root : CFP_DATA_DEFAULT, folder = data / "tum_fr3_walking_halfsphere_30";
+  const fs::path folder = cfp_test::data_folder("tum_fr3_walking_halfsphere_30"), data = folder.parent_path();
   if (!fs::exists(folder) || !fs::exists(data / "detectors")) {
     std::printf("CFP_SKIPPED: no %s or no %s\n", folder.c_str(), (data / "detectors").c_str());
     return 0;

@@ -22,6 +22,7 @@
 #include "cfp/core/random.hpp"
 #include "cfp/detection/box_tracker.hpp"
 #include "cfp/math/so3.hpp"
+#include "support/data.hpp"
 
 namespace {
 
@@ -316,7 +317,7 @@ std::vector<Variant> variants() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::string folder = argc > 1 ? argv[1] : std::string(CFP_DATA_DEFAULT) + "/mot/TUD-Stadtmitte";
+  const std::string folder = argc > 1 ? argv[1] : cfp_test::data_folder("mot/TUD-Stadtmitte").string();
   std::vector<DataSet> sets;
   const Sequence tud = read_mot(folder);
   if (tud.frames.empty()) {

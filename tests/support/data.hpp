@@ -1,4 +1,4 @@
-// Where the real recordings of others are, when they are there: $CFP_TEST_DATA, else the folder beside the checkout.
+// Where the real recordings of others are: the environment's CFP_TEST_DATA, else the folder of that name in CMake's cache.
 #pragma once
 
 #include <cstdlib>
