@@ -87,7 +87,7 @@ int main(int argc, char** argv) {
   std::vector<double> squared_errors(data.pose.size());
   cfp::BundleOptions judge_only = arguments.options;
   judge_only.levenberg_marquardt.max_iterations = 0;
-  cfp::adjust_bundle(data.view(), judge_only, workspace, cfp::SingleThread{}, squared_errors);
+  (void)cfp::adjust_bundle(data.view(), judge_only, workspace, squared_errors);
   const double before = rms(squared_errors);
 
   const auto start = std::chrono::steady_clock::now();
@@ -96,7 +96,7 @@ int main(int argc, char** argv) {
     cfp::TwoThreads two_threads;
     result = cfp::adjust_bundle(data.view(), arguments.options, workspace, two_threads, squared_errors);
   } else {
-    result = cfp::adjust_bundle(data.view(), arguments.options, workspace, cfp::SingleThread{}, squared_errors);
+    result = cfp::adjust_bundle(data.view(), arguments.options, workspace, squared_errors);
   }
   const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - start;
 

@@ -68,7 +68,6 @@
 #include "cfp/math/order_statistic.hpp"
 #include "cfp/math/se3.hpp"
 #include "cfp/math/so3.hpp"
-#include "cfp/optimization/bundle/block_cholesky.hpp"
 #include "cfp/optimization/bundle/bundle_adjustment.hpp"
 #include "cfp/optimization/bundle/bundle_problem.hpp"
 #include "cfp/optimization/least_squares.hpp"

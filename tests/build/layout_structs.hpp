@@ -130,7 +130,6 @@
   CFP_LAYOUT(cfp::BundleOptions, chi2_stereo)                        \
   CFP_LAYOUT(cfp::BundleResult, factor_blocks)                       \
   CFP_LAYOUT_OPAQUE(cfp::SingleThread)                                   \
-  CFP_LAYOUT_OPAQUE(cfp::BlockCholesky)                                  \
   CFP_LAYOUT(cfp::LevenbergMarquardtOptions, min_absolute_decrease)      \
   CFP_LAYOUT(cfp::LeastSquaresResult, accepted)                          \
   CFP_LAYOUT_OPAQUE(cfp::Damping)                                        \
@@ -138,7 +137,7 @@
   CFP_LAYOUT(cfp::PnpRansacOptions, seed)                                \
   CFP_LAYOUT_OPAQUE(cfp::PnpRansacResult<float>)                         \
   CFP_LAYOUT_OPAQUE(cfp::PnpRansacResult<double>)                        \
-  CFP_LAYOUT_OPAQUE(cfp::BundleWorkspace)                            \
+  CFP_LAYOUT(cfp::BundleWorkspace, schur)                            \
   CFP_LAYOUT(cfp::FirstStageInput<float>, fundamental)                   \
   CFP_LAYOUT(cfp::FirstStageInput<double>, fundamental)                  \
   CFP_LAYOUT(cfp::FirstStageOutput<float>, objects)                      \

@@ -1,4 +1,4 @@
-#include "cfp/optimization/bundle/block_cholesky.hpp"
+#include "cfp/optimization/bundle/block_cholesky_impl.hpp"
 
 #include <algorithm>
 #include <limits>
@@ -8,6 +8,7 @@
 #include <Eigen/Cholesky>
 
 #include "cfp/core/random.hpp"
+#include "cfp/core/types.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
 
@@ -60,13 +61,13 @@ TEST_CASE("The block factorisation solves as a dense one, in natural and in mini
   for (const Case c : {Case{0, 0, 0}, Case{1, 0, 0}, Case{2, 1, 0}, Case{9, 8, 0}, Case{40, 2, 15}, Case{80, 79, 0},
                        Case{100, 4, 30}}) {
     System system(c.size, c.band, c.far, 5);
-    for (const int natural_order_limit : {0, 1000}) {
-      CAPTURE(c.size, natural_order_limit);
-      cfp::BlockCholesky cholesky;
-      cholesky.analyze(c.size, system.rows, system.columns, natural_order_limit);
-      REQUIRE(cholesky.factorize(system.blocks));
+    for (const int keep_order_up_to : {0, 1000}) {
+      CAPTURE(c.size, keep_order_up_to);
+      cfp::detail::BlockFactor factor;
+      cfp::detail::analyze_blocks<6>(c.size, system.rows, system.columns, factor, keep_order_up_to);
+      REQUIRE(cfp::detail::factorize_blocks<6>(system.blocks, factor));
       std::vector<double> x = system.right_side;
-      cholesky.solve(x);
+      cfp::detail::solve_blocks<6>(x, factor);
       const Eigen::VectorXd b = Eigen::Map<const Eigen::VectorXd>(system.right_side.data(), 6 * c.size);
       const Eigen::VectorXd expected = system.dense.llt().solve(b);
       CHECK((Eigen::Map<const Eigen::VectorXd>(x.data(), 6 * c.size) - expected).norm() <= 1e-12 * expected.norm());
@@ -79,11 +80,33 @@ TEST_CASE("Minimum degree order keeps an arrow sparse", "[optimization][block_ch
   constexpr int n = 80;
   for (int i = 0; i < n; ++i) rows.push_back(i), columns.push_back(i);
   for (int i = 1; i < n; ++i) rows.push_back(i), columns.push_back(0);
-  cfp::BlockCholesky cholesky;
-  cholesky.analyze(n, rows, columns, 0);
-  CHECK(cholesky.factor_blocks() == 2 * n - 1);
-  cholesky.analyze(n, rows, columns, n);
-  CHECK(cholesky.factor_blocks() == n * (n + 1) / 2);
+  cfp::detail::BlockFactor factor;
+  cfp::detail::analyze_blocks<6>(n, rows, columns, factor, 0);
+  CHECK(factor.row.size() == 2 * n - 1);
+  cfp::detail::analyze_blocks<6>(n, rows, columns, factor, n);
+  CHECK(factor.row.size() == n * (n + 1) / 2);
+}
+
+TEST_CASE("Blocks of another size are factorised by the same code", "[optimization][block_cholesky]") {
+  constexpr int n = 70;
+  Eigen::MatrixXd dense = Eigen::MatrixXd::Random(3 * n, 3 * n);
+  dense = (dense * dense.transpose() + Eigen::MatrixXd::Identity(3 * n, 3 * n)).eval();
+  std::vector<int> rows, columns;
+  std::vector<double> blocks;
+  for (int r = 0; r < n; ++r) {
+    for (int c = 0; c <= r; ++c) {
+      rows.push_back(r), columns.push_back(c);
+      const Eigen::Matrix3d block = dense.block<3, 3>(3 * r, 3 * c);
+      blocks.insert(blocks.end(), block.data(), block.data() + 9);
+    }
+  }
+  cfp::detail::BlockFactor factor;
+  cfp::detail::analyze_blocks<3>(n, rows, columns, factor);
+  REQUIRE(cfp::detail::factorize_blocks<3>(blocks, factor));
+  std::vector<double> x(3 * n, 1.0);
+  cfp::detail::solve_blocks<3>(x, factor);
+  const Eigen::VectorXd expected = dense.llt().solve(Eigen::VectorXd::Ones(3 * n));
+  CHECK((Eigen::Map<const Eigen::VectorXd>(x.data(), 3 * n) - expected).norm() <= 1e-9 * expected.norm());
 }
 
 TEST_CASE("A matrix that is not positive definite is refused", "[optimization][block_cholesky]") {
@@ -93,24 +116,24 @@ TEST_CASE("A matrix that is not positive definite is refused", "[optimization][b
     for (std::size_t i = 0; i < system.rows.size(); ++i) {
       if (system.rows[i] == 3 && system.columns[i] == 3) system.blocks[36 * i + 14] = bad;
     }
-    cfp::BlockCholesky cholesky;
-    cholesky.analyze(5, system.rows, system.columns);
-    CHECK_FALSE(cholesky.factorize(system.blocks));
+    cfp::detail::BlockFactor factor;
+    cfp::detail::analyze_blocks<6>(5, system.rows, system.columns, factor);
+    CHECK_FALSE(cfp::detail::factorize_blocks<6>(system.blocks, factor));
   }
 }
 
 TEST_CASE("Factorising and solving again allocates nothing", "[optimization][block_cholesky]") {
   System system(100, 4, 30, 5), small(20, 4, 5, 6);
-  cfp::BlockCholesky cholesky;
-  cholesky.analyze(100, system.rows, system.columns);
+  cfp::detail::BlockFactor factor;
+  cfp::detail::analyze_blocks<6>(100, system.rows, system.columns, factor);
   CHECK(cfp_test::allocations_in([&] {
-          CHECK(cholesky.factorize(system.blocks));
-          cholesky.solve(system.right_side);
+          CHECK(cfp::detail::factorize_blocks<6>(system.blocks, factor));
+          cfp::detail::solve_blocks<6>(system.right_side, factor);
         }) == 0);
-  cholesky.analyze(20, small.rows, small.columns);
+  cfp::detail::analyze_blocks<6>(20, small.rows, small.columns, factor);
   CHECK(cfp_test::allocations_in([&] {
-          cholesky.analyze(20, small.rows, small.columns);
-          CHECK(cholesky.factorize(small.blocks));
-          cholesky.solve(small.right_side);
+          cfp::detail::analyze_blocks<6>(20, small.rows, small.columns, factor);
+          CHECK(cfp::detail::factorize_blocks<6>(small.blocks, factor));
+          cfp::detail::solve_blocks<6>(small.right_side, factor);
         }) == 0);
 }

@@ -49,10 +49,10 @@ TEST_CASE("One thread, two threads and any order of the tasks give the same bits
     options.stereo_share = 0.3;
     const cfp_test::BaScene start = cfp_test::make_ba_scene(options, 1);
     cfp_test::BaScene one = start, two = start, backward = start, again = start;
-    adjust_bundle(one.problem(), cfp::BundleOptions{}, workspace);
-    adjust_bundle(two.problem(), cfp::BundleOptions{}, workspace, two_threads);
-    adjust_bundle(backward.problem(), cfp::BundleOptions{}, workspace, BackwardExecutor{});
-    adjust_bundle(again.problem(), cfp::BundleOptions{}, workspace);
+    (void)adjust_bundle(one.problem(), cfp::BundleOptions{}, workspace);
+    (void)adjust_bundle(two.problem(), cfp::BundleOptions{}, workspace, two_threads);
+    (void)adjust_bundle(backward.problem(), cfp::BundleOptions{}, workspace, BackwardExecutor{});
+    (void)adjust_bundle(again.problem(), cfp::BundleOptions{}, workspace);
     CHECK(same_bits(one, two));
     CHECK(same_bits(one, backward));
     CHECK(same_bits(one, again));
@@ -172,12 +172,17 @@ TEST_CASE("Hostile input is counted as invalid and does not change the rest", "[
       add(3, 3, 1e300, 1, 1, 1), invalid += 5;
   scene.points.emplace_back(nan, 0, 1), add(3, static_cast<int>(scene.points.size()) - 1, 1, 1, 1, 1), ++invalid;
   scene.points.emplace_back(0, 0, inf), add(3, static_cast<int>(scene.points.size()) - 1, 1, 1, 1, 1), ++invalid;
-  scene.poses.emplace_back(), scene.poses.back().translation.x() = nan, scene.fixed.push_back(0);
-  add(static_cast<int>(scene.poses.size()) - 1, 0, 1, 1, 1, 1), ++invalid;
+  for (const bool scaled : {false, true}) {  // not finite, and no rotation
+    scene.poses.emplace_back(), scene.fixed.push_back(0);
+    if (scaled)
+      scene.poses.back().rotation *= 1.1;
+    else
+      scene.poses.back().translation.x() = nan;
+    add(static_cast<int>(scene.poses.size()) - 1, 0, 1, 1, 1, 1), ++invalid;
+  }
   std::vector<double> errors(scene.pose.size());
   cfp::BundleWorkspace workspace;
-  const cfp::BundleResult result =
-      adjust_bundle(scene.problem(), cfp::BundleOptions{}, workspace, cfp::SingleThread{}, errors);
+  const cfp::BundleResult result = adjust_bundle(scene.problem(), cfp::BundleOptions{}, workspace, errors);
   CHECK(result.invalid == invalid);
   CHECK(result.used == clean.pose.size());
   CHECK(result.final_cost == reference.final_cost);

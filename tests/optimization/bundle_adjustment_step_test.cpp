@@ -34,11 +34,12 @@ cfp::Vector3<double> residual(const cfp_test::BaScene& scene, std::size_t i, con
 
 /// The pose after the library's own update.
 BundlePose moved(const cfp::BundleWorkspace& work, std::size_t rank, const cfp::Vector6<double>& xi) {
-  std::vector<double> steps(6 * work.state.poses.size(), 0.0);
-  for (std::size_t e = 0; e < 6; ++e) steps[6 * rank + e] = xi[static_cast<int>(e)];
+  cfp::detail::BundleSchur schur;
+  schur.pose_steps.assign(6 * work.state.poses.size(), 0.0);
+  for (std::size_t e = 0; e < 6; ++e) schur.pose_steps[6 * rank + e] = xi[static_cast<int>(e)];
   cfp::detail::BundleState next;
   next.poses.resize(work.state.poses.size());
-  (void)cfp::detail::move_poses(work.index, work.state, work.linear, 1.0, steps.data(), next);
+  (void)cfp::detail::move_poses(work.index, work.state, work.linear, schur, 1.0, next);
   return next.poses[rank];
 }
 
@@ -52,10 +53,10 @@ template <typename Loss>
 DenseSystem dense_system(const cfp_test::BaScene& scene, const cfp::BundleWorkspace& work, const Loss& mono,
                          const Loss& stereo) {
   const auto& index = work.index;
-  const int poses = index.free_poses, points = static_cast<int>(index.point_of.size()), n = 6 * poses + 3 * points;
+  const int poses = index.free_poses, points = static_cast<int>(index.caller_point.size()), n = 6 * poses + 3 * points;
   DenseSystem system{Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
   for (std::size_t i = 0; i < scene.pose.size(); ++i) {
-    const std::size_t rank = to_index(index.rank_of[to_index(scene.pose[i])]),
+    const std::size_t rank = to_index(index.pose_number[to_index(scene.pose[i])]),
                       j = to_index(index.point_number[to_index(scene.point[i])]);
     const BundlePose& pose = work.state.poses[rank];
     const double* x = work.state.points.data() + 3 * j;
@@ -108,7 +109,9 @@ void check_step(const Loss& mono, double stereo_share, const Camera& camera, boo
   cfp::detail::prepare(problem, work, result);
   REQUIRE(result.used == scene.pose.size());
   REQUIRE(work.index.eliminate_poses == few_points);
-  REQUIRE(cfp::is_finite(cfp::detail::linearize(problem, mono, stereo, work.index, work.state, work.linear, executor)));
+  cfp::detail::BundleLeastSquares<cfp::BundleProblem<Camera>, Loss, Loss, cfp::SingleThread> least_squares{
+      problem, mono, stereo, work, executor};
+  REQUIRE(cfp::is_finite(least_squares.linearize()));
 
   const DenseSystem system = dense_system(scene, work, mono, stereo);
   const int poses = 6 * work.index.free_poses;
@@ -120,11 +123,11 @@ void check_step(const Loss& mono, double stereo_share, const Camera& camera, boo
           1e-5 * (1 + system.g.segment<6>(6 * k).norm()));
   }
   for (const double lambda : {1e-4, 1.0}) {
-    double promised = 0;
-    REQUIRE(cfp::detail::take_step(work, lambda, executor, promised));
+    const double promised = least_squares.propose(lambda);
+    REQUIRE(cfp::is_finite(promised));
     const Eigen::MatrixXd damped = system.H + lambda * system.D;
     const Eigen::VectorXd h = -damped.ldlt().solve(system.g);
-    CHECK((Eigen::Map<const Eigen::VectorXd>(work.pose_steps.data(), poses) - h.head(poses)).norm() <
+    CHECK((Eigen::Map<const Eigen::VectorXd>(work.schur.pose_steps.data(), poses) - h.head(poses)).norm() <
           1e-5 * h.head(poses).norm());
     const Eigen::VectorXd points = Eigen::Map<const Eigen::VectorXd>(work.next_state.points.data(), h.size() - poses) -
                                    Eigen::Map<const Eigen::VectorXd>(work.state.points.data(), h.size() - poses);

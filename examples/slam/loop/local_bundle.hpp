@@ -46,7 +46,7 @@ class LocalBundle {
     options.levenberg_marquardt.max_iterations = options_.max_iterations;
     squared_errors_.resize(pose_index_.size());
     cfp::BundleWorkspace workspace;
-    cfp::adjust_bundle(problem, options, workspace, cfp::SingleThread{}, cfp::span<double>(squared_errors_));
+    (void)cfp::adjust_bundle(problem, options, workspace, squared_errors_);
   }
 
   // Writes poses and points back and forgets the observations that do not fit. What has gone from the map meanwhile

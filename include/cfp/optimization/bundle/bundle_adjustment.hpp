@@ -1,9 +1,9 @@
 /// @file bundle_adjustment.hpp
 /// Weighted bundle adjustment: camera poses and points that minimise
 ///   cost = sum over observations of w rho(|r|^2 / sigma^2),
-/// r = projection - (u, v), or - (u, v, u_right) for a stereo or RGB-D observation. The weight stands outside the loss
-/// (MODEL section 6): a probably dynamic point is never harder to reject. (g2o as ORB-SLAM2 uses it puts the factor
-/// inside, rho(w r^2 / sigma^2); the two agree for w in {0, 1}.)
+/// r = projection - (u, v), or - (u, v, u_right) for a stereo or RGB-D observation. The weight stands outside the loss:
+/// a probably dynamic point is never harder to reject. (g2o as ORB-SLAM2 uses it puts the factor inside, rho(w r^2 /
+/// sigma^2); the two agree for w in {0, 1}.)
 ///
 /// Levenberg-Marquardt on the normal equations, points eliminated (Schur complement), the reduced camera system
 /// factorised by sparse block Cholesky. Time and memory per iteration are linear in the observations and in the pairs
@@ -13,50 +13,76 @@
 #pragma once
 
 #include <cmath>
-#include <utility>
+#include <type_traits>
 
 #include "cfp/optimization/bundle/bundle_adjustment_impl.hpp"
 #include "cfp/optimization/bundle/bundle_problem.hpp"
 
 namespace cfp {
+inline namespace CFP_ISA {
+
+/// An executor that does everything on the calling thread. Any type with `executor(count, task)`, which calls task(0),
+/// …, task(count - 1) in any order and on any thread and returns when all are done, is an executor; two_threads.hpp has
+/// one.
+struct SingleThread {
+  template <typename Task>
+  void operator()(int count, const Task& task) const {
+    for (int i = 0; i < count; ++i) task(i);
+  }
+};
 
 /// Adjusts the free poses and all points of the problem, in place.
 ///
-/// - Stops as LevenbergMarquardtOptions says; the reason, costs and counts are in the result. The cost never rises.
+/// - Stops as LevenbergMarquardtOptions says; status, costs and counts are in the result. The cost never rises.
+/// - Rotations are normalised before the first evaluation; one that is off by more than 1e-2 is no rotation, and its
+///   observations are invalid.
 /// - Observations whose point the camera does not see at the start (behind it, for example) are left out of the whole
-/// solve; a step that
-///   brings a used observation behind its camera is refused and the damping raised. Call again to readmit.
+///   solve; a step that brings a used observation behind its camera is refused and the damping raised. Call again to
+///   readmit.
 /// - Gauge: nothing is added to the cost. With no pose (mono: or only one) fixed, the damping alone holds the free
 ///   directions, and the solution stays near the start along them.
 /// - A fixed pose, a free pose or a point without a used observation keeps its bits. When no step was accepted,
-/// everything does.
-/// - The same input gives the same bits with any executor.
-/// - Allocates only in the workspace, before the first iteration; not at all when it has seen a problem of this size
-/// and no more
-///   than 64 poses are free.
+///   everything does.
+/// - The same input gives the same bits with any executor. Parts of less than 4000 observations stay on this thread.
+/// - Allocates only in the workspace, before the first iteration; not at all when it has seen a problem of this size.
 /// - squared_errors, when not empty: one per observation, |r|^2 / sigma^2 at the solution, for the caller's outlier
-/// test (against
-///   5.991 mono, 7.815 RGB-D; the weight has no part in it); -1 when the camera does not see the point or the
-///   observation is invalid. Observations of weight 0 are judged, too.
+///   test (against 5.991 mono, 7.815 RGB-D; the weight has no part in it); -1 when the camera does not see the point or
+///   the observation is invalid. Observations of weight 0 are judged, too.
 /// Preconditions (asserted): arrays of one length where they are parallel; cameras: one, or one per pose.
-template <typename Camera, typename Scalar, typename Executor = SingleThread>
-BundleResult adjust_bundle(const BundleProblem<Camera, Scalar>& problem, const BundleOptions& options,
-                           BundleWorkspace& workspace, Executor&& executor = Executor{},
-                           span<double> squared_errors = {}) {
+template <typename Camera, typename Scalar, typename Executor,
+          std::enable_if_t<!std::is_convertible_v<Executor&&, span<double>>, int> = 0>
+[[nodiscard]] BundleResult adjust_bundle(const BundleProblem<Camera, Scalar>& problem, const BundleOptions& options,
+                                         BundleWorkspace& workspace, Executor&& executor,
+                                         span<double> squared_errors = {}) {
   detail::assert_shapes(problem);
   BundleResult result;
   detail::build_index(problem, workspace.index, result);
   detail::prepare(problem, workspace, result);
   if (result.used > 0) {
+    LeastSquaresResult solved;
     with_loss<double>(options.loss, std::sqrt(options.chi2_mono), [&](auto mono) {
       auto stereo = mono;
       stereo.delta = std::sqrt(options.chi2_stereo);
-      detail::minimize(problem, options.levenberg_marquardt, mono, stereo, workspace, executor, result);
+      detail::BundleLeastSquares<BundleProblem<Camera, Scalar>, decltype(mono), decltype(stereo),
+                                 std::remove_reference_t<Executor>>
+          least_squares{problem, mono, stereo, workspace, executor};
+      solved = minimize_least_squares(least_squares, options.levenberg_marquardt);
     });
+    result.status = solved.status;
+    result.initial_cost = solved.initial_cost, result.final_cost = solved.final_cost;
+    result.iterations = solved.iterations, result.accepted = solved.accepted;
     if (result.accepted > 0) detail::write_back(problem, workspace);
   }
   if (!squared_errors.empty()) detail::write_squared_errors(problem, squared_errors);
   return result;
 }
 
+/// The same on the calling thread.
+template <typename Camera, typename Scalar>
+[[nodiscard]] BundleResult adjust_bundle(const BundleProblem<Camera, Scalar>& problem, const BundleOptions& options,
+                                         BundleWorkspace& workspace, span<double> squared_errors = {}) {
+  return adjust_bundle(problem, options, workspace, SingleThread{}, squared_errors);
+}
+
+}  // namespace CFP_ISA
 }  // namespace cfp

@@ -1,5 +1,6 @@
 /// @file bundle_adjustment_impl.hpp
-/// Inside bundle_adjustment.hpp: the Levenberg-Marquardt loop and the way between the caller's arrays and the solver's.
+/// Inside bundle_adjustment.hpp: the problem that the least-squares loop minimises, and the way between the caller's
+/// arrays and the solver's.
 #pragma once
 
 #include <algorithm>
@@ -8,31 +9,26 @@
 #include <utility>
 #include <vector>
 
-#include "cfp/optimization/bundle/block_cholesky.hpp"
 #include "cfp/optimization/bundle/bundle_pose_elimination_impl.hpp"
 #include "cfp/optimization/bundle/bundle_problem.hpp"
 #include "cfp/optimization/bundle/bundle_schur_impl.hpp"
+#include "cfp/optimization/least_squares.hpp"
 
 namespace cfp {
 
 /// Scratch memory of adjust_bundle; keeps what it has grown to. One per thread that calls.
-class BundleWorkspace {
- public:
-  BundleWorkspace() = default;
-
+struct BundleWorkspace {
   // Internal: the stages of adjust_bundle work on these.
   detail::BundleIndex index;
   detail::BundleState state, next_state;
   detail::BundleLinearization linear, next_linear;
   detail::BundleSchur schur;
-  detail::BundlePoseElimination pose_elimination;
-  std::vector<double> pose_steps;
-  BlockCholesky cholesky;
 };
 
 }  // namespace cfp
 
 namespace cfp::detail {
+inline namespace CFP_ISA {
 
 template <typename Camera, typename Scalar>
 void assert_shapes([[maybe_unused]] const BundleProblem<Camera, Scalar>& problem) noexcept {
@@ -48,146 +44,140 @@ void assert_shapes([[maybe_unused]] const BundleProblem<Camera, Scalar>& problem
 
 /// Sizes every array and copies the poses and points that take part.
 template <typename Camera, typename Scalar>
-void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& work, BundleResult& result) {
-  const BundleIndex& index = work.index;
-  const std::size_t ranks = index.pose_of_rank.size(), points = index.point_of.size(),
-                    free_poses = to_index(index.free_poses);
+void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& workspace, BundleResult& result) {
+  const BundleIndex& index = workspace.index;
+  BundleSchur& schur = workspace.schur;
+  const std::size_t poses = index.caller_pose.size(), points = index.caller_point.size(),
+                    free_poses = to_index(index.free_poses), links = index.link_pose.size(),
+                    blocks = index.block_row.size();
   result.free_poses = free_poses;
   result.adjusted_points = points;
-  result.reduced_blocks = index.block_row.size();
-  work.cholesky.analyze(index.eliminate_poses ? 0 : index.free_poses, index.block_row, index.block_column);
-  if (index.eliminate_poses) work.pose_elimination.resize(index);
-  result.factor_blocks = work.cholesky.factor_blocks();
-  for (BundleState* state : {&work.state, &work.next_state}) {
-    state->poses.resize(ranks);
+  result.reduced_blocks = blocks;
+  if (index.eliminate_poses) {
+    analyze_blocks<3>(static_cast<int>(points), index.block_row, index.block_column, schur.factor);
+    schur.blocks[0].resize(9 * blocks);
+    schur.right_side[0].resize(3 * points);
+    schur.triangles.resize(42 * free_poses);
+    schur.couplings.resize(BundleSchur::coupling_doubles * links);
+  } else {
+    analyze_blocks<6>(index.free_poses, index.block_row, index.block_column, schur.factor);
+    for (std::size_t part = 0; part < to_index(bundle_parts); ++part) {
+      schur.blocks[part].resize(36 * blocks);
+      schur.right_side[part].resize(6 * free_poses);
+      schur.pairs[part].resize(BundleSchur::pair_doubles * to_index(index.most_free_links));
+    }
+  }
+  result.factor_blocks = schur.factor.row.size();
+  schur.points.resize(BundleSchur::point_doubles * points);
+  schur.pose_steps.resize(6 * free_poses);
+  for (BundleState* state : {&workspace.state, &workspace.next_state}) {
+    state->poses.resize(poses);
     state->points.resize(3 * points);
   }
-  for (BundleLinearization* linear : {&work.linear, &work.next_linear}) {
-    linear->slots.resize(BundleLinearization::slot_doubles * index.slot_rank.size());
+  for (BundleLinearization* linear : {&workspace.linear, &workspace.next_linear}) {
+    linear->links.resize(BundleLinearization::link_doubles * links);
     linear->poses.resize(BundleLinearization::pose_doubles * free_poses);
-    linear->costs.resize(ranks);
+    linear->costs.resize(poses);
   }
-  for (std::size_t part = 0; part < to_index(ba_parts); ++part) {
-    work.schur.blocks[part].resize(36 * index.block_row.size());
-    work.schur.right_side[part].resize(6 * free_poses);
-    work.schur.scratch[part].resize(to_index(ba_slot_scratch * index.max_free_slots));
-  }
-  work.schur.points.resize(BundleSchur::point_doubles * points);
-  work.pose_steps.resize(6 * free_poses);
-
-  for (std::size_t r = 0; r < ranks; ++r) {
-    const SE3<double>& pose = problem.poses[to_index(index.pose_of_rank[r])];
-    const Vector3<double> center = pose.inverse().translation;
-    for (int e = 0; e < 9; ++e) work.state.poses[r].rotation[e] = pose.rotation(e / 3, e % 3);
-    for (int e = 0; e < 3; ++e) work.state.poses[r].center[e] = center[e];
+  for (std::size_t k = 0; k < poses; ++k) {
+    const SE3<double>& pose = problem.poses[to_index(index.caller_pose[k])];
+    const Matrix3<double> rotation = normalized_rotation(pose.rotation);
+    const Vector3<double> center = -(rotation.transpose() * pose.translation);
+    for (int e = 0; e < 9; ++e) workspace.state.poses[k].rotation[e] = rotation(e / 3, e % 3);
+    for (int e = 0; e < 3; ++e) workspace.state.poses[k].center[e] = center[e];
   }
   for (std::size_t j = 0; j < points; ++j) {
-    for (int e = 0; e < 3; ++e) work.state.points[3 * j + to_index(e)] = problem.points[to_index(index.point_of[j])][e];
+    const Vector3<double>& x = problem.points[to_index(index.caller_point[j])];
+    std::copy(x.data(), x.data() + 3, workspace.state.points.data() + 3 * j);
   }
-}
-
-/// The normal equations at a state; returns the cost, NaN when a point is behind a camera that used to see it.
-template <typename Camera, typename Scalar, typename MonoLoss, typename StereoLoss, typename Executor>
-double linearize(const BundleProblem<Camera, Scalar>& problem, const MonoLoss& mono, const StereoLoss& stereo,
-                 const BundleIndex& index, const BundleState& state, BundleLinearization& linear, Executor& executor) {
-  executor(ba_parts, [&](int part) {
-    for (int r = index.rank_part[to_index(part)]; r < index.rank_part[to_index(part) + 1]; ++r) {
-      const Camera& camera = camera_of(problem.cameras, index.pose_of_rank[to_index(r)]);
-      linearize_pose(index, r, camera, problem.baseline_fx, mono, stereo, state, linear);
-    }
-  });
-  double cost = 0;
-  for (const double c : linear.costs) cost += c;
-  return cost;
-}
-
-/// The poses' steps by elimination of the points.
-template <typename Executor>
-[[nodiscard]] bool solve_for_poses(BundleWorkspace& work, double lambda, Executor& executor) {
-  bool definite[ba_parts];
-  executor(ba_parts, [&](int part) {
-    definite[part] = eliminate_points(work.index, work.state, work.linear, lambda, part, work.schur);
-  });
-  for (const bool part : definite) {
-    if (!part) return false;
-  }
-  auto& blocks = work.schur.blocks;
-  auto& right_side = work.schur.right_side;
-  for (std::size_t part = 1; part < to_index(ba_parts); ++part) {
-    for (std::size_t i = 0; i < blocks[0].size(); ++i) blocks[0][i] += blocks[part][i];
-    for (std::size_t i = 0; i < right_side[0].size(); ++i) right_side[0][i] += right_side[part][i];
-  }
-  if (!work.cholesky.factorize(blocks[0])) return false;
-  std::copy(right_side[0].begin(), right_side[0].end(), work.pose_steps.begin());
-  work.cholesky.solve(work.pose_steps);
-  return true;
-}
-
-/// Solves the damped normal equations and fills next_state. False when they are not positive definite.
-template <typename Executor>
-[[nodiscard]] bool take_step(BundleWorkspace& work, double lambda, Executor& executor, double& promised) {
-  const bool solved = work.index.eliminate_poses
-                          ? eliminate_poses(work.index, work.state, work.linear, lambda, work.schur,
-                                            work.pose_elimination, work.pose_steps.data())
-                          : solve_for_poses(work, lambda, executor);
-  if (!solved) return false;
-  double by_points[ba_parts];
-  executor(ba_parts, [&](int part) {
-    by_points[part] = move_points(work.index, work.state, work.linear, work.schur, lambda, work.pose_steps.data(), part,
-                                  work.next_state);
-  });
-  promised = move_poses(work.index, work.state, work.linear, lambda, work.pose_steps.data(), work.next_state);
-  for (const double p : by_points) promised += p;
-  return is_finite(promised);
 }
 
 /// Bundle adjustment as minimize_least_squares wants it.
-template <typename Linearize, typename Executor>
+template <typename Problem, typename MonoLoss, typename StereoLoss, typename Executor>
 struct BundleLeastSquares {
-  BundleWorkspace& work;
-  const Linearize& linearize_at;  // (state, linear) -> cost
+  // Below so many observations a phase is over before another thread has woken up.
+  static constexpr std::size_t worth_sharing = 4000;
+  const Problem& problem;
+  const MonoLoss& mono;
+  const StereoLoss& stereo;
+  BundleWorkspace& workspace;
   Executor& executor;
 
-  double linearize() { return linearize_at(work.state, work.linear); }
-  double propose(double damping) {
-    double promised = 0;
-    return take_step(work, damping, executor, promised) ? promised : std::numeric_limits<double>::quiet_NaN();
-  }
-  double linearize_trial() { return linearize_at(work.next_state, work.next_linear); }
+  double linearize() { return linearize_at(workspace.state, workspace.linear); }
+  /// NaN when a point is behind a camera that used to see it.
+  double linearize_trial() { return linearize_at(workspace.next_state, workspace.next_linear); }
   void accept() {
-    std::swap(work.state, work.next_state);
-    std::swap(work.linear, work.next_linear);
+    std::swap(workspace.state, workspace.next_state);
+    std::swap(workspace.linear, workspace.next_linear);
+  }
+  double propose(double damping) {
+    const BundleIndex& index = workspace.index;
+    BundleSchur& schur = workspace.schur;
+    if (!(index.eliminate_poses ? eliminate_poses(index, workspace.state, workspace.linear, damping, schur)
+                                : solve_for_poses(damping)))
+      return std::numeric_limits<double>::quiet_NaN();
+    return move_points(index, workspace.state, workspace.linear, schur, damping, workspace.next_state) +
+           move_poses(index, workspace.state, workspace.linear, schur, damping, workspace.next_state);
+  }
+
+ private:
+  template <typename Task>
+  void run(const Task& task) {
+    if (workspace.index.kept.size() >= worth_sharing) {
+      executor(bundle_parts, task);
+    } else {
+      for (int part = 0; part < bundle_parts; ++part) task(part);
+    }
+  }
+
+  double linearize_at(const BundleState& state, BundleLinearization& linear) {
+    const BundleIndex& index = workspace.index;
+    run([&](int part) {
+      for (int k = index.pose_part[to_index(part)]; k < index.pose_part[to_index(part) + 1]; ++k)
+        linearize_pose(index, to_index(k), camera_of(problem.cameras, index.caller_pose[to_index(k)]),
+                       problem.baseline_fx, mono, stereo, state, linear);
+    });
+    double cost = 0;
+    for (const double c : linear.costs) cost += c;
+    return cost;
+  }
+
+  /// The poses' steps by elimination of the points.
+  [[nodiscard]] bool solve_for_poses(double damping) {
+    BundleSchur& schur = workspace.schur;
+    bool definite[bundle_parts];
+    run([&](int part) {
+      definite[part] =
+          eliminate_points(workspace.index, workspace.state, workspace.linear, damping, to_index(part), schur);
+    });
+    for (const bool part : definite) {
+      if (!part) return false;
+    }
+    for (std::size_t part = 1; part < to_index(bundle_parts); ++part) {
+      for (std::size_t i = 0; i < schur.blocks[0].size(); ++i) schur.blocks[0][i] += schur.blocks[part][i];
+      for (std::size_t i = 0; i < schur.right_side[0].size(); ++i) schur.right_side[0][i] += schur.right_side[part][i];
+    }
+    if (!factorize_blocks<6>(schur.blocks[0], schur.factor)) return false;
+    std::copy(schur.right_side[0].begin(), schur.right_side[0].end(), schur.pose_steps.begin());
+    solve_blocks<6>(schur.pose_steps, schur.factor);
+    return true;
   }
 };
 
-template <typename Camera, typename Scalar, typename MonoLoss, typename StereoLoss, typename Executor>
-void minimize(const BundleProblem<Camera, Scalar>& problem, const LevenbergMarquardtOptions& options,
-              const MonoLoss& mono, const StereoLoss& stereo, BundleWorkspace& work, Executor& executor,
-              BundleResult& result) {
-  const auto linearize_at = [&](const BundleState& state, BundleLinearization& linear) {
-    return linearize(problem, mono, stereo, work.index, state, linear, executor);
-  };
-  BundleLeastSquares<decltype(linearize_at), Executor> least_squares{work, linearize_at, executor};
-  const LeastSquaresResult solved = minimize_least_squares(least_squares, options);
-  result.status = solved.status;
-  result.initial_cost = solved.initial_cost, result.final_cost = solved.final_cost;
-  result.iterations = solved.iterations, result.accepted = solved.accepted;
-}
-
 template <typename Camera, typename Scalar>
-void write_back(const BundleProblem<Camera, Scalar>& problem, const BundleWorkspace& work) noexcept {
-  const BundleIndex& index = work.index;
-  for (std::size_t r = 0; r < to_index(index.free_poses); ++r) {
-    const BundlePose& from = work.state.poses[r];
+void write_back(const BundleProblem<Camera, Scalar>& problem, const BundleWorkspace& workspace) noexcept {
+  const BundleIndex& index = workspace.index;
+  for (std::size_t k = 0; k < to_index(index.free_poses); ++k) {
+    const BundlePose& from = workspace.state.poses[k];
     Matrix3<double> rotation;
     for (int e = 0; e < 9; ++e) rotation(e / 3, e % 3) = from.rotation[e];
-    SE3<double>& pose = problem.poses[to_index(index.pose_of_rank[r])];
+    SE3<double>& pose = problem.poses[to_index(index.caller_pose[k])];
     pose.rotation = normalized_rotation(rotation);
     pose.translation = -(pose.rotation * Vector3<double>(from.center[0], from.center[1], from.center[2]));
   }
-  for (std::size_t j = 0; j < index.point_of.size(); ++j) {
-    const double* x = work.state.points.data() + 3 * j;
-    problem.points[to_index(index.point_of[j])] = Vector3<double>(x[0], x[1], x[2]);
+  for (std::size_t j = 0; j < index.caller_point.size(); ++j) {
+    const double* x = workspace.state.points.data() + 3 * j;
+    problem.points[to_index(index.caller_point[j])] = Vector3<double>(x[0], x[1], x[2]);
   }
 }
 
@@ -196,15 +186,17 @@ void write_squared_errors(const BundleProblem<Camera, Scalar>& problem, span<dou
   const auto& observations = problem.observations;
   CFP_ASSERT(squared_errors.size() == observations.pose.size());
   for (std::size_t i = 0; i < squared_errors.size(); ++i) {
-    const int k = observations.pose[i], j = observations.point[i];
     BundleMeasurement m;
     double error = -1;
-    const bool judged = k >= 0 && to_index(k) < problem.poses.size() && j >= 0 && to_index(j) < problem.points.size() &&
-                        read_measurement(observations, i, problem.baseline_fx, m) &&
-                        squared_error(camera_of(problem.cameras, k), problem.poses[to_index(k)],
-                                      problem.points[to_index(j)], m, problem.baseline_fx, error);
+    const bool readable = read_measurement(observations, i, problem.baseline_fx, m);
+    const std::size_t k = static_cast<std::size_t>(m.pose), j = static_cast<std::size_t>(m.point);
+    const bool judged = readable && m.pose >= 0 && k < problem.poses.size() && m.point >= 0 &&
+                        j < problem.points.size() &&
+                        squared_error(camera_of(problem.cameras, m.pose), problem.poses[k], problem.points[j], m,
+                                      problem.baseline_fx, error);
     squared_errors[i] = judged && is_finite(error) ? error : -1;
   }
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp::detail

@@ -15,16 +15,15 @@
 namespace cfp {
 
 /// Parallel arrays in any order, float or double (the arithmetic is double). An observation is *invalid*, hence not
-/// used, when an index is out of range, its pixel, weight, sigma, pose or point is not finite, its weight is negative,
-/// its sigma is not positive, or its cost overflows. Weight 0 is the same as absent. The same pose may observe a point
-/// several times.
+/// used, when an index is out of range, its pixel, weight, sigma, pose or point is not finite, its pose is no rigid
+/// motion, its weight is negative, its sigma is not positive, or its cost overflows. Weight 0 is the same as absent.
+/// The same pose may observe a point several times.
 template <typename Scalar>
 struct BundleObservations {
-  span<const int> pose;         ///< index into BundleProblem::poses
-  span<const int> point;        ///< index into BundleProblem::points
-  PointSpan<Scalar, 2> pixels;  ///< (u, v)
-  span<const Scalar> u_right =
-      {};  ///< px, u - fx b / z of a stereo or RGB-D observation; not > 0 or NaN: a pixel only. Empty: all mono
+  span<const int> pose;             ///< index into BundleProblem::poses
+  span<const int> point;            ///< index into BundleProblem::points
+  PointSpan<Scalar, 2> pixels;      ///< (u, v)
+  span<const Scalar> u_right = {};  ///< px, as in PoseObservations: not > 0 or NaN: a pixel only. Empty: all mono
   span<const Scalar> sigmas = {};   ///< px, ORB-SLAM2: the scale factor of the octave. Empty: all 1
   span<const Scalar> weights = {};  ///< w >= 0, for example the static probability. Empty: all 1
 };
@@ -37,8 +36,7 @@ struct BundleProblem {
   span<const Camera> cameras;    ///< one for all poses, or one per pose; any type like PinholeCamera
   BundleObservations<Scalar> observations;
   span<const char> fixed_poses = {};  ///< per pose: not 0 = held. Empty: all free
-  double baseline_fx =
-      0;  ///< fx times stereo baseline, px m (ORB-SLAM2: Camera.bf); not > 0: all observations are mono
+  double baseline_fx = 0;             ///< fx times stereo baseline, px m (ORB-SLAM2: Camera.bf); not > 0: all are mono
 };
 
 struct BundleOptions {
@@ -47,6 +45,25 @@ struct BundleOptions {
   double chi2_mono = 5.991;    ///< delta^2 of the loss for two residuals, > 0: 95 % of chi^2 with 2 degrees of freedom
   double chi2_stereo = 7.815;  ///< delta^2 of the loss for three residuals, > 0: 3 degrees of freedom
 };
+
+/// Every observation is counted once: used + zero_weight + invalid + behind = all.
+struct BundleResult {
+  SolverStatus status = SolverStatus::not_enough_data;
+  double initial_cost = 0;      ///< sum of w rho(|r|^2 / sigma^2) over the used observations
+  double final_cost = 0;        ///< of the poses and points returned, <= initial_cost
+  int iterations = 0;           ///< steps tried
+  int accepted = 0;             ///< steps taken
+  std::size_t used = 0;         ///< observations in the cost
+  std::size_t zero_weight = 0;  ///< left out: w = 0
+  std::size_t invalid = 0;      ///< left out: see BundleObservations
+  std::size_t behind = 0;       ///< left out: at the start the camera did not see the point (behind it, for example)
+  std::size_t free_poses = 0;   ///< poses that were adjusted
+  std::size_t adjusted_points = 0;  ///< points that were adjusted: those with a used observation
+  std::size_t reduced_blocks = 0;   ///< blocks of the reduced system, lower triangle
+  std::size_t factor_blocks = 0;    ///< blocks of its Cholesky factor
+};
+
+inline namespace CFP_ISA {
 
 /// The first field outside its range, or nothing.
 [[nodiscard]] inline OptionPath invalid_field(const BundleOptions& options) noexcept {
@@ -57,32 +74,5 @@ struct BundleOptions {
   return {};
 }
 
-/// Every observation is counted once: used + zero_weight + invalid + behind = all.
-struct BundleResult {
-  SolverStatus status = SolverStatus::not_enough_data;
-  double initial_cost = 0;      ///< sum of w rho(|r|^2 / sigma^2) over the used observations
-  double final_cost = 0;        ///< <= initial_cost
-  int iterations = 0;           ///< steps tried
-  int accepted = 0;             ///< steps taken
-  std::size_t used = 0;         ///< observations in the cost
-  std::size_t zero_weight = 0;  ///< left out: w = 0
-  std::size_t invalid = 0;      ///< left out: see BundleObservations
-  std::size_t behind = 0;  ///< left out: at the start the camera did not see the point (behind it or beyond its model)
-  std::size_t free_poses = 0;       ///< poses that were adjusted
-  std::size_t adjusted_points = 0;  ///< points that were adjusted: those with a used observation
-  std::size_t reduced_blocks =
-      0;  ///< 6x6 blocks of the reduced camera system, lower triangle; 0 when the poses were eliminated
-  std::size_t factor_blocks = 0;  ///< 6x6 blocks of its Cholesky factor
-};
-
-/// An executor that does everything on the calling thread. Any type with `executor(count, task)`, which calls task(0),
-/// …, task(count - 1) in any order and on any thread and returns when all are done, is an executor; two_threads.hpp has
-/// one.
-struct SingleThread {
-  template <typename Task>
-  void operator()(int count, const Task& task) const {
-    for (int i = 0; i < count; ++i) task(i);
-  }
-};
-
+}  // namespace CFP_ISA
 }  // namespace cfp

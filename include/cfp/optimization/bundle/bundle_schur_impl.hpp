@@ -1,10 +1,11 @@
 /// @file bundle_schur_impl.hpp
-/// Inside bundle_adjustment.hpp: eliminates the points from the damped normal equations and recovers their steps.
+/// Inside bundle_adjustment.hpp: eliminates points, or poses, from the damped normal equations and recovers their
+/// steps.
 ///
-/// Per point, with V = sum of its N, g = sum of its n: V' = V + lambda D_x, and every pair of observations a, b of it
-/// takes W_a V'^-1 W_b^T from block (a, b) of the reduced camera system, W = G N. D is isotropic per point, and per
-/// pose for translation and rotation (mean of the diagonal), so that the iterates do not depend on the direction of the
-/// world's axes.
+/// Per point, with V = sum of its N, g = sum of its n: V' = V + lambda D_x, and every pair of links a, b of it takes
+/// W_a V'^-1 W_b^T from block (a, b) of the reduced system, W = G N. D is isotropic per point, and per pose for
+/// translation and rotation (mean of the diagonal), so that the iterates do not depend on the direction of the world's
+/// axes.
 #pragma once
 
 #include <algorithm>
@@ -13,18 +14,26 @@
 
 #include <Eigen/Core>
 
+#include "cfp/math/so3.hpp"
 #include "cfp/optimization/bundle/bundle_linearization_impl.hpp"
 
 namespace cfp::detail {
 
-/// The reduced camera system and what the points need afterwards.
+/// The reduced system, and what is needed to recover the steps of what was eliminated.
 struct BundleSchur {
   static constexpr std::size_t point_doubles = 10;  // V'^-1 (00 01 02 11 12 22), g, D
-  std::vector<double> blocks[ba_parts];             // 36 per block, column-major
-  std::vector<double> right_side[ba_parts];         // 6 per free rank
-  std::vector<double> scratch[ba_parts];            // ba_slot_scratch per free slot of one point
+  static constexpr std::size_t pair_doubles = 30;   // W = G N (6x3), V'^-1 N (3x3), both column-major, d = x - c
+  static constexpr std::size_t coupling_doubles = 18;
+  std::vector<double> blocks[bundle_parts];      // N N per block, column-major
+  std::vector<double> right_side[bundle_parts];  // N per block row
+  std::vector<double> pairs[bundle_parts];       // pair_doubles per free link of one point
   std::vector<double> points;
+  std::vector<double> triangles, couplings;  // poses eliminated: L^-1 and L^-1 g per pose, L^-1 W per link
+  std::vector<double> pose_steps;            // 6 per free pose
+  BlockFactor factor;
 };
+
+inline namespace CFP_ISA {
 
 /// The scale of the damping for a block of three: the mean of its diagonal, never quite zero.
 [[nodiscard]] inline double damping_scale(double trace) noexcept { return (std::max)(trace / 3, 1e-30); }
@@ -56,47 +65,8 @@ inline void multiply_symmetric(const double* S, const double (&x)[3], double (&y
   y[2] = S[2] * x[0] + S[4] * x[1] + S[5] * x[2];
 }
 
-/// What the pairs of one slot need: W = G N = [N; hat(d) N] (6x3), V'^-1 N (3x3), both column-major, and d = x - c.
-inline constexpr int ba_slot_scratch = 30;
-
-inline void fill_scratch(const double* N, const double (&d)[3], const double* V_inverse, double* scratch) noexcept {
-  const double n[3][3] = {{N[0], N[1], N[2]}, {N[1], N[3], N[4]}, {N[2], N[4], N[5]}};
-  for (int c = 0; c < 3; ++c) {
-    double column[3];
-    multiply_symmetric(V_inverse, n[c], column);
-    double* const W = scratch + 6 * c;
-    W[0] = n[0][c], W[1] = n[1][c], W[2] = n[2][c];
-    W[3] = d[1] * n[2][c] - d[2] * n[1][c];
-    W[4] = d[2] * n[0][c] - d[0] * n[2][c];
-    W[5] = d[0] * n[1][c] - d[1] * n[0][c];
-    for (int r = 0; r < 3; ++r) scratch[18 + 3 * c + r] = column[r];
-    scratch[27 + c] = d[c];
-  }
-}
-
-/// Takes W_b V'^-1 W_a^T from the blocks (b, a) of all pairs a <= b < count of the slots of one point. Half of each
-/// block follows from the other: with T = W_b V'^-1 N_a it is [T, T hat(d_a)^T].
-inline void subtract_pairs(const double* scratch, int count, const int* pair, double* blocks) noexcept {
-  using Column = Eigen::Map<Vector6<double>>;
-  using ConstColumn = Eigen::Map<const Vector6<double>>;
-  for (int a = 0; a < count; ++a) {
-    const double* const p = scratch + ba_slot_scratch * a + 18;
-    const double x = p[9], y = p[10], z = p[11];
-    for (int b = a; b < count; ++b, ++pair) {
-      const ConstColumn w0(scratch + ba_slot_scratch * b), w1(scratch + ba_slot_scratch * b + 6),
-          w2(scratch + ba_slot_scratch * b + 12);
-      double* const block = blocks + 36 * to_index(*pair);
-      const Vector6<double> t0 = w0 * p[0] + w1 * p[1] + w2 * p[2];
-      const Vector6<double> t1 = w0 * p[3] + w1 * p[4] + w2 * p[5];
-      const Vector6<double> t2 = w0 * p[6] + w1 * p[7] + w2 * p[8];
-      Column(block) -= t0;
-      Column(block + 6) -= t1;
-      Column(block + 12) -= t2;
-      Column(block + 18) -= t2 * y - t1 * z;
-      Column(block + 24) -= t0 * z - t2 * x;
-      Column(block + 30) -= t1 * x - t0 * y;
-    }
-  }
+inline void add_cross(const double (&a)[3], const double (&b)[3], double* sum) noexcept {
+  sum[0] += a[1] * b[2] - a[2] * b[1], sum[1] += a[2] * b[0] - a[0] * b[2], sum[2] += a[0] * b[1] - a[1] * b[0];
 }
 
 /// V' of point j, and in schur.points what its step needs; false when V' is not positive definite, which only rounding
@@ -104,8 +74,8 @@ inline void subtract_pairs(const double* scratch, int count, const int* pair, do
 [[nodiscard]] inline bool damp_point(const BundleIndex& index, const BundleLinearization& linear, double lambda,
                                      std::size_t j, double (&V)[6], BundleSchur& schur) noexcept {
   double sum[9] = {};
-  for (std::size_t s = index.slot_begin[j]; s < index.slot_begin[j + 1]; ++s) {
-    for (std::size_t e = 0; e < 9; ++e) sum[e] += linear.slots[BundleLinearization::slot_doubles * s + e];
+  for (std::size_t l = index.link_begin[j]; l < index.link_begin[j + 1]; ++l) {
+    for (std::size_t e = 0; e < 9; ++e) sum[e] += linear.links[BundleLinearization::link_doubles * l + e];
   }
   const double scale = damping_scale(sum[0] + sum[3] + sum[5]);
   std::copy(sum, sum + 6, V);
@@ -115,80 +85,119 @@ inline void subtract_pairs(const double* scratch, int count, const int* pair, do
   return invert_symmetric(V, point);
 }
 
-/// H' = H + lambda D of a pose.
-[[nodiscard]] inline Matrix6<double> damped_pose(const double* pose, double lambda) noexcept {
-  Matrix6<double> H = Eigen::Map<const Matrix6<double>>(pose);
+/// H' = H + lambda D of a pose, column-major.
+inline void damp_pose(const double* pose, double lambda, double* damped) noexcept {
+  std::copy(pose, pose + 36, damped);
   const double t = lambda * damping_scale(pose[0] + pose[7] + pose[14]),
                r = lambda * damping_scale(pose[21] + pose[28] + pose[35]);
-  for (int e = 0; e < 3; ++e) H(e, e) += t, H(e + 3, e + 3) += r;
-  return H;
+  for (int e = 0; e < 3; ++e) damped[7 * e] += t, damped[7 * (e + 3)] += r;
+}
+
+/// W = G N = [N; hat(d) N] of a link, column-major.
+inline void couple(const double* N, const double (&d)[3], double* W) noexcept {
+  const double n[3][3] = {{N[0], N[1], N[2]}, {N[1], N[3], N[4]}, {N[2], N[4], N[5]}};
+  for (int c = 0; c < 3; ++c, W += 6) {
+    W[0] = n[0][c], W[1] = n[1][c], W[2] = n[2][c];
+    W[3] = d[1] * n[2][c] - d[2] * n[1][c];
+    W[4] = d[2] * n[0][c] - d[0] * n[2][c];
+    W[5] = d[0] * n[1][c] - d[1] * n[0][c];
+  }
+}
+
+/// What the pairs of one link need.
+inline void prepare_pairs(const double* N, const double (&d)[3], const double* V_inverse, double* out) noexcept {
+  couple(N, d, out);
+  const double n[3][3] = {{N[0], N[1], N[2]}, {N[1], N[3], N[4]}, {N[2], N[4], N[5]}};
+  for (int c = 0; c < 3; ++c) {
+    double column[3];
+    multiply_symmetric(V_inverse, n[c], column);
+    std::copy(column, column + 3, out + 18 + 3 * c);
+    out[27 + c] = d[c];
+  }
+}
+
+/// Takes W_b V'^-1 W_a^T from the blocks (b, a) of all pairs a <= b < count of the links of one point. Half of each
+/// block follows from the other: with T = W_b V'^-1 N_a it is [T, T hat(d_a)^T].
+inline void subtract_pairs(const double* links, int count, const int* pair, double* blocks) noexcept {
+  for (int a = 0; a < count; ++a) {
+    const double* const p = links + BundleSchur::pair_doubles * to_index(a) + 18;
+    const double x = p[9], y = p[10], z = p[11];
+    for (int b = a; b < count; ++b, ++pair) {
+      const double* const w = links + BundleSchur::pair_doubles * to_index(b);
+      double* const block = blocks + 36 * to_index(*pair);
+      for (int r = 0; r < 6; ++r) {
+        const double t0 = w[r] * p[0] + w[6 + r] * p[1] + w[12 + r] * p[2];
+        const double t1 = w[r] * p[3] + w[6 + r] * p[4] + w[12 + r] * p[5];
+        const double t2 = w[r] * p[6] + w[6 + r] * p[7] + w[12 + r] * p[8];
+        block[r] -= t0;
+        block[6 + r] -= t1;
+        block[12 + r] -= t2;
+        block[18 + r] -= t2 * y - t1 * z;
+        block[24 + r] -= t0 * z - t2 * x;
+        block[30 + r] -= t1 * x - t0 * y;
+      }
+    }
+  }
 }
 
 /// The share of one part of the points in the reduced system; part 0 starts from the poses' own blocks. False as
 /// damp_point.
 [[nodiscard]] inline bool eliminate_points(const BundleIndex& index, const BundleState& state,
-                                           const BundleLinearization& linear, double lambda, int part,
+                                           const BundleLinearization& linear, double lambda, std::size_t part,
                                            BundleSchur& schur) noexcept {
   double* const blocks = schur.blocks[part].data();
   double* const right_side = schur.right_side[part].data();
-  double* const scratch = schur.scratch[part].data();
+  double* const pairs = schur.pairs[part].data();
   std::fill(schur.blocks[part].begin(), schur.blocks[part].end(), 0.0);
   std::fill(schur.right_side[part].begin(), schur.right_side[part].end(), 0.0);
-  if (part == 0) {
-    for (std::size_t k = 0; k < to_index(index.free_poses); ++k) {
-      const double* pose = linear.poses.data() + k * BundleLinearization::pose_doubles;
-      Eigen::Map<Matrix6<double>>(blocks + 36 * to_index(index.diagonal_block[k])) = damped_pose(pose, lambda);
-      for (std::size_t e = 0; e < 6; ++e) right_side[6 * k + e] = -pose[36 + e];
-    }
+  for (std::size_t k = 0; part == 0 && k < to_index(index.free_poses); ++k) {
+    const double* pose = linear.poses.data() + k * BundleLinearization::pose_doubles;
+    damp_pose(pose, lambda, blocks + 36 * to_index(index.diagonal_block[k]));
+    for (std::size_t e = 0; e < 6; ++e) right_side[6 * k + e] = -pose[36 + e];
   }
-  for (std::size_t j = to_index(index.point_part[to_index(part)]); j < to_index(index.point_part[to_index(part) + 1]);
-       ++j) {
-    const double* slot = linear.slots.data() + BundleLinearization::slot_doubles * index.slot_begin[j];
+  for (std::size_t j = to_index(index.point_part[part]); j < to_index(index.point_part[part + 1]); ++j) {
     double V[6];
     if (!damp_point(index, linear, lambda, j, V, schur)) return false;
     const double* const point = schur.points.data() + BundleSchur::point_doubles * j;
     const double gradient[3] = {point[6], point[7], point[8]};
     double Vg[3];
     multiply_symmetric(point, gradient, Vg);
-
     const double* x = state.points.data() + 3 * j;
-    const int* rank = index.slot_rank.data() + index.slot_begin[j];
-    for (int a = 0; a < index.free_slots[j]; ++a, slot += BundleLinearization::slot_doubles) {
-      const double* c = state.poses[to_index(rank[a])].center;
+    const double* link = linear.links.data() + BundleLinearization::link_doubles * index.link_begin[j];
+    for (std::size_t a = 0; a < to_index(index.free_links[j]); ++a, link += BundleLinearization::link_doubles) {
+      const std::size_t k = to_index(index.link_pose[index.link_begin[j] + a]);
+      const double* c = state.poses[k].center;
       const double d[3] = {x[0] - c[0], x[1] - c[1], x[2] - c[2]};
-      fill_scratch(slot, d, point, scratch + ba_slot_scratch * a);
+      prepare_pairs(link, d, point, pairs + BundleSchur::pair_doubles * a);
       double n[3];
-      multiply_symmetric(slot, Vg, n);
-      double* const g = right_side + 6 * rank[a];
+      multiply_symmetric(link, Vg, n);
+      double* const g = right_side + 6 * k;
       g[0] += n[0], g[1] += n[1], g[2] += n[2];
-      g[3] += d[1] * n[2] - d[2] * n[1], g[4] += d[2] * n[0] - d[0] * n[2], g[5] += d[0] * n[1] - d[1] * n[0];
+      add_cross(d, n, g + 3);
     }
-    subtract_pairs(scratch, index.free_slots[j], index.pair_block.data() + index.pair_begin[j], blocks);
+    subtract_pairs(pairs, index.free_links[j], index.pair_block.data() + index.pair_begin[j], blocks);
   }
   return true;
 }
 
-/// The points' steps from the poses' steps (6 per free rank): x_next = x + h. Returns the part's share of h^T (lambda D
-/// h - g).
+/// The points' steps from the poses' steps: x_next = x + h. Returns the part's share of h^T (lambda D h - g).
 [[nodiscard]] inline double move_points(const BundleIndex& index, const BundleState& state,
                                         const BundleLinearization& linear, const BundleSchur& schur, double lambda,
-                                        const double* pose_steps, int part, BundleState& next) noexcept {
+                                        BundleState& next) noexcept {
   double promised = 0;
-  for (std::size_t j = to_index(index.point_part[to_index(part)]); j < to_index(index.point_part[to_index(part) + 1]);
-       ++j) {
+  for (std::size_t j = 0; j < index.caller_point.size(); ++j) {
     const double* point = schur.points.data() + BundleSchur::point_doubles * j;
     const double* x = state.points.data() + 3 * j;
-    const double* slot = linear.slots.data() + BundleLinearization::slot_doubles * index.slot_begin[j];
-    const int* rank = index.slot_rank.data() + index.slot_begin[j];
+    const double* link = linear.links.data() + BundleLinearization::link_doubles * index.link_begin[j];
     double sum[3] = {point[6], point[7], point[8]};
-    for (int a = 0; a < index.free_slots[j]; ++a, slot += BundleLinearization::slot_doubles) {
-      const double* c = state.poses[to_index(rank[a])].center;
-      const double* xi = pose_steps + 6 * rank[a];
-      const double d0 = x[0] - c[0], d1 = x[1] - c[1], d2 = x[2] - c[2];
-      const double moved[3] = {xi[0] + xi[4] * d2 - xi[5] * d1, xi[1] + xi[5] * d0 - xi[3] * d2,
-                               xi[2] + xi[3] * d1 - xi[4] * d0};
-      double y[3];
-      multiply_symmetric(slot, moved, y);
+    for (std::size_t a = 0; a < to_index(index.free_links[j]); ++a, link += BundleLinearization::link_doubles) {
+      const std::size_t k = to_index(index.link_pose[index.link_begin[j] + a]);
+      const double* c = state.poses[k].center;
+      const double* xi = schur.pose_steps.data() + 6 * k;
+      const double d[3] = {x[0] - c[0], x[1] - c[1], x[2] - c[2]}, w[3] = {xi[3], xi[4], xi[5]};
+      double moved[3] = {xi[0], xi[1], xi[2]}, y[3];
+      add_cross(w, d, moved);
+      multiply_symmetric(link, moved, y);
       for (int e = 0; e < 3; ++e) sum[e] += y[e];
     }
     double h[3];
@@ -201,15 +210,15 @@ inline void subtract_pairs(const double* scratch, int count, const int* pair, do
   return promised;
 }
 
-/// The poses' steps applied; fixed ranks are copied. Returns their share of h^T (lambda D h - g).
+/// The poses' steps applied; fixed poses are copied. Returns their share of h^T (lambda D h - g).
 [[nodiscard]] inline double move_poses(const BundleIndex& index, const BundleState& state,
-                                       const BundleLinearization& linear, double lambda, const double* pose_steps,
+                                       const BundleLinearization& linear, const BundleSchur& schur, double lambda,
                                        BundleState& next) noexcept {
   double promised = 0;
   for (std::size_t k = 0; k < state.poses.size(); ++k) {
     next.poses[k] = state.poses[k];
     if (k >= to_index(index.free_poses)) continue;
-    const double* xi = pose_steps + 6 * k;
+    const double* xi = schur.pose_steps.data() + 6 * k;
     const double* H = linear.poses.data() + k * BundleLinearization::pose_doubles;
     const double t = lambda * damping_scale(H[0] + H[7] + H[14]), r = lambda * damping_scale(H[21] + H[28] + H[35]);
     for (std::size_t e = 0; e < 6; ++e) promised += xi[e] * ((e < 3 ? t : r) * xi[e] - H[36 + e]);
@@ -221,4 +230,5 @@ inline void subtract_pairs(const double* scratch, int count, const int* pair, do
   return promised;
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp::detail
