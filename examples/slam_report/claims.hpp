@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "experiment.hpp"
@@ -95,75 +96,66 @@ inline std::vector<SequenceErrors> sequence_errors(const std::vector<RunSummary>
   return out;
 }
 
-inline Claim claim_five_times(const std::vector<SequenceErrors>& all) {
-  Claim claim{"In every walking sequence the ATE of cfp is at least 5 times smaller than that of plain.", "",
-              Verdict::not_tested};
+// A claim about every sequence of a kind ("walking", "sitting") that has the variant `other`: part(cfp, other or,
+// without one, the best variant) -> {figures, met}.
+template <typename Part>
+Claim claim_over(const std::vector<SequenceErrors>& all, const char* statement, const char* kind, const char* other,
+                 const Part& part) {
+  Claim claim{statement, "", Verdict::not_tested};
   for (const SequenceErrors& s : all) {
-    const VariantError *cfp = s.find("cfp"), *plain = s.find("plain");
-    if (!s.is("walking") || plain == nullptr) continue;
-    const double factor = plain->ate.median / cfp->ate.median;
-    claim.add(shown_name(s.sequence) + ": " + cfp->text() + ", " + plain->text() + ", factor " + number(factor, 1),
-              !cfp->lost && (plain->lost || factor >= 5));
+    const VariantError* against = other != nullptr ? s.find(other) : s.variants.size() > 1 ? &s.best() : nullptr;
+    if (!s.is(kind) || against == nullptr) continue;
+    const auto [figures, met] = part(*s.find("cfp"), *against);
+    claim.add(shown_name(s.sequence) + ": " + figures, met);
   }
   return claim;
 }
 
-inline Claim claim_harmless(const std::vector<SequenceErrors>& all) {
-  Claim claim{"In no sitting sequence is the ATE of cfp more than 2 % above the best variant's.", "",
-              Verdict::not_tested};
-  for (const SequenceErrors& s : all) {
-    if (!s.is("sitting") || s.variants.size() < 2) continue;
-    const VariantError &cfp = *s.find("cfp"), &best = s.best();
+inline std::vector<Claim> claims_on_errors(const std::vector<SequenceErrors>& all) {
+  using Figures = std::pair<std::string, bool>;
+  const auto five_times = [](const VariantError& cfp, const VariantError& plain) {
+    const double factor = plain.ate.median / cfp.ate.median;
+    return Figures(cfp.text() + ", " + plain.text() + ", factor " + number(factor, 1),
+                   !cfp.lost && (plain.lost || factor >= 5));
+  };
+  const auto harmless = [](const VariantError& cfp, const VariantError& best) {
     const double excess = 100 * (cfp.ate.median / best.ate.median - 1);
-    claim.add(shown_name(s.sequence) + ": " + cfp.text() + ", best " + best.text() + (excess < 0 ? " (" : " (+") +
-                  number(excess, 1) + " %)",
-              !cfp.lost && excess <= 2);
-  }
-  return claim;
-}
-
-// Noise: at most 2 % above the best, or, with several seeds, ranges that overlap.
-inline Claim claim_best(const std::vector<SequenceErrors>& all) {
-  Claim claim{
-      "In every walking sequence cfp is the best variant, or within noise of it (2 %, or overlapping ranges of the "
-      "seeds).",
-      "", Verdict::not_tested};
-  for (const SequenceErrors& s : all) {
-    if (!s.is("walking") || s.variants.size() < 2) continue;
-    const VariantError &cfp = *s.find("cfp"), &best = s.best();
+    return Figures(cfp.text() + ", best " + best.text() + (excess < 0 ? " (" : " (+") + number(excess, 1) + " %)",
+                   !cfp.lost && excess <= 2);
+  };
+  const auto near_best = [](const VariantError& cfp, const VariantError& best) {
     const bool overlap = cfp.ate.known > 1 && best.ate.known > 1 && cfp.ate.minimum <= best.ate.maximum;
-    claim.add(shown_name(s.sequence) + ": " + cfp.text() + ", best " + best.text(),
-              !cfp.lost && (cfp.ate.median <= 1.02 * best.ate.median || overlap));
-  }
-  return claim;
-}
-
-inline Claim claim_mdc(const std::vector<SequenceErrors>& all) {
-  Claim claim{"In walking/rpy leaving out missed-detection compensation is the worst of all variants that use boxes.",
-              "", Verdict::not_tested};
+    return Figures(cfp.text() + ", best " + best.text(),
+                   !cfp.lost && (cfp.ate.median <= 1.02 * best.ate.median || overlap));
+  };
+  const auto worse = [](const VariantError& cfp, const VariantError& boxes) {
+    return Figures(boxes.text() + ", " + cfp.text(), boxes.worse_than(cfp));
+  };
+  Claim mdc{"In walking/rpy leaving out missed-detection compensation is the worst of all variants that use boxes.", "",
+            Verdict::not_tested};
   for (const SequenceErrors& s : all) {
-    const VariantError* mdc = s.find("no-mdc");
-    if (!s.is("walking") || !s.is("rpy") || mdc == nullptr) continue;
-    std::string figures = shown_name(s.sequence) + ": " + mdc->text();
+    const VariantError* without = s.find("no-mdc");
+    if (!s.is("walking") || !s.is("rpy") || without == nullptr) continue;
+    std::string figures = shown_name(s.sequence) + ": " + without->text();
     bool worst = true;
     for (const VariantError& other : s.variants) {
       if (other.variant == "plain" || other.variant == "no-mdc") continue;
-      worst = worst && !other.worse_than(*mdc);
+      worst = worst && !other.worse_than(*without);
       figures += ", " + other.text();
     }
-    claim.add(figures, worst);
+    mdc.add(figures, worst);
   }
-  return claim;
-}
-
-inline Claim claim_boxes(const std::vector<SequenceErrors>& all) {
-  Claim claim{"Leaving out whole boxes is worse than cfp in every sitting sequence.", "", Verdict::not_tested};
-  for (const SequenceErrors& s : all) {
-    const VariantError *cfp = s.find("cfp"), *boxes = s.find("only-boxes");
-    if (s.is("sitting") && boxes != nullptr)
-      claim.add(shown_name(s.sequence) + ": " + boxes->text() + ", " + cfp->text(), boxes->worse_than(*cfp));
-  }
-  return claim;
+  return {claim_over(all, "In every walking sequence the ATE of cfp is at least 5 times smaller than that of plain.",
+                     "walking", "plain", five_times),
+          claim_over(all, "In no sitting sequence is the ATE of cfp more than 2 % above the best variant's.", "sitting",
+                     nullptr, harmless),
+          claim_over(all,
+                     "In every walking sequence cfp is the best variant, or within noise of it (2 %, or overlapping "
+                     "ranges of the seeds).",
+                     "walking", nullptr, near_best),
+          mdc,
+          claim_over(all, "Leaving out whole boxes is worse than cfp in every sitting sequence.", "sitting",
+                     "only-boxes", worse)};
 }
 
 // The two claims on K, over the sequences with labels.
@@ -195,10 +187,9 @@ inline std::array<Claim, 2> claims_on_probability(const std::vector<RunSummary>&
 
 // All figures are medians over the seeds.
 inline std::vector<Claim> check_claims(const std::vector<RunSummary>& runs) {
-  const std::vector<SequenceErrors> errors = sequence_errors(runs);
-  const auto probability = claims_on_probability(runs);
-  return {claim_five_times(errors), claim_harmless(errors), claim_best(errors), claim_mdc(errors),
-          claim_boxes(errors),      probability[0],         probability[1]};
+  std::vector<Claim> claims = claims_on_errors(sequence_errors(runs));
+  for (const Claim& claim : claims_on_probability(runs)) claims.push_back(claim);
+  return claims;
 }
 
 inline Table claims_table(const std::vector<RunSummary>& runs, const std::string& protocol) {

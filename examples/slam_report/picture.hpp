@@ -55,29 +55,22 @@ inline std::string summary_picture(const std::vector<RunRecord>& runs, std::size
   const double content = (std::max)(views[0].plot.height(), frame_height);
 
   std::string words;
-  const auto text = [&words](double x, double y, const char* css, const std::string& what) {
-    words += "<text class=\"" + std::string(css) + "\" x=\"" + number(x, 0) + "\" y=\"" + number(y, 0) + "\">" +
+  double y = margin + content;
+  const auto text = [&](double x, double down, const char* css, const std::string& what) {
+    words += "<text class=\"" + std::string(css) + "\" x=\"" + number(x, 0) + "\" y=\"" + number(y + down, 0) + "\">" +
              escape(what) + "</text>\n";
   };
-  double x = margin, y = margin + content + line;
+  text(right, line, "quiet words", "Boxes: yellow detected, orange compensated. Keypoints: red moving, green static.");
   const auto entry = [&](const std::string& css, const std::string& what) {
-    const double needed = 34 + 7.8 * static_cast<double>(what.size());
-    if (x > margin && x + needed > right) {
-      x = margin;
-      y += line;
-    }
-    words += "<path class=\"" + css + "\" d=\"M" + number(x, 0) + ' ' + number(y - 5, 0) + "h26\"/>";
-    text(x + 33, y, "words", what);
-    x += needed + 14;
+    y += line;
+    words += "<path class=\"" + css + "\" d=\"M" + number(margin, 0) + ' ' + number(y - 5, 0) + "h26\"/>";
+    text(margin + 33, 0, "words", what);
   };
-  if (std::any_of(same.begin(), same.end(), [](const RunRecord* run) { return !run->truth.empty(); }))
-    entry("truth", "truth");
+  if (!same.empty()) entry("truth", "truth of " + same.front()->sequence);
   for (const Series& s : all) {
     const double ate = summarize(*s.run).ate_rmse_m;
     entry(s.css("curve"), s.name + (std::isfinite(ate) ? ": ATE " + number(ate, 3) + " m" : ""));
   }
-  y += line;
-  if (!same.empty()) text(margin, y, "quiet words", same.front()->sequence);
   const double height = y + margin;
 
   const auto placed = [content](const Plot& plot, double left) {
@@ -99,9 +92,6 @@ inline std::string summary_picture(const std::vector<RunRecord>& runs, std::size
     out += "<image x=\"" + number(right, 0) + "\" y=\"" + number(margin + (content - frame_height) / 2, 0) +
            "\" width=\"" + number(column, 0) + "\" height=\"" + number(frame_height, 0) +
            "\" href=\"data:image/jpeg;base64," + base64(picture->jpeg) + "\"/>\n";
-    text(right, margin + content + line, "quiet words", "Boxes: yellow detected, orange compensated.");
-    text(right, margin + content + 2 * line, "quiet words",
-         "Keypoints inside boxes: from red, moving, to green, static.");
   } else {
     out += placed(views[1].plot, right);
   }

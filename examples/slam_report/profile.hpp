@@ -50,22 +50,20 @@ inline std::vector<Saving> savings_of(const RunSummary& s, int features) {
       rest = std::max(rest, other == m ? left : median(other));
     return side - rest;
   };
-  std::vector<Saving> savings;
   // Half of the extractor's time is the pyramid and the corner test, which do not depend on how many keypoints are
-  // kept.
-  savings.push_back({"--features " + std::to_string(features / 2) + ": keypoints, their matching and their poses",
-                     without(Module::features, 0.75 * median(Module::features)) +
-                         (median(Module::matching) + median(Module::pose) + median(Module::fine)) / 2});
-  if (median(Module::detection) > 0)
-    savings.push_back(
-        {"a smaller network, or --detector FILE.txt from an earlier pass", without(Module::detection, 0)});
+  // kept. Nearly all of the coarse stage is F and O.
+  std::vector<Saving> savings{
+      {"--features " + std::to_string(features / 2) + ": keypoints, their matching and their poses",
+       without(Module::features, 0.75 * median(Module::features)) +
+           (median(Module::matching) + median(Module::pose) + median(Module::fine)) / 2},
+      {"a smaller network, or --detector FILE.txt from an earlier pass", without(Module::detection, 0)},
+      {"half the flow points (FlowOptions)", without(Module::flow, median(Module::flow) / 2)},
+      {"--variant no-ksp: no second stage", median(Module::fine)}};
   if (median(Module::flow) > 0) {
-    savings.push_back({"half the flow points (FlowOptions)", without(Module::flow, median(Module::flow) / 2)});
     savings.push_back({"--variant cfp-minus: no optical flow, no object probability",
-                       without(Module::flow, 0) + 0.8 * median(Module::coarse)});  // nearly all of it is F
+                       without(Module::flow, 0) + 0.8 * median(Module::coarse)});
     savings.push_back({"FundamentalRansacOptions::confidence 0.95: fewer samples for F", median(Module::coarse) / 2});
   }
-  if (median(Module::fine) > 0) savings.push_back({"--variant no-ksp: no second stage", median(Module::fine)});
   std::stable_sort(savings.begin(), savings.end(),
                    [](const Saving& a, const Saving& b) { return a.milliseconds > b.milliseconds; });
   return savings;

@@ -82,39 +82,23 @@ class SystemTable {
   }
 
   void add_published(const PublishedRow& row, const std::string& name, bool ranked) {
-    std::vector<Cell> cells{name, row.evidence};
-    bool any = false;
-    for (const auto& sequence : sequences_) {
+    add({name, row.evidence}, [&](const auto& sequence, double& value) {
       const PublishedError& e = row.error[sequence.first];
-      any = any || std::isfinite(e.rmse);
-      cells.push_back(
-          {number(e.rmse, row.decimals), std::isfinite(e.sd) ? "S.D. " + number(e.sd, row.decimals) : "", Rank::none});
-      values_.push_back(ranked ? e.rmse : not_known);
-    }
-    if (any) {
-      table_.rows.push_back(cells);
-    } else {
-      values_.resize(values_.size() - sequences_.size());
-    }
+      if (ranked) value = e.rmse;
+      return Cell(number(e.rmse, row.decimals), std::isfinite(e.sd) ? "S.D. " + number(e.sd, row.decimals) : "");
+    });
   }
 
   // Not ranked below 95 % coverage: the published figures come from systems that held the camera.
   void add_ours(const std::vector<RunSummary>& runs, const char* variant, double RunSummary::*rmse, int decimals) {
-    std::vector<Cell> cells{std::string("ours: ") + variant, "measured"};
-    std::size_t n = 0;
-    for (const auto& sequence : sequences_) {
+    const std::size_t before = table_.rows.size();
+    add({std::string("ours: ") + variant, "measured"}, [&](const auto& sequence, double& value) {
       const Spread spread = spread_of(runs, sequence.second, variant, rmse);
       const Spread coverage = spread_of(values_of(runs, sequence.second, variant, coverage_percent));
-      n += spread.total;
-      cells.push_back(cell_of(spread, coverage, decimals));
-      values_.push_back(coverage.median < 95 ? not_known : spread.median);
-    }
-    if (n > 0) {
-      table_.own.insert(table_.rows.size());
-      table_.rows.push_back(cells);
-    } else {
-      values_.resize(values_.size() - sequences_.size());
-    }
+      if (coverage.median >= 95) value = spread.median;
+      return spread.total > 0 ? cell_of(spread, coverage, decimals) : Cell(number(no, 0));
+    });
+    if (table_.rows.size() > before) table_.own.insert(before);
   }
 
   [[nodiscard]] Table finished(const std::string& note) {
@@ -123,7 +107,7 @@ class SystemTable {
       std::vector<double> column;
       for (std::size_t r = 0; r < table_.rows.size(); ++r) {
         cells.push_back(&table_.rows[r][c + 2]);
-        column.push_back(values_[r * sequences_.size() + c]);
+        column.push_back(values_[r][c]);
       }
       rank(cells, column, 4);
     }
@@ -132,8 +116,23 @@ class SystemTable {
   }
 
  private:
+  // cell(sequence, value to rank by) for every column; a row of nothing is left out.
+  template <typename MakeCell>
+  void add(std::vector<Cell> cells, const MakeCell& cell) {
+    std::vector<double> values;
+    const std::string nothing = number(no, 0);
+    bool any = false;
+    for (const auto& sequence : sequences_) {
+      cells.push_back(cell(sequence, values.emplace_back(not_known)));
+      any = any || cells.back().text != nothing || !cells.back().range.empty();
+    }
+    if (!any) return;
+    table_.rows.push_back(std::move(cells));
+    values_.push_back(std::move(values));
+  }
+
   std::vector<std::pair<std::size_t, std::string>> sequences_;
-  std::vector<double> values_;  // values_: one per cell, not_known for what is not ranked
+  std::vector<std::vector<double>> values_;  // of each row; not_known: not ranked
   Table table_;
 };
 

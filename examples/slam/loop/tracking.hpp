@@ -100,11 +100,20 @@ class Tracking {
   // Matches, probabilities, weights and the pose, each twice.
   void estimate(Frame& frame, const FrameFeatures& features, FrameRecord& record) {
     predicted_ = motion_.predict(last_, frame.time_s, view_);
-    match_last_frame(frame);
+    {
+      const Part part(observer_, Module::matching);
+      grid_.build(frame, view_);
+      match_last_(frame, grid_, last_, map_, predicted_.T_cam_world, view_, options_.search_radius,
+                  2 * options_.min_inliers, from_last_);
+    }
     cfp::StageResult<float> stage = coarse(frame, features);
+    observer_.weighted(stage, probability_.state(), frame);
     note_boxes(record);
     const cfp::PoseEstimate pose = first_pose(frame, stage.weight);
-    if (pose.valid) stage = fine(frame, pose);
+    if (pose.valid) {
+      stage = fine(frame, pose);
+      observer_.weighted(stage, probability_.state(), frame);
+    }
     record.health = stage.report.health;
     frame.static_probability.assign(stage.static_probability.begin(), stage.static_probability.end());
     if (frame.has_pose) second_pose(frame, stage.weight);
@@ -119,19 +128,13 @@ class Tracking {
     input.flow = {cfp::view(features.flow_from), cfp::view(features.flow_to)};
     input.map_point_probability = frame.map_point_probability;
     input.image_motion = predicted_.image_motion;
-    observer_.begin(Module::coarse);
-    const auto result = probability_.coarse(input);
-    observer_.end(Module::coarse);
-    observer_.weighted(result, probability_.state(), frame);
-    return result;
+    const Part part(observer_, Module::coarse);
+    return probability_.coarse(input);
   }
 
   cfp::StageResult<float> fine(Frame& frame, const cfp::PoseEstimate& pose) {
-    observer_.begin(Module::fine);
-    const auto result = probability_.fine(pose, from_last_.match, frame.map_point_probability);
-    observer_.end(Module::fine);
-    observer_.weighted(result, probability_.state(), frame);
-    return result;
+    const Part part(observer_, Module::fine);
+    return probability_.fine(pose, from_last_.match, frame.map_point_probability);
   }
 
   void note_boxes(FrameRecord& record) const {
@@ -142,13 +145,6 @@ class Tracking {
       record.boxes.push_back({box.id, box.box, box.compensated(), object.static_probability,
                               object.status == cfp::Status::ok, object.pairs});
     }
-  }
-
-  void match_last_frame(Frame& frame) {
-    const Part part(observer_, Module::matching);
-    grid_.build(frame, view_);
-    match_last_(frame, grid_, last_, map_, predicted_.T_cam_world, view_, options_.search_radius,
-                2 * options_.min_inliers, from_last_);
   }
 
   // From the last frame's points or, when those do not give it, from the map.
