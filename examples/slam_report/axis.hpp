@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <initializer_list>
 #include <string>
 #include <utility>
@@ -57,9 +56,7 @@ inline std::vector<Tick> log_ticks(double low, double high) {
     for (const double factor : {1.0, 2.0, 5.0}) {
       const double value = factor * std::pow(10.0, exponent);
       if ((factor > 1 && !few) || value < low * 0.999 || value > high * 1.001) continue;
-      char text[32];
-      std::snprintf(text, sizeof text, "%g", value);
-      out.push_back({value, text});
+      out.push_back({value, cfp_examples::general(value, 6)});
     }
   }
   return out;

@@ -3,10 +3,11 @@
 
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "../support/numbers.hpp"
 
 namespace cfp_slam {
 
@@ -41,9 +42,8 @@ inline std::string escape(std::string_view text) {
 // Fixed decimals; a dash for what is not finite, an exponent for what has too many digits to be read.
 inline std::string number(double value, int decimals) {
   if (!std::isfinite(value)) return "–";
-  char text[64];
-  std::snprintf(text, sizeof text, std::abs(value) < 1e9 ? "%.*f" : "%.*e", std::abs(value) < 1e9 ? decimals : 1,
-                value);
+  const std::string text =
+      std::abs(value) < 1e9 ? cfp_examples::fixed(value, decimals) : cfp_examples::general(value, 2);
   const std::string_view shown(text);
   return std::string(shown.find_first_of("123456789") == std::string_view::npos && shown[0] == '-' ? shown.substr(1)
                                                                                                    : shown);

@@ -117,7 +117,7 @@ class RunWriter final : public Observer {
   }
 
   void write_frame(const FrameRecord& f) {
-    frames_ << cfp_examples::fixed_text(f.time_s, 6) << ' ' << f.image << ' ' << to_string(f.outcome) << ' '
+    frames_ << cfp_examples::fixed(f.time_s, 6) << ' ' << f.image << ' ' << to_string(f.outcome) << ' '
             << f.keyframe << ' ' << f.keypoints << ' ' << f.matches << ' ' << f.inliers << ' '
             << f.health.effective_points << ' ' << f.health.box_share << ' '
             << (f.health.fallback != cfp::WeightFallback::none);

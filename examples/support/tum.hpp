@@ -75,13 +75,6 @@ inline std::vector<cfp::StampedPose<double>> read_tum_trajectory(const std::file
   return poses;
 }
 
-/// The number with fixed decimals, in every locale.
-inline std::string fixed_text(double value, int decimals) {
-  char text[400];
-  const auto [end, error] = std::to_chars(text, text + sizeof text, value, std::chars_format::fixed, decimals);
-  return error == std::errc() ? std::string(text, end) : std::string("nan");
-}
-
 /// One trajectory line, microseconds and nine decimals.
 inline std::string tum_line(const cfp::StampedPose<double>& pose) {
   const Eigen::Quaterniond q(pose.T_world_cam.rotation);
