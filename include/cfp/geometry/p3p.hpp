@@ -45,42 +45,53 @@ template <typename Scalar>
   using Real = decltype(Scalar() + double());
   P3PSolutions<Scalar> result;
   Vector3<Real> x[3], y[3];
+  Real magnitude = 0;
   for (std::size_t i = 0; i < 3; ++i) {
     x[i] = problem.world[i].template cast<Real>();
     y[i] = problem.rays[i].template cast<Real>();
-    const Real length_sq = y[i].squaredNorm();
-    if (!(length_sq < Real(1e200) && x[i].squaredNorm() < Real(1e200))) {
-      result.status = Status::invalid_input;
-      return result;
-    }
-    y[i] *= Real(1) / std::sqrt(length_sq);  // not finite for a ray without direction: that has no solution
+    const Real square = y[i].squaredNorm();
+    magnitude += square + x[i].squaredNorm();
+    y[i] *= Real(1) / std::sqrt(square);  // not finite for a ray without direction: that one has no solution
   }
-  Real l01 = (x[1] - x[0]).squaredNorm(), l02 = (x[2] - x[0]).squaredNorm(), l12 = (x[2] - x[1]).squaredNorm();
-  if (l01 > l02 && l01 > l12) {
-    std::swap(x[0], x[2]), std::swap(y[0], y[2]), std::swap(l01, l12);
-  } else if (l02 > l12) {
-    std::swap(x[0], x[1]), std::swap(y[0], y[1]), std::swap(l02, l12);
+  if (!(magnitude < Real(1e200))) {
+    result.status = Status::invalid_input;
+    return result;
   }
-  // The edge 12 is the longest now; its height squared in units of it is, by Heron, at least:
-  const Real inverse_l12 = Real(1) / l12, a = l01 * inverse_l12, b = l02 * inverse_l12, excess = a + b - Real(1);
-  if (!(a * b - Real(0.25) * excess * excess > Real(2.5e-15))) return result;
-  const Vector3<Real> x01 = x[1] - x[0], x02 = x[2] - x[0], y01 = y[1] - y[0], y02 = y[2] - y[0];
-  const Real chord = (y01.cwiseAbs() + y02.cwiseAbs()).sum(), inverse_chord = Real(1) / chord;
-  if (!(chord > Real(1e-12))) return result;
-  const Real square = inverse_chord * inverse_chord;
-  const detail::P3PEquations<Real> equations{
-      a, b, chord, square * y01.squaredNorm(), square * y02.squaredNorm(), square * (y[2] - y[1]).squaredNorm()};
+  // Number k belongs to the edge opposite to point k; point i0 is opposite to the longest.
+  const Real edges[3] = {(x[2] - x[1]).squaredNorm(), (x[0] - x[2]).squaredNorm(), (x[1] - x[0]).squaredNorm()};
+  const Real chords[3] = {(y[2] - y[1]).squaredNorm(), (y[0] - y[2]).squaredNorm(), (y[1] - y[0]).squaredNorm()};
+  int i0 = edges[1] > edges[0] ? 1 : 0;
+  i0 = edges[2] > edges[i0] ? 2 : i0;
+  const int i1 = i0 == 2 ? 0 : i0 + 1, i2 = i0 == 0 ? 2 : i0 - 1;
+  const Real inverse = Real(1) / edges[i0], a = edges[i2] * inverse, b = edges[i1] * inverse;
+  // By Heron, the squared height over the longest edge in units of it.
+  const Real excess = a + b - Real(1), height_sq = a * b - Real(0.25) * excess * excess;
+  if (!(height_sq > Real(2.5e-15))) return result;
+  detail::Triple<Real> solutions[4];
+  const int count = detail::p3p_depths<Real>({a, b, chords[i2], chords[i1], chords[i0]}, solutions);
 
-  Vector3<Real> solutions[4];
-  const int count = detail::p3p_depths(equations, solutions);
-  const Real length = std::sqrt(l12), inverse_length = Real(1) / length;
-  const Matrix3<Real> world_frame = detail::triangle_frame<Real>(x02 - x01, inverse_length, x01).transpose();
+  // Orthonormal axes of the triangle: along the longest edge, across it, normal.
+  const Real length = std::sqrt(edges[i0]), inverse_length = Real(1) / length;
+  const Vector3<Real> x01 = x[i1] - x[i0], along = inverse_length * (x[i2] - x[i1]);
+  const Real offset = along.dot(x01);
+  Vector3<Real> across = x01 - offset * along;
+  const Real inverse_height = Real(1) / std::sqrt(across.squaredNorm());
+  across *= inverse_height;
+  Matrix3<Real> world_axes;
+  world_axes << along, across, cross(along, across);
+  const Vector3<Real> y01 = y[i1] - y[i0], y02 = y[i2] - y[i0];
   for (int k = 0; k < count; ++k) {
-    const Vector3<Real> p = length * solutions[k];
-    const Real d0 = p[2] * inverse_chord;
-    const Vector3<Real> edge01 = p[0] * y[1] + d0 * y01, edge02 = p[1] * y[2] + d0 * y02;
-    const Matrix3<Real> R = detail::triangle_frame<Real>(edge02 - edge01, inverse_length, edge01) * world_frame;
-    const Vector3<Real> t = d0 * y[0] - R * x[0];
+    const detail::Triple<Real>& p = solutions[k];
+    const Real d0 = length * p.w;
+    const Vector3<Real> edge01 = (length * p.u) * y[i1] + d0 * y01, edge02 = (length * p.v) * y[i2] + d0 * y02;
+    // The same axes in the camera's frame, and what rounding left of their products.
+    const Vector3<Real> X = inverse_length * (edge02 - edge01), Y = inverse_height * (edge01 - offset * X);
+    const Real XX = X.squaredNorm(), YY = Y.squaredNorm(), XY = X.dot(Y);
+    const Vector3<Real> axis_x = (Real(1.5) - Real(0.5) * XX) * X, axis_y = (Real(1.5) - Real(0.5) * YY) * Y - XY * X;
+    Matrix3<Real> axes;
+    axes << axis_x, axis_y, cross(axis_x, axis_y);
+    const Matrix3<Real> R = axes * world_axes.transpose();
+    const Vector3<Real> t = d0 * y[i0] - R * x[i0];
     if (!t.template cast<Scalar>().allFinite()) continue;
     SE3<Scalar>& T = result.T_cam_world[static_cast<std::size_t>(result.count++)];
     T.rotation = R.template cast<Scalar>();

@@ -44,15 +44,16 @@ template <typename Scalar>
     const Scalar root = std::sqrt(q), ratio = size / (q * root);
     t = root * (Scalar(1.7323) + ratio * (Scalar(0.3296) - Scalar(0.0622) * ratio));
   }
-  // Halley steps, which triple the digits.
+  // Householder steps of third order, each of which makes four digits of one.
   Scalar x = -std::copysign(t, r) - third;
   const Scalar spread = std::abs(t) + std::abs(third);
   for (int step = 0; step < 8; ++step) {
     const Scalar value = ((x + a) * x + b) * x + c, slope = (Scalar(3) * x + Scalar(2) * a) * x + b;
-    const Scalar change = value * slope / (slope * slope - value * (Scalar(3) * x + a));
+    const Scalar square_slope = slope * slope, bend = value * (Scalar(3) * x + a);
+    const Scalar change = value * (square_slope - bend) / (slope * (square_slope - Scalar(2) * bend) + value * value);
     if (!(std::abs(change) <= spread)) break;
     x -= change;
-    if (std::abs(change) <= Scalar(1e-5) * std::abs(x)) break;
+    if (std::abs(change) <= Scalar(1e-4) * std::abs(x)) break;
   }
   return x;
 }
