@@ -1,0 +1,1 @@
+// The unit to which the precompiled headers of the tests belong.
