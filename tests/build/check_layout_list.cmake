@@ -2,6 +2,7 @@
 cmake_minimum_required(VERSION 3.16)
 file(READ "${ROOT}/tests/build/layout_structs.hpp" listed)
 file(GLOB_RECURSE headers RELATIVE "${ROOT}/include" "${ROOT}/include/cfp/*.hpp")
+list(FILTER headers EXCLUDE REGEX "^cfp/simd/")  # registers, which follow the flags
 # Not in cfp.hpp, and a thread's handle is not data.
 list(REMOVE_ITEM headers cfp/optimization/bundle/two_threads.hpp)
 set(missing "")

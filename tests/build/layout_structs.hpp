@@ -1,7 +1,6 @@
 // Every public struct, one line each: CFP_LAYOUT(type, last data member) or, where the members are private or there are
 // none, CFP_LAYOUT_OPAQUE(type). check_layout_list.cmake names those that are missing.
-// Left out because they are registers, made to follow the flags, and never stored: PacketMask and BasicPacket of
-// simd/packet.hpp.
+// Left out: simd/, whose types are registers, made to follow the flags, and never stored.
 #pragma once
 
 #include "cfp/cfp.hpp"
@@ -122,6 +121,8 @@
   CFP_LAYOUT(cfp::MapPointOptions, weight)                               \
   CFP_LAYOUT(cfp::ObjectProbabilityOptions, unknown_object_probability)  \
   CFP_LAYOUT(cfp::ObjectProbability, status)                             \
+  CFP_LAYOUT(cfp::P3PProblem<float>, rays)                               \
+  CFP_LAYOUT(cfp::P3PProblem<double>, rays)                              \
   CFP_LAYOUT(cfp::P3PSolutions<float>, status)                           \
   CFP_LAYOUT(cfp::P3PSolutions<double>, status)                          \
   CFP_LAYOUT(cfp::BundleObservations<float>, weights)                        \
