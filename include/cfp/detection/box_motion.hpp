@@ -30,10 +30,10 @@ namespace cfp {
 
 /// Defaults from benchmarks/studies/tracker_study.cpp (TUD-Stadtmitte and simulated walkers).
 struct BoxMotionOptions {
-  double edge_noise = 0.04;          ///< standard deviation of an edge / size of the box, in (0, 1]
-  double centre_acceleration = 1.5;  ///< q of the centre / size of the box, s^-1.5, >= 0
+  double edge_noise = 0.07;          ///< standard deviation of an edge / size of the box, in (0, 1]
+  double centre_acceleration = 1.0;  ///< q of the centre / size of the box, s^-1.5, >= 0
   double size_acceleration = 0.2;    ///< q of the log size, s^-1.5, >= 0
-  double initial_centre_rate = 1.0;  ///< standard deviation of a new box's velocity / size, per second, > 0
+  double initial_centre_rate = 2.0;  ///< standard deviation of a new box's velocity / size, per second, > 0
   double initial_size_rate = 0.2;    ///< the same of the log size rate, per second, > 0
 };
 
