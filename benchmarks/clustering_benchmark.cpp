@@ -177,14 +177,14 @@ void sort_std_values_only(benchmark::State& state) {
   });
 }
 
-void foreground(benchmark::State& state, cfp::AdaptiveRule rule) {
+void foreground(benchmark::State& state, cfp::ForegroundRule rule) {
   cfp::ForegroundWorkspace<float> workspace;
   cfp::ForegroundOptions options;
-  options.adaptive.rule = rule;
+  options.rule = rule;
   std::vector<char> mask(static_cast<std::size_t>(state.range(0)));
   run<float>(state, [&](const std::vector<float>& values, std::vector<int>&) {
-    const cfp::ForegroundResult result = cfp::depth_foreground(values, options, workspace, mask);
-    return Outcome{result.clusters, result.background};
+    const cfp::ForegroundResult result = cfp::depth_foreground({values, {}, {}, 0}, options, workspace, mask);
+    return Outcome{1, result.background};
   });
 }
 
@@ -200,8 +200,8 @@ BENCHMARK(sort_std<float>)->SIZES;
 BENCHMARK(sort_std_values_only<float>)->SIZES;
 BENCHMARK(sort_values<double>)->SIZES;
 BENCHMARK(sort_std<double>)->SIZES;
-BENCHMARK_CAPTURE(foreground, density, cfp::AdaptiveRule::foreground_density)->SIZES;
-BENCHMARK_CAPTURE(foreground, fixed, cfp::AdaptiveRule::fixed)->SIZES;
+BENCHMARK_CAPTURE(foreground, window, cfp::ForegroundRule::depth_window)->SIZES;
+BENCHMARK_CAPTURE(foreground, dbscan, cfp::ForegroundRule::dbscan)->SIZES;
 
 }  // namespace
 

@@ -48,7 +48,7 @@ FRAME = [
     ("frame", "frame<double, Stages::both, false>", "both stages, F by RANSAC, double", None, None),
     ("box_tracker", "cfp_frame<double>/5", "box tracker, 5 boxes", 2, 2),
     ("box_tracker", "cfp_frame<double>/20", "box tracker, 20 boxes", 10, 10),
-    ("clustering", "foreground/density/200", "foreground of a box of 200 keypoints, adaptive eps", None, None),
+    ("clustering", "foreground/window/200", "foreground of a box of 200 keypoints", None, None),
 ]
 
 # The average times of the paper's Table V (CFP-SLAM, an i7 with an RTX 3060) in milliseconds; what of ours does that work, how often.
@@ -56,7 +56,7 @@ PAPER = [
     ("EKF: missed-detection compensation and association of boxes", 0.07, 1, "box_tracker", "cfp_frame<double>/5", "5 boxes"),
     ("OSP: static probability of objects", 17.93, 1, "frame", "frame<float, Stages::first, false>",
      "500 pairs, 3 boxes, F's RANSAC, foreground included; corners and optical flow, most of the paper's time, excluded"),
-    ("DBSCAN: clustering of the keypoints in boxes", 1.76, 3, "clustering", "foreground/density/200", "3 boxes of 200 keypoints, adaptive eps included"),
+    ("DBSCAN: clustering of the keypoints in boxes", 1.76, 3, "clustering", "foreground/dbscan/200", "3 boxes of 200 keypoints, adaptive eps included"),
     ("KSP: static probability of keypoints", 3.66, 1, "frame", "frame<float, Stages::second, true>", "1000 keypoints, map points and weights included"),
     ("two pose optimisations", "part of Tracking, 42.7", 2, "pose_refinement", "pixel only, N = 1000, 10 % outliers: cfp double, default", "1000 points, 10 % outliers"),
 ]

@@ -11,6 +11,7 @@
 // A TUM folder has rgb.txt, depth.txt (timestamp filename) and detections.txt (timestamp class score x1 y1 x2 y2). One
 // picture is written per frame, and a contact sheet of nine.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -42,15 +43,17 @@ cv::Mat annotate(const cv::Mat& rgb, const cv::Mat& depth, double units_per_metr
   cfp::ForegroundWorkspace<float> workspace;
   for (const Box& box : boxes) {
     std::vector<cv::Point2f> points;
+    std::vector<std::array<float, 2>> pixels;
     std::vector<float> depths;
     for (const cv::KeyPoint& keypoint : keypoints) {
       if (!cfp::contains(box, keypoint.pt.x, keypoint.pt.y)) continue;
       points.push_back(keypoint.pt);
+      pixels.push_back({keypoint.pt.x, keypoint.pt.y});
       depths.push_back(static_cast<float>(depth.at<std::uint16_t>(cvRound(keypoint.pt.y), cvRound(keypoint.pt.x)) /
                                           units_per_metre));
     }
     std::vector<char> foreground(depths.size());
-    const cfp::ForegroundResult result = cfp::depth_foreground(depths, {}, workspace, foreground);
+    const cfp::ForegroundResult result = cfp::depth_foreground({depths, pixels, box, 0.0F}, {}, workspace, foreground);
     for (std::size_t i = 0; i < points.size(); ++i) {
       const cv::Scalar colour = depths[i] <= 0       ? cv::Scalar(160, 160, 160)
                                 : foreground[i] != 0 ? cv::Scalar(0, 0, 255)
@@ -62,12 +65,10 @@ cv::Mat annotate(const cv::Mat& rgb, const cv::Mat& depth, double units_per_metr
     cv::rectangle(picture, cv::Point2f(box.x1, box.y1), cv::Point2f(box.x2, box.y2), cv::Scalar(255, 160, 0), 1);
     cv::putText(picture, text, cv::Point2f(box.x1 + 2, box.y1 + 12), cv::FONT_HERSHEY_SIMPLEX, 0.4,
                 cv::Scalar(255, 255, 255), 1, cv::LINE_AA);
-    std::printf(
-        "box %.0f %.0f %.0f %.0f: %s, foreground %zu (%.2f to %.2f m), background %zu, without depth %zu, eps %.3f m, "
-        "min_pts %zu\n",
-        static_cast<double>(box.x1), static_cast<double>(box.y1), static_cast<double>(box.x2),
-        static_cast<double>(box.y2), to_string(result.status), result.foreground, result.near_m, result.far_m,
-        result.background, result.invalid, result.dbscan.eps, result.dbscan.min_pts);
+    std::printf("box %.0f %.0f %.0f %.0f: %s, foreground %zu (%.2f to %.2f m), background %zu, without depth %zu\n",
+                static_cast<double>(box.x1), static_cast<double>(box.y1), static_cast<double>(box.x2),
+                static_cast<double>(box.y2), to_string(result.status), result.foreground, result.near_m, result.far_m,
+                result.background, result.invalid);
   }
   return picture;
 }

@@ -1,5 +1,5 @@
 // Rules of the literature that read DBSCAN's eps and min_pts off the distances to the k-th neighbour: the rivals of
-// clustering/adaptive.hpp in dbscan_study. All take ascending, finite values, where a neighbour search is a walk.
+// clustering/adaptive.hpp in foreground_study. All take ascending, finite values, where a neighbour search is a walk.
 #pragma once
 
 #include <algorithm>

@@ -1,8 +1,9 @@
-// Person boxes of real depth frames with the depth that parts person from background, for dbscan_study. The limits were
-// read by hand off the depth images and hold for whole boxes, so background at a person's own depth counts as person
-// here. The recordings belong to others and are not in this repository; absent ones are reported and left out.
+// Person boxes of real depth frames with the depth that parts person from background, for foreground_study. The limits
+// were read by hand off the depth images and hold for whole boxes, so background at a person's own depth counts as
+// person here. The recordings belong to others and are not in this repository; absent ones are reported and left out.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -24,7 +25,9 @@ namespace cfp_study {
 
 struct RealBox {
   std::string group;
+  cfp::Box<double> box;
   std::vector<double> depths;
+  std::vector<std::array<double, 2>> pixels;
   double limit_m;
 };
 
@@ -36,9 +39,10 @@ inline void add_real_boxes(const std::string& group, const std::string& image, c
   std::vector<cv::KeyPoint> keypoints;
   cv::ORB::create(1500)->detect(rgb, keypoints);
   for (const auto& [box, limit] : boxes) {
-    RealBox real{group, {}, limit};
+    RealBox real{group, {box.x1, box.y1, box.x2, box.y2}, {}, {}, limit};
     for (const cv::KeyPoint& keypoint : keypoints) {
       if (!cfp::contains(box, keypoint.pt.x, keypoint.pt.y)) continue;
+      real.pixels.push_back({keypoint.pt.x, keypoint.pt.y});
       real.depths.push_back(depth.at<std::uint16_t>(cvRound(keypoint.pt.y), cvRound(keypoint.pt.x)) / units_per_metre);
     }
     out.push_back(real);
@@ -87,6 +91,7 @@ inline void print_real_boxes(const std::string& data) {
   using Options = cfp::ForegroundOptions;
   const auto fixed = [](const cfp::DbscanOptions& dbscan) {
     Options options;
+    options.rule = cfp::ForegroundRule::dbscan;
     options.adaptive.rule = cfp::AdaptiveRule::fixed;
     options.adaptive.fixed = dbscan;
     return options;
@@ -99,7 +104,10 @@ inline void print_real_boxes(const std::string& data) {
     const char* name;
     std::function<Options(const RealBox&)> options;
   };
-  const Row rows[] = {{"foreground density", [](const RealBox&) { return Options{}; }},
+  Options adaptive;
+  adaptive.rule = cfp::ForegroundRule::dbscan;
+  const Row rows[] = {{"window", [](const RealBox&) { return Options{}; }},
+                      {"adaptive DBSCAN", [=](const RealBox&) { return adaptive; }},
                       {"k-distance median", by(Rule::k_distance_median)},
                       {"k-distance knee", by(Rule::k_distance_knee)},
                       {"KANN-DBSCAN", by(Rule::kann)},
@@ -126,7 +134,7 @@ inline void print_real_boxes(const std::string& data) {
       for (const RealBox& box : boxes) {
         if (box.group != group) continue;
         std::vector<char> mask(box.depths.size());
-        cfp::depth_foreground(box.depths, row.options(box), workspace, mask);
+        cfp::depth_foreground({box.depths, box.pixels, box.box, 0}, row.options(box), workspace, mask);
         int f = 0, f_kept = 0, b = 0, b_kept = 0;
         for (std::size_t i = 0; i < mask.size(); ++i) {
           if (!cfp::is_valid_depth(box.depths[i])) continue;

@@ -67,7 +67,7 @@ void formulas(const Inputs<Scalar>& in, Results& results) {
   }
   std::vector<char> foreground(n);
   cfp::ForegroundWorkspace<Scalar> workspace;
-  cfp::depth_foreground(in.two_depths, cfp::ForegroundOptions{}, workspace, foreground);
+  cfp::depth_foreground({in.two_depths, {}, {}, Scalar(0)}, {}, workspace, foreground);
   results.add_all("foreground", foreground, 0);
 }
 

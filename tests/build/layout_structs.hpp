@@ -19,8 +19,12 @@
   CFP_LAYOUT(cfp::DbscanWorkspace<double>, neighbours)                   \
   CFP_LAYOUT(cfp::DbscanVerifierOptions, ascending_numbers)              \
   CFP_LAYOUT(cfp::DbscanVerdict, index)                                  \
+  CFP_LAYOUT(cfp::ForegroundInput<float>, previous_depth_m)              \
+  CFP_LAYOUT(cfp::ForegroundInput<double>, previous_depth_m)             \
+  CFP_LAYOUT(cfp::ObjectDepth<float>, depth_m)                           \
+  CFP_LAYOUT(cfp::ObjectDepth<double>, depth_m)                          \
   CFP_LAYOUT(cfp::ForegroundOptions, invalid_is_foreground)              \
-  CFP_LAYOUT(cfp::ForegroundResult, near_m)                              \
+  CFP_LAYOUT(cfp::ForegroundResult, dbscan)                              \
   CFP_LAYOUT(cfp::ForegroundWorkspace<float>, labels)                    \
   CFP_LAYOUT(cfp::ForegroundWorkspace<double>, labels)                   \
   CFP_LAYOUT_OPAQUE(cfp::Tolerance<float>)                               \

@@ -1,6 +1,7 @@
 #include "cfp/clustering/depth_foreground.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -24,7 +25,7 @@ Outcome run(const std::vector<Scalar>& depths, const cfp::ForegroundOptions& opt
   Outcome out;
   cfp::ForegroundWorkspace<Scalar> workspace;
   out.mask.assign(depths.size(), 9);
-  out.result = cfp::depth_foreground(depths, options, workspace, out.mask);
+  out.result = cfp::depth_foreground({depths, {}, {}, 0}, options, workspace, out.mask);
   return out;
 }
 
@@ -40,9 +41,9 @@ std::size_t kept(const std::vector<char>& mask, std::size_t first, std::size_t c
 
 cfp::ForegroundOptions fixed(double eps, std::size_t min_pts) {
   cfp::ForegroundOptions options;
+  options.rule = cfp::ForegroundRule::dbscan;
   options.adaptive.rule = cfp::AdaptiveRule::fixed;
   options.adaptive.fixed = {eps, min_pts};
-  options.sure_points = 0;
   return options;
 }
 
@@ -58,57 +59,81 @@ TEMPLATE_TEST_CASE("A person before a wall is parted from it", "[clustering]", f
   CHECK(kept(out.mask, 40, 40) == 0);
   CHECK(out.result.foreground == 40);
   CHECK(out.result.background == 40);
-  CHECK(out.result.clusters == 2);
   CHECK_THAT(out.result.near_m, WithinAbs(2.0, 1e-6));
   CHECK_THAT(out.result.far_m, WithinAbs(2.39, 1e-6));
+  CHECK_THAT(out.result.depth_m, WithinAbs(2.2, 1e-6));
 }
 
-TEST_CASE("A small nearer cluster belongs to the foreground and does not win it", "[clustering]") {
+TEST_CASE("A hand before the body belongs to the foreground", "[clustering]") {
   std::vector<double> depths;
-  add_layer(depths, 8, 1.2, 0.005);  // a hand: a cluster of its own, 8 of 108 points
+  add_layer(depths, 8, 1.2, 0.005);  // 8 of 108 points
   add_layer(depths, 50, 2.0, 0.008);
   add_layer(depths, 50, 4.0, 0.002);
-  const Outcome out = run(depths, fixed(0.1, 5));
-  CHECK(out.result.clusters == 3);
+  const Outcome out = run(depths);
   CHECK(kept(out.mask, 0, 58) == 58);
   CHECK(kept(out.mask, 58, 50) == 0);
-  CHECK(kept(run(depths).mask, 0, 58) == 58);
-  CHECK(run(depths).result.background == 50);
 }
 
 TEST_CASE("As printed, the cluster of the lowest mean depth is the foreground, however small", "[clustering]") {
-  std::vector<double> depths;
+  std::vector<double> depths{1.0, 3.2, 3.6};  // noise nearer than the foreground's far end goes with it
   add_layer(depths, 8, 1.2, 0.005);
   add_layer(depths, 50, 2.0, 0.008);
-  cfp::ForegroundOptions options = fixed(0.1, 5);
-  options.adaptive.min_share = 0;
-  options.merge_gap_m = 0;
-  CHECK(run(depths, options).result.foreground == 8);
-}
-
-TEST_CASE("Noise nearer than the foreground's far end goes with it, noise behind does not", "[clustering]") {
-  std::vector<double> depths{1.0, 1.5, 3.2, 3.6};
-  add_layer(depths, 30, 2.0, 0.01);
-  add_layer(depths, 30, 4.0, 0.01);
   const Outcome out = run(depths, fixed(0.1, 5));
-  CHECK(std::vector<char>(out.mask.begin(), out.mask.begin() + 4) == std::vector<char>({1, 1, 0, 0}));
-  CHECK(out.result.foreground == 32);
+  CHECK(out.result.foreground == 9);
+  CHECK(std::vector<char>(out.mask.begin(), out.mask.begin() + 3) == std::vector<char>({1, 0, 0}));
+  CHECK(out.result.dbscan.min_pts == 5);
 }
 
-TEST_CASE("A near cluster joins within the merge gap, and only while a body could reach so far", "[clustering]") {
-  const auto background = [](double gap, double second_length, double merge_gap) {
-    std::vector<double> depths;
-    add_layer(depths, 40, 2.0, 0.005);  // ends at 2.195
-    add_layer(depths, 40, 2.195 + gap, second_length / 39);
-    add_layer(depths, 40, 6.0, 0.001);
-    cfp::ForegroundOptions options = fixed(0.05, 5);
-    options.merge_gap_m = merge_gap;
-    return run(depths, options).result.background;
+TEST_CASE("The window ends at the widest gap behind the front, or at a fixed depth", "[clustering]") {
+  std::vector<double> depths;
+  add_layer(depths, 30, 2.0, 0.005);  // front at 2.02 or so, ends at 2.145
+  add_layer(depths, 30, 2.25, 0.002);
+  CHECK(run(depths).result.foreground == 30);
+  depths.clear();
+  add_layer(depths, 200, 2.0, 0.01);  // no gap: 2.3 + behind_m
+  const Outcome out = run(depths);
+  CHECK_THAT(out.result.far_m, WithinAbs(2.7, 0.011));
+}
+
+TEMPLATE_TEST_CASE("A desk before a person is background when the pixels are known", "[clustering]", float, double) {
+  std::vector<double> depths;
+  std::vector<std::array<TestType, 2>> pixels;
+  add_layer(depths, 30, 1.4, 0.01);  // the desk, in the lower half of the box
+  add_layer(depths, 30, 2.4, 0.01);
+  add_layer(depths, 20, 4.0, 0.01);
+  for (std::size_t i = 0; i < depths.size(); ++i) {
+    const double y = i < 30 ? 160 + 0.1 * static_cast<double>(i) : 60 + static_cast<double>(i % 40);
+    pixels.push_back({TestType(120), TestType(y)});
+  }
+  const std::vector<TestType> typed(depths.begin(), depths.end());
+  cfp::ForegroundWorkspace<TestType> workspace;
+  std::vector<char> mask(depths.size());
+  cfp::ForegroundInput<TestType> in;
+  in.depths_m = typed;
+  in.pixels = pixels;
+  cfp::depth_foreground(in, {}, workspace, mask);
+  CHECK(kept(mask, 0, 30) == 30);  // without a box the nearest layer is the person
+  in.box = {100, 50, 140, 200};
+  cfp::depth_foreground(in, {}, workspace, mask);
+  CHECK(kept(mask, 0, 30) == 0);
+  CHECK(kept(mask, 30, 30) == 30);
+  CHECK(kept(mask, 60, 20) == 0);
+}
+
+TEST_CASE("The depth of the frame before decides between layers, while somebody is there", "[clustering]") {
+  std::vector<double> depths;
+  add_layer(depths, 40, 1.4, 0.01);
+  add_layer(depths, 40, 2.4, 0.01);
+  cfp::ForegroundWorkspace<double> workspace;
+  std::vector<char> mask(depths.size());
+  const auto with = [&](double previous) {
+    return cfp::depth_foreground({depths, {}, {}, previous}, {}, workspace, mask);
   };
-  CHECK(background(0.15, 0.05, 0.2) == 40);
-  CHECK(background(0.15, 0.05, 0.0) == 80);
-  CHECK(background(0.25, 0.05, 0.2) == 80);
-  CHECK(background(0.15, 0.60, 0.2) == 80);  // reaches beyond body_depth_m
+  CHECK_THAT(with(2.5).near_m, WithinAbs(2.4, 1e-9));
+  CHECK_THAT(with(2.5).depth_m, WithinAbs(2.6, 1e-9));
+  CHECK_THAT(with(1.5).far_m, WithinAbs(1.79, 1e-9));
+  for (const double unknown : {0.0, -1.0, 9.0, std::numeric_limits<double>::quiet_NaN()})
+    CHECK_THAT(with(unknown).far_m, WithinAbs(1.79, 1e-9));
 }
 
 TEST_CASE("A body is parted from a slanted plane that begins at its back", "[clustering]") {
@@ -118,7 +143,7 @@ TEST_CASE("A body is parted from a slanted plane that begins at its back", "[clu
   const Outcome out = run(depths);
   CHECK(out.result.status == ForegroundStatus::ok);
   CHECK(kept(out.mask, 0, 100) == 100);
-  CHECK(kept(out.mask, 100, 100) <= 10);
+  CHECK(kept(out.mask, 100, 100) <= 10);  // 0.4 m behind the front, at 0.03 m each
 }
 
 TEMPLATE_TEST_CASE("Points without a valid depth follow the documented rule and change nothing else", "[clustering]",
@@ -156,9 +181,6 @@ TEST_CASE("Whatever cannot be told is foreground, with the reason", "[clustering
   std::vector<double> spread;
   add_layer(spread, 40, 1.0, 0.2);
   all_foreground(run(spread, fixed(0.05, 3)), ForegroundStatus::no_cluster);
-  // Twelve points whose gap of 0.3 m is a gap or not as the radius has it.
-  const std::vector<double> sparse{2.0, 2.1, 2.2, 2.3, 2.4, 2.5, 2.8, 2.9, 3.0, 3.1, 3.2, 3.3};
-  all_foreground(run(sparse), ForegroundStatus::unstable);
 }
 
 TEST_CASE("Twelve points with a clear gap can be told apart, and one layer is all foreground", "[clustering]") {
@@ -207,18 +229,24 @@ TEMPLATE_TEST_CASE("Depth foreground allocates nothing after warm-up", "[cluster
   for (TestType& depth : small) depth = static_cast<TestType>(random.index(2) == 0 ? 2.0 : random.uniform(1, 5));
   cfp::ForegroundWorkspace<TestType> workspace;
   std::vector<char> mask(800);
-  cfp::depth_foreground(large, {}, workspace, mask);
+  cfp::depth_foreground({large, {}, {}, 0}, {}, workspace, mask);
   CHECK(cfp_test::allocations_in([&] {
-          cfp::depth_foreground(small, {}, workspace, cfp::span<char>(mask.data(), small.size()));
-          cfp::depth_foreground(large, {}, workspace, mask);
+          cfp::depth_foreground({small, {}, {}, 0}, {}, workspace, cfp::span<char>(mask.data(), small.size()));
+          cfp::depth_foreground({large, {}, {}, 0}, {}, workspace, mask);
         }) == 0);
 }
 
 TEST_CASE("Foreground options outside their range are named", "[clustering]") {
   CHECK(!invalid_field(cfp::ForegroundOptions{}));
   cfp::ForegroundOptions options;
-  options.merge_gap_m = std::numeric_limits<double>::quiet_NaN();
-  CHECK(invalid_field(options).string() == "merge_gap_m");
+  options.behind_m = std::numeric_limits<double>::quiet_NaN();
+  CHECK(invalid_field(options).string() == "behind_m");
+  options = {};
+  options.last_gap_m = 0.1;
+  CHECK(invalid_field(options).string() == "last_gap_m");
+  options = {};
+  options.near_share = 1;
+  CHECK(invalid_field(options).string() == "near_share");
   options = {};
   options.min_points = 0;
   CHECK(invalid_field(options).string() == "min_points");
@@ -226,6 +254,6 @@ TEST_CASE("Foreground options outside their range are named", "[clustering]") {
   options.adaptive.min_share = -0.1;
   CHECK(invalid_field(options).string() == "adaptive.min_share");
   options.adaptive.min_share = 0;
-  options.merge_gap_m = 0;
+  options.near_share = 0;
   CHECK(!invalid_field(options));
 }

@@ -92,7 +92,7 @@ TEST_CASE("Each box's O and labels equal the equation groups called one by one",
     CHECK(run.objects[b].pairs == o.pairs);
     std::vector<char> is_foreground(depths.size());
     cfp::ForegroundWorkspace<double> work;
-    cfp::depth_foreground(cfp::span<const double>(depths), options.foreground, work, cfp::span<char>(is_foreground));
+    cfp::depth_foreground({depths, {}, {}, 0}, options.foreground, work, is_foreground);
     for (std::size_t j = 0; j < members.size(); ++j) {
       const std::size_t i = members[j];
       if (run.ruling_box[i] != static_cast<std::int32_t>(b)) continue;

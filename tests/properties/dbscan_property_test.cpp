@@ -1,6 +1,7 @@
 #include "cfp/clustering/dbscan.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -50,7 +51,7 @@ std::vector<double> any_box() {
 std::vector<char> foreground_of(const std::vector<double>& depths, const cfp::ForegroundOptions& options = {}) {
   cfp::ForegroundWorkspace<double> workspace;
   std::vector<char> mask(depths.size());
-  cfp::depth_foreground(depths, options, workspace, mask);
+  cfp::depth_foreground({depths, {}, {}, 0}, options, workspace, mask);
   return mask;
 }
 
@@ -122,6 +123,21 @@ TEST_CASE("Depth foreground properties", "[properties]") {
     }
     RC_ASSERT(far < near);
   });
+  rc::prop("whatever is known, the foreground lies between two depths, and the background outside", [] {
+    const std::vector<double> depths = any_box();
+    cfp::Random random(*rc::gen::arbitrary<std::uint64_t>(), "pixels");
+    std::vector<std::array<double, 2>> pixels;
+    while (pixels.size() < depths.size()) pixels.push_back({random.uniform(0, 100), random.uniform(0, 200)});
+    cfp::ForegroundWorkspace<double> workspace;
+    std::vector<char> mask(depths.size());
+    const double previous = *rc::gen::element(0.0, 2.0, 3.5, 9.0);
+    const auto result = cfp::depth_foreground({depths, pixels, {0, 0, 100, 200}, previous}, {}, workspace, mask);
+    RC_ASSERT(result.foreground + result.background + result.invalid == depths.size());
+    for (std::size_t i = 0; i < depths.size(); ++i) {
+      if (!cfp::is_valid_depth(depths[i])) continue;
+      RC_ASSERT((mask[i] != 0) == (depths[i] >= result.near_m && depths[i] <= result.far_m));
+    }
+  });
   rc::prop("permuting the points permutes the mask", [] {
     const std::vector<double> depths = any_box();
     const std::vector<std::size_t> order = any_order(depths.size());
@@ -137,7 +153,8 @@ TEST_CASE("Depth foreground properties", "[properties]") {
   rc::prop("every rule labels every point and repeats itself", [] {
     const std::vector<double> depths = any_box();
     cfp::ForegroundOptions options;
-    options.adaptive.rule = static_cast<cfp::AdaptiveRule>(*rc::gen::inRange(0, 5));
+    options.rule = static_cast<cfp::ForegroundRule>(*rc::gen::inRange(0, 2));
+    options.adaptive.rule = static_cast<cfp::AdaptiveRule>(*rc::gen::inRange(0, 2));
     const std::vector<char> mask = foreground_of(depths, options);
     RC_ASSERT(std::all_of(mask.begin(), mask.end(), [](char m) { return m == 0 || m == 1; }));
     RC_ASSERT(mask == foreground_of(depths, options));

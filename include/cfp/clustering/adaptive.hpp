@@ -1,6 +1,6 @@
 /// @file adaptive.hpp
 /// eps and min_pts of the depth clustering from the depths themselves (paper IV-C: "we adaptively determine eps and
-/// minPts", without saying how). All rules stand behind one enum; `dbscan_study` compares them and is why the default
+/// minPts", without saying how). All rules stand behind one enum; `foreground_study` compares them and is why the default
 /// is the default.
 #pragma once
 
@@ -75,9 +75,9 @@ struct AdaptiveOptions {
 namespace detail {
 inline namespace CFP_ISA {
 
-// Position, among n > 0 ascending depths, of one that belongs to the foreground.
-constexpr std::size_t foreground_position(std::size_t n, const AdaptiveOptions& options) noexcept {
-  const auto at = static_cast<std::size_t>(options.min_share * static_cast<double>(n));
+// Position of a share in [0, 1) of n > 0 ascending values.
+[[nodiscard]] constexpr std::size_t position_of_share(double share, std::size_t n) noexcept {
+  const auto at = static_cast<std::size_t>(share * static_cast<double>(n));
   return at < n ? at : n - 1;
 }
 
@@ -145,7 +145,7 @@ template <typename Scalar>
   CFP_ASSERT(std::is_sorted(depths.begin(), depths.end()));
   const std::size_t n = depths.size();
   if (n < 3 || options.rule == AdaptiveRule::fixed) return options.fixed;
-  const std::size_t at = detail::foreground_position(n, options);
+  const std::size_t at = detail::position_of_share(options.min_share, n);
   const double floor_m = options.noise_factor * options.noise.sigma_m(static_cast<double>(depths[at]));
   const DbscanOptions chosen = detail::density_options(depths, options, floor_m, at, workspace.neighbours);
   return is_finite(chosen.eps) ? chosen : options.fixed;

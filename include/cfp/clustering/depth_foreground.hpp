@@ -1,6 +1,6 @@
 /// @file depth_foreground.hpp
-/// Which keypoints of a person's box lie on the person and which on what is behind (paper IV-C, "DBSCAN density
-/// clustering algorithm"): depth clustering, then the nearest layer. Depths in metres, one call per box.
+/// Which keypoints of a person's box lie on the person and which on what is behind or before (paper IV-C): by a window
+/// of depths around the person, or, as printed, by clustering the depths. Depths in metres, one call per box.
 #pragma once
 
 #include <algorithm>
@@ -15,22 +15,54 @@
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
+#include "cfp/geometry/box.hpp"
 
 namespace cfp {
 
+/// The keypoints of one box. What is not known stays as it is.
+template <typename Scalar>
+struct ForegroundInput {
+  span<const Scalar> depths_m;  ///< not positive or not finite: no depth there
+  PointSpan<Scalar, 2> pixels;  ///< one per depth, px; empty: unknown. Of use only with `box`.
+  Box<Scalar> box;              ///< px; improper: unknown
+  Scalar previous_depth_m{};    ///< `depth_m` of the same object's result in the frame before; not positive: unknown
+};
+
+enum class ForegroundRule : std::uint8_t {
+  depth_window,  ///< see `depth_foreground`
+  dbscan         ///< as printed: the cluster of the lowest mean depth, and what is nearer
+};
+
+/// Defaults of the window from benchmarks/studies/foreground_study.cpp.
 struct ForegroundOptions {
-  AdaptiveOptions adaptive;
-  double merge_gap_m = 0.2;  ///< a cluster that begins so near behind the foreground and ends within body_depth_m joins
-                             ///< it; >= 0, 0: none
-  std::size_t min_points = 6;    ///< fewer valid depths: too_few_points; >= 1
-  std::size_t sure_points = 18;  ///< with fewer valid depths the split must also hold for a smaller and a larger eps
+  ForegroundRule rule = ForegroundRule::depth_window;
+  AdaptiveOptions adaptive;    ///< dbscan: eps and min_pts
+  double near_share = 0.15;    ///< the person's front is read at this share of the ascending depths, as nearer ones may
+                               ///< be a hand or flying pixels at a silhouette; [0, 1)
+  double upper_share = 0.1;    ///< the same among the points in the upper half of the box; [0, 1)
+  double obstacle_m = 0.4;     ///< the upper half begins so much farther: something stands before the person; >= 0
+  double before_m = 0.5;       ///< how far the window reaches before the front of a person behind something; >= 0
+  double behind_m = 0.4;       ///< how far the window reaches behind the front where no gap ends it; >= 0
+  double first_gap_m = 0.15;   ///< nearest end of the window at a gap, behind the front; >= 0
+  double last_gap_m = 0.6;     ///< farthest end of the window at a gap; >= first_gap_m
+  double min_gap_m = 0.04;     ///< narrower gaps end nothing; >= 0
+  double half_body_m = 0.05;   ///< the front stands so much before `previous_depth_m`; >= 0
+  std::size_t min_points = 6;  ///< fewer valid depths: too_few_points; >= 1
   bool invalid_is_foreground = true;  ///< label of points without a valid depth: true is the safe side
 };
 
-[[nodiscard]] constexpr OptionPath invalid_field(const ForegroundOptions& options) noexcept {
-  if (const OptionPath field = nested("adaptive", invalid_field(options.adaptive))) return field;
-  if (!detail::non_negative(options.merge_gap_m)) return "merge_gap_m";
-  if (options.min_points < 1) return "min_points";
+[[nodiscard]] constexpr OptionPath invalid_field(const ForegroundOptions& o) noexcept {
+  if (const OptionPath field = nested("adaptive", invalid_field(o.adaptive))) return field;
+  if (!(o.near_share >= 0.0 && o.near_share < 1.0)) return "near_share";
+  if (!(o.upper_share >= 0.0 && o.upper_share < 1.0)) return "upper_share";
+  if (!detail::non_negative(o.obstacle_m)) return "obstacle_m";
+  if (!detail::non_negative(o.before_m)) return "before_m";
+  if (!detail::non_negative(o.behind_m)) return "behind_m";
+  if (!detail::non_negative(o.first_gap_m)) return "first_gap_m";
+  if (!(o.last_gap_m >= o.first_gap_m) || !is_finite(o.last_gap_m)) return "last_gap_m";
+  if (!detail::non_negative(o.min_gap_m)) return "min_gap_m";
+  if (!detail::non_negative(o.half_body_m)) return "half_body_m";
+  if (o.min_points < 1) return "min_points";
   return {};
 }
 
@@ -39,8 +71,7 @@ struct ForegroundOptions {
 enum class ForegroundStatus : std::uint8_t {
   ok,
   too_few_points,  ///< fewer valid depths than min_points
-  no_cluster,      ///< no cluster reaches past the minimum share of the points
-  unstable         ///< few points, and a slightly smaller or larger eps splits them elsewhere
+  no_cluster       ///< dbscan alone
 };
 
 [[nodiscard]] constexpr const char* to_string(ForegroundStatus status) noexcept {
@@ -51,20 +82,18 @@ enum class ForegroundStatus : std::uint8_t {
       return "too few points";
     case ForegroundStatus::no_cluster:
       return "no cluster";
-    case ForegroundStatus::unstable:
-      return "unstable";
   }
   return "unknown";
 }
 
 struct ForegroundResult {
   ForegroundStatus status = ForegroundStatus::too_few_points;
-  DbscanOptions dbscan;  ///< eps (m) and min_pts that were used
-  std::size_t clusters = 0;
+  double depth_m = 0;            ///< median of the foreground, for the next frame; 0 unless ok
+  double near_m = 0, far_m = 0;  ///< nearest and farthest foreground depth; 0 without valid depths
   std::size_t foreground = 0;    ///< points labelled foreground, those without a valid depth not counted
   std::size_t background = 0;    ///< points labelled background, likewise
   std::size_t invalid = 0;       ///< points without a valid depth
-  double near_m = 0, far_m = 0;  ///< nearest and farthest foreground depth; 0 without valid depths
+  DbscanOptions dbscan;          ///< eps (m) and min_pts that the rule dbscan used
 };
 
 /// Grows to the largest box seen, then allocates nothing.
@@ -77,35 +106,70 @@ struct ForegroundWorkspace {
 namespace detail {
 inline namespace CFP_ISA {
 
-// How many of the ascending depths belong to the foreground under these parameters; 0 for none.
+// Positions [first, last) of the ascending depths.
+struct DepthRange {
+  std::size_t first, last;
+};
+
+// The depth at `upper_share` of the points in the upper half of the box; 0 for fewer than eight.
 template <typename Scalar>
-std::size_t foreground_count(span<const Scalar> depths, const DbscanOptions& parameters,
-                             const ForegroundOptions& options, ForegroundWorkspace<Scalar>& workspace,
-                             std::size_t& clusters) {
-  const std::size_t n = depths.size();
-  workspace.labels.resize(n);
-  clusters = dbscan_sorted(depths, parameters, workspace.dbscan, span<int>(workspace.labels)).clusters;
-  const std::size_t at = foreground_position(n, options.adaptive);
-  const double limit = static_cast<double>(depths[at]) + options.adaptive.body_depth_m;
-  std::size_t count = 0;  // up to the end of the last cluster taken
-  for (std::size_t i = 0; i < n;) {
-    if (workspace.labels[i] == dbscan_noise) {
-      ++i;
-      continue;
-    }
-    std::size_t end = i + 1;
-    for (std::size_t j = end; j < n && workspace.labels[j] <= workspace.labels[i]; ++j) {
-      if (workspace.labels[j] == workspace.labels[i]) end = j + 1;
-    }
-    const bool enough = count > at;
-    if (enough && !(static_cast<double>(depths[i]) - static_cast<double>(depths[count - 1]) <= options.merge_gap_m &&
-                    static_cast<double>(depths[end - 1]) <= limit)) {
-      break;
-    }
-    count = end;
-    i = end;
+[[nodiscard]] double front_of_upper_half(const ForegroundInput<Scalar>& in, const SortedValues<Scalar>& sorted,
+                                         double upper_share) noexcept {
+  if (in.pixels.empty() || !is_proper(in.box)) return 0;
+  const Scalar middle = (in.box.y1 + in.box.y2) / Scalar(2);
+  const auto upper = [&](std::uint32_t i) { return in.pixels(i, 1) < middle; };
+  const auto count = static_cast<std::size_t>(std::count_if(sorted.index.begin(), sorted.index.end(), upper));
+  if (count < 8) return 0;
+  std::size_t left = position_of_share(upper_share, count), i = 0;
+  for (; !upper(sorted.index[i]) || left > 0; ++i) left -= upper(sorted.index[i]) ? 1U : 0U;
+  return static_cast<double>(sorted.values[i]);
+}
+
+// The window around a person whose front stands at `front`. A gap of many points is what few of them lie in: flying
+// pixels bridge the empty ones.
+template <typename Scalar>
+[[nodiscard]] DepthRange depth_window(span<const Scalar> depths, double front, double before_m,
+                                      const ForegroundOptions& o) noexcept {
+  const auto depth = [&](std::size_t i) { return static_cast<double>(depths[i]); };
+  const std::size_t n = depths.size(), stride = 1 + n / 150;
+  std::size_t first = 0, last = 0, end_at_gap = 0;
+  while (first < n && depth(first) < front - before_m) ++first;
+  double widest = o.min_gap_m;
+  for (last = first; last < n && depth(last) <= front + o.last_gap_m; ++last) {
+    if (last + stride >= n || depth(last + 1) < front + o.first_gap_m) continue;
+    const double gap = depth(last + stride) - depth(last);
+    if (!(gap > widest)) continue;
+    widest = gap;
+    end_at_gap = last + (stride + 1) / 2;
   }
-  return count > at ? count : 0;
+  if (end_at_gap > 0) return {first, end_at_gap};
+  while (last > first && depth(last - 1) > front + o.behind_m) --last;
+  return {first, last};
+}
+
+template <typename Scalar>
+[[nodiscard]] DepthRange person_range(const ForegroundInput<Scalar>& in, const SortedValues<Scalar>& sorted,
+                                      const ForegroundOptions& o) noexcept {
+  const std::size_t n = sorted.values.size(), near = position_of_share(o.near_share, n);
+  if (is_valid_depth(in.previous_depth_m)) {
+    const double front = static_cast<double>(in.previous_depth_m) - o.half_body_m;
+    const DepthRange range = depth_window(sorted.values, front, o.before_m, o);
+    if (range.last > range.first + near) return range;  // else nobody is there any more
+  }
+  const double front = static_cast<double>(sorted.values[near]);
+  const double upper = front_of_upper_half(in, sorted, o.upper_share);
+  if (upper > front + o.obstacle_m) return depth_window(sorted.values, upper, o.before_m, o);
+  return depth_window(sorted.values, front, front, o);
+}
+
+// Up to the end of the cluster of the lowest mean depth, which is the first; nothing without one.
+template <typename Scalar>
+[[nodiscard]] DepthRange first_cluster(span<const Scalar> depths, const DbscanOptions& parameters,
+                                       ForegroundWorkspace<Scalar>& workspace) {
+  workspace.labels.resize(depths.size());
+  dbscan_sorted(depths, parameters, workspace.dbscan, workspace.labels);
+  const auto last = std::find(workspace.labels.rbegin(), workspace.labels.rend(), 0);
+  return {0, static_cast<std::size_t>(workspace.labels.rend() - last)};
 }
 
 }  // namespace CFP_ISA
@@ -113,51 +177,48 @@ std::size_t foreground_count(span<const Scalar> depths, const DbscanOptions& par
 
 inline namespace CFP_ISA {
 
-/// mask[i] = 1 for foreground, 0 for background. Clusters the valid depths (finite, > 0) with `adaptive_options`. The
-/// foreground ends where the first cluster ends that reaches past the nearest `adaptive.min_share` of the points; a
-/// cluster that begins within `merge_gap_m` behind it, and ends within `adaptive.body_depth_m` of the foreground's
-/// depth, joins it; everything nearer goes with it, smaller clusters (a hand) and noise (flying pixels at silhouettes)
-/// alike. The result is a cut in depth. Fewer than `sure_points` valid depths: the split is repeated with eps x 0.7 and
-/// x 1.4, and unless both agree to within one point in ten, the status is `unstable`. One cluster only is `ok`:
-/// everything is foreground because it is one layer. Points without a valid depth take no part and get the label
-/// `invalid_is_foreground` says, whatever the status. O(n log n), in practice O(n); deterministic; permuting the points
-/// permutes the mask; allocates only when the workspace grows. Departures from the paper, which takes the cluster of
-/// the lowest mean depth (dbscan_study shows what they bring): the minimum share, for without it a tiny near cluster
-/// wins; and joining, for plain clothes leave gaps in a body.
+/// mask[i] = 1 for foreground, 0 for background, by two cuts in depth.
+/// The person's front is taken, in this order: from `previous_depth_m`, when the window there holds more than
+/// `near_share` of the points; from the upper half of the box, when it begins `obstacle_m` farther than the whole (a
+/// desk, a table: what stands before a person hides the legs); from the depth that the nearest `near_share` reach. The
+/// window ends at the widest gap between `first_gap_m` and `last_gap_m` behind the front, or, where no gap is wider
+/// than `min_gap_m`, `behind_m` behind it. It begins `before_m` before the front in the first two cases; in the third,
+/// everything nearer belongs to the person (an arm). One layer only is `ok`: everything is foreground. Points without a
+/// valid depth take no part and get the label `invalid_is_foreground` says, whatever the status. O(n log n), in
+/// practice O(n); deterministic; permuting the points permutes the mask; allocates only when the workspace grows.
+/// Departure from the paper, which clusters: a window is never worse on the scenes of foreground_study.
 template <typename Scalar>
-ForegroundResult depth_foreground(span<const non_deduced<Scalar>> depths_m, const ForegroundOptions& options,
+ForegroundResult depth_foreground(const ForegroundInput<non_deduced<Scalar>>& in, const ForegroundOptions& options,
                                   ForegroundWorkspace<Scalar>& workspace, span<char> mask) {
-  CFP_ASSERT(mask.size() == depths_m.size());
+  CFP_ASSERT(mask.size() == in.depths_m.size());
+  CFP_ASSERT(in.pixels.empty() || in.pixels.size() == in.depths_m.size());
   const SortedValues<Scalar> sorted = sort_values(
-      depths_m, [](Scalar depth) { return is_valid_depth(depth); }, workspace.dbscan.sort);
+      in.depths_m, [](Scalar depth) { return is_valid_depth(depth); }, workspace.dbscan.sort);
   const span<const Scalar> depths = sorted.values;
   const std::size_t n = depths.size();
   ForegroundResult result;
-  result.invalid = depths_m.size() - n;
+  result.invalid = in.depths_m.size() - n;
   std::fill(mask.begin(), mask.end(), options.invalid_is_foreground ? char(1) : char(0));
 
-  std::size_t count = 0;
-  if (n >= options.min_points && n > 0) {
-    result.dbscan = adaptive_options(depths, options.adaptive, workspace.dbscan);
-    count = detail::foreground_count(depths, result.dbscan, options, workspace, result.clusters);
-    result.status = count > 0 ? ForegroundStatus::ok : ForegroundStatus::no_cluster;
-    if (count > 0 && n < options.sure_points) {
-      for (const double factor : {0.7, 1.4}) {
-        std::size_t clusters = 0;
-        const std::size_t other = detail::foreground_count(depths, {result.dbscan.eps * factor, result.dbscan.min_pts},
-                                                           options, workspace, clusters);
-        if (10 * (other > count ? other - count : count - other) > n) result.status = ForegroundStatus::unstable;
-      }
+  detail::DepthRange range{0, n};
+  if (n > 0 && n >= options.min_points) {
+    if (options.rule == ForegroundRule::depth_window) {
+      range = detail::person_range<Scalar>(in, sorted, options);
+    } else {
+      result.dbscan = adaptive_options(depths, options.adaptive, workspace.dbscan);
+      range = detail::first_cluster(depths, result.dbscan, workspace);
     }
+    result.status = range.last > range.first ? ForegroundStatus::ok : ForegroundStatus::no_cluster;
+    if (range.last <= range.first) range = {0, n};
   }
-  if (result.status != ForegroundStatus::ok) count = n;
-  for (std::size_t i = 0; i < n; ++i) mask[sorted.index[i]] = i < count ? char(1) : char(0);
-  result.foreground = count;
-  result.background = n - count;
-  if (count > 0) {
-    result.near_m = static_cast<double>(depths[0]);
-    result.far_m = static_cast<double>(depths[count - 1]);
-  }
+  for (std::size_t i = 0; i < n; ++i) mask[sorted.index[i]] = i >= range.first && i < range.last ? char(1) : char(0);
+  result.foreground = range.last - range.first;
+  result.background = n - result.foreground;
+  if (n == 0) return result;
+  result.near_m = static_cast<double>(depths[range.first]);
+  result.far_m = static_cast<double>(depths[range.last - 1]);
+  if (result.status == ForegroundStatus::ok)
+    result.depth_m = static_cast<double>(depths[(range.first + range.last) / 2]);
   return result;
 }
 

@@ -117,7 +117,7 @@ bool separate_foreground(const FirstStageInput<Scalar>& in, const ObjectBox<Scal
   if (in.depths_m.empty()) return false;
   work.depths.clear();
   for (const std::int32_t i : work.members) work.depths.push_back(in.depths_m[static_cast<std::size_t>(i)]);
-  const ForegroundResult separated = depth_foreground(span<const Scalar>(work.depths), options.foreground,
+  const ForegroundResult separated = depth_foreground({work.depths, {}, {}, Scalar(0)}, options.foreground,
                                                       work.foreground, span<char>(work.is_foreground));
   return separated.status == ForegroundStatus::ok;
 }

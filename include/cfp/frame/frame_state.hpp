@@ -55,15 +55,23 @@ struct FrameReport {
   FrameHealth health;          ///< of the weights, fallback included
 };
 
+/// Where the foreground of a tracked box stood.
+template <typename Scalar>
+struct ObjectDepth {
+  std::int64_t id = 0;  ///< of the track
+  Scalar depth_m{};     ///< median, see ForegroundResult
+};
+
 /// What the next frame has to know of a frame.
 template <typename Scalar>
 struct FrameMemory {
   bool known = false;  ///< false: there was no such frame
   double timestamp_s = 0;
   std::vector<std::array<Scalar, 2>> keypoints;
-  std::vector<Scalar> depths;             ///< empty: none
-  std::vector<std::uint8_t> descriptors;  ///< one after the other; empty: none
-  std::size_t descriptor_bytes = 0;       ///< of each
+  std::vector<Scalar> depths;                      ///< empty: none
+  std::vector<ObjectDepth<Scalar>> object_depths;  ///< of the boxes that the depths could separate
+  std::vector<std::uint8_t> descriptors;           ///< one after the other; empty: none
+  std::size_t descriptor_bytes = 0;                ///< of each
 
   [[nodiscard]] DescriptorSpan descriptor_view() const noexcept {
     return {descriptors.data(), descriptors.empty() ? 0 : keypoints.size(), descriptor_bytes, descriptor_bytes};
@@ -113,6 +121,7 @@ void begin_frame(const Frame<Scalar>& frame, FrameState<Scalar>& state) {
   FrameMemory<Scalar>& current = state.current;
   current.known = true;
   current.timestamp_s = frame.timestamp_s;
+  current.object_depths.clear();
   current.depths.assign(frame.depths.begin(), frame.depths.end());
   const std::size_t bytes = current.descriptor_bytes = frame.descriptors.bytes;
   current.descriptors.resize(frame.descriptors.size * bytes);

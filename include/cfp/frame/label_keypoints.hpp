@@ -32,17 +32,26 @@ bool collect_members(const Frame<Scalar>& frame, const TrackedBox<Scalar>& box, 
   return by_index || (!frame.labels.empty() && !box.compensated());
 }
 
-/// Marks in scratch.mask which of the members lie on their object. Returns whether the depths could tell.
+/// Marks in scratch.mask which of the members lie on their object, and remembers its depth for the next frame. Returns
+/// whether the depths could tell.
 template <typename Scalar>
-bool separate_foreground(const CoarseOptions& options, FrameState<Scalar>& state) {
+bool separate_foreground(const TrackedBox<Scalar>& box, const CoarseOptions& options, FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
   if (state.current.depths.empty()) return false;
   scratch.depths.clear();
-  for (const std::int32_t i : scratch.members)
+  scratch.points.clear();
+  for (const std::int32_t i : scratch.members) {
     scratch.depths.push_back(state.current.depths[static_cast<std::size_t>(i)]);
-  return depth_foreground(span<const Scalar>(scratch.depths), options.foreground, scratch.foreground,
-                          span<char>(scratch.mask))
-             .status == ForegroundStatus::ok;
+    scratch.points.push_back(state.current.keypoints[static_cast<std::size_t>(i)]);
+  }
+  ForegroundInput<Scalar> in{scratch.depths, scratch.points, box.box, Scalar(0)};
+  for (const ObjectDepth<Scalar>& object : state.previous.object_depths) {
+    if (state.previous.known && object.id == box.id) in.previous_depth_m = object.depth_m;
+  }
+  const ForegroundResult result = depth_foreground(in, options.foreground, scratch.foreground, scratch.mask);
+  if (result.status != ForegroundStatus::ok) return false;
+  state.current.object_depths.push_back({box.id, static_cast<Scalar>(result.depth_m)});
+  return true;
 }
 
 }  // namespace CFP_ISA
@@ -69,7 +78,7 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
       return c.class_id == state.boxes[b].class_id && c.non_rigid;
     });
     if (!segmented && non_rigid && options.coarse.use_depth_foreground &&
-        !detail::separate_foreground(options.coarse, state))
+        !detail::separate_foreground(state.boxes[b], options.coarse, state))
       ++state.report.undecided_foregrounds;
 
     const Scalar o = static_cast<Scalar>(state.objects[b].static_probability);
