@@ -6,11 +6,15 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <vector>
 
 #include <opencv2/features2d.hpp>
 
 namespace cfp_examples {
+
+using OrbDescriptor = std::array<std::uint64_t, 4>;  // 256 bits
 
 struct FeatureOptions {
   int count = 1000;           // keypoints kept
@@ -29,10 +33,14 @@ class FeatureExtractor {
                              31, options.fast_threshold)),
         levels_(static_cast<std::size_t>(options.levels)) {}
 
-  void operator()(const cv::Mat& gray, std::vector<cv::KeyPoint>& keypoints, cv::Mat& descriptors) {
+  void operator()(const cv::Mat& gray, std::vector<cv::KeyPoint>& keypoints, std::vector<OrbDescriptor>& descriptors) {
     orb_->detect(gray, candidates_);
     select(gray.cols, gray.rows, keypoints);
-    orb_->compute(gray, keypoints, descriptors);
+    cv::Mat rows;
+    orb_->compute(gray, keypoints, rows);
+    descriptors.resize(keypoints.size());
+    for (std::size_t i = 0; i < keypoints.size(); ++i)
+      std::memcpy(descriptors[i].data(), rows.ptr(static_cast<int>(i)), sizeof(OrbDescriptor));
   }
 
  private:

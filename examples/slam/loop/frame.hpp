@@ -5,12 +5,11 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
-#include <cstring>
 #include <vector>
 
 #include <opencv2/core.hpp>
 
+#include "../../support/orb_features.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/radial_tangential_camera.hpp"
 #include "cfp/math/se3.hpp"
@@ -18,14 +17,8 @@
 namespace cfp_slam {
 
 using Camera = cfp::RadialTangentialCamera<float>;  // of the images
-using Descriptor = std::array<std::uint64_t, 4>;
+using Descriptor = cfp_examples::OrbDescriptor;
 inline constexpr int no_point = -1;
-
-inline Descriptor descriptor_row(const cv::Mat& descriptors, std::size_t row) {
-  Descriptor d;
-  std::memcpy(d.data(), descriptors.ptr(static_cast<int>(row)), sizeof d);
-  return d;
-}
 
 // The camera of the undistorted images: their size, and how sure a keypoint's position is per pyramid level.
 struct View {

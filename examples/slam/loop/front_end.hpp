@@ -23,7 +23,7 @@ namespace cfp_slam {
 struct FrameFeatures {
   double time_s = 0;
   std::vector<cv::KeyPoint> keypoints;
-  cv::Mat descriptors;
+  std::vector<Descriptor> descriptors;
   std::vector<std::array<float, 2>> pixels;  // without distortion; NaN where the lens model has no ray
   std::vector<float> depths_m;               // -1: none
   std::vector<cv::Point2f> flow_from, flow_to;

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,13 +12,10 @@
 #include "cfp/frame/static_probability.hpp"
 #include "cfp/interop/opencv.hpp"
 #include "front_end.hpp"
-#include "last_frame_matching.hpp"
 #include "local_bundle.hpp"
 #include "local_map.hpp"
 #include "mapping.hpp"
 #include "motion.hpp"
-#include "observer.hpp"
-#include "options.hpp"
 #include "pose.hpp"
 #include "relocalization.hpp"
 
@@ -89,8 +85,7 @@ class Tracking {
     frame.keypoints = std::move(features.keypoints);
     frame.pixels = std::move(features.pixels);
     frame.depths_m = std::move(features.depths_m);
-    frame.descriptors.resize(n);
-    for (std::size_t i = 0; i < n; ++i) frame.descriptors[i] = descriptor_row(features.descriptors, i);
+    frame.descriptors = std::move(features.descriptors);
     frame.static_probability.assign(n, 1.0F);
     frame.map_point_probability.assign(n, -1.0F);
     frame.map_point.assign(n, no_point);
