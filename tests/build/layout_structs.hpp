@@ -8,7 +8,7 @@
 // clang-format off
 #define CFP_LAYOUTS                                                      \
   CFP_LAYOUT(cfp::DepthNoise, nearest_m)                                 \
-  CFP_LAYOUT(cfp::AdaptiveOptions, body_depth_m)                         \
+  CFP_LAYOUT(cfp::AdaptiveOptions, density)                              \
   CFP_LAYOUT(cfp::SortedValues<double>, index)                           \
   CFP_LAYOUT(cfp::SortWorkspace<double>, index)                          \
   CFP_LAYOUT(cfp::SortedValues<float>, index)                            \

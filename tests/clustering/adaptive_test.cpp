@@ -80,9 +80,7 @@ TEST_CASE("Adaptive options outside their range are named", "[clustering]") {
   CHECK(named([&](auto& o) { o.max_eps_m = 0.01; }) == "max_eps_m");
   CHECK(named([&](auto& o) { o.spacing_factor = nan; }) == "spacing_factor");
   CHECK(named([&](auto& o) { o.min_share = 1; }) == "min_share");
-  CHECK(named([&](auto& o) { o.min_density = 0; }) == "min_density");
-  CHECK(named([&](auto& o) { o.max_density = 0.01; }) == "max_density");
-  CHECK(named([&](auto& o) { o.body_depth_m = nan; }) == "body_depth_m");
+  CHECK(named([&](auto& o) { o.density = 0; }) == "density");
 }
 
 TEST_CASE("The noise model gives its published figure", "[clustering]") {

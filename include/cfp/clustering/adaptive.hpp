@@ -1,7 +1,6 @@
 /// @file adaptive.hpp
 /// eps and min_pts of the depth clustering from the depths themselves (paper IV-C: "we adaptively determine eps and
-/// minPts", without saying how). All rules stand behind one enum; `foreground_study` compares them and is why the default
-/// is the default.
+/// minPts", without saying how).
 #pragma once
 
 #include <algorithm>
@@ -32,7 +31,7 @@ struct DepthNoise {
 };
 
 enum class AdaptiveRule : std::uint8_t {
-  foreground_density,  ///< the default, see `adaptive_options`
+  foreground_density,  ///< see `adaptive_options`
   fixed                ///< `fixed` as it stands
 };
 
@@ -46,9 +45,7 @@ struct AdaptiveOptions {
   double spacing_factor = 3.0;  ///< eps follows so many mean spacings, for boxes with few points; > 0
   double min_share = 0.15;      ///< the foreground's depth is read at this share of all points, as nearer ones may be a
                                 ///< hand or flying pixels at a silhouette; [0, 1)
-  double min_density = 0.15;    ///< first share of the foreground's density that a core point must have; (0, 1]
-  double max_density = 0.6;     ///< last share tried; [min_density, 1]
-  double body_depth_m = 0.5;    ///< the share is raised while the foreground reaches farther behind its depth; > 0
+  double density = 0.3;         ///< share of the foreground's density that a core point must have; (0, 1]
 };
 
 [[nodiscard]] constexpr OptionPath invalid_field(const DepthNoise& noise) noexcept {
@@ -66,9 +63,7 @@ struct AdaptiveOptions {
   if (!(o.max_eps_m >= o.min_eps_m) || !is_finite(o.max_eps_m)) return "max_eps_m";
   if (!detail::positive(o.spacing_factor)) return "spacing_factor";
   if (!(o.min_share >= 0.0 && o.min_share < 1.0)) return "min_share";
-  if (!(o.min_density > 0.0 && o.min_density <= 1.0)) return "min_density";
-  if (!(o.max_density >= o.min_density && o.max_density <= 1.0)) return "max_density";
-  if (!detail::positive(o.body_depth_m)) return "body_depth_m";
+  if (!(o.density > 0.0 && o.density <= 1.0)) return "density";
   return {};
 }
 
@@ -81,63 +76,16 @@ inline namespace CFP_ISA {
   return at < n ? at : n - 1;
 }
 
-// The last core point of the first cluster that ends at or behind position `least`; n when no cluster does.
-template <typename Scalar>
-std::size_t foreground_end(span<const Scalar> values, Scalar eps, std::size_t least, std::size_t min_pts,
-                           const std::vector<std::uint32_t>& neighbours) noexcept {
-  const std::size_t n = values.size();
-  std::size_t last = n;
-  for (std::size_t i = 0; i < n; ++i) {
-    if (neighbours[i] < min_pts) continue;
-    if (last != n && last >= least && !(values[i] - values[last] <= eps)) return last;
-    last = i;
-  }
-  return last != n && last >= least ? last : n;
-}
-
-template <typename Scalar>
-DbscanOptions density_options(span<const Scalar> depths, const AdaptiveOptions& options, double floor_m, std::size_t at,
-                              std::vector<std::uint32_t>& neighbours) {
-  const std::size_t n = depths.size();
-  const auto around =
-      (std::max)(std::size_t(3), static_cast<std::size_t>(std::lround(0.5 * std::sqrt(static_cast<double>(n)))));
-  const std::size_t low = at > around ? at - around : 0, high = (std::min)(n - 1, at + around);
-  const double spacing =
-      (static_cast<double>(depths[high]) - static_cast<double>(depths[low])) / static_cast<double>(high - low);
-  DbscanOptions chosen;
-  chosen.eps = (std::min)((std::max)(options.min_eps_m, options.spacing_factor * spacing), options.max_eps_m);
-  chosen.eps = (std::max)(chosen.eps, floor_m);
-  const Scalar eps = radius<Scalar>(chosen.eps);
-  count_neighbours(depths, eps, neighbours);
-  std::uint32_t peak = 0;
-  for (std::size_t i = 0; i < n && (i <= at || depths[i] - depths[at] <= eps); ++i)
-    peak = (std::max)(peak, neighbours[i]);
-
-  std::size_t nearest = n;
-  for (double share = options.min_density; share <= options.max_density; share *= 1.4) {
-    const auto min_pts =
-        (std::max)(std::size_t(2), static_cast<std::size_t>(std::ceil(share * static_cast<double>(peak))));
-    const std::size_t end = foreground_end(depths, eps, at, min_pts, neighbours);
-    if (end >= nearest && nearest != n) continue;
-    nearest = end;
-    chosen.min_pts = min_pts;
-    if (end == n || static_cast<double>(depths[end]) - static_cast<double>(depths[at]) <= options.body_depth_m) break;
-  }
-  return chosen;
-}
-
 }  // namespace CFP_ISA
 }  // namespace detail
 
 inline namespace CFP_ISA {
 
 /// eps (metres) and min_pts for depths that are valid and ascending.
-/// The default reads the foreground's depth z at `min_share`, sets eps to `spacing_factor` mean spacings around it
-/// within [min_eps_m, max_eps_m], but at least noise_factor sigmas at z, counts the neighbours of the points up to
-/// z + eps, and asks of a core point `min_density` of the largest count, at least 2. So min_pts grows with n and with
-/// the density of the foreground, not of the wall. While the foreground then reaches more than `body_depth_m` behind z,
-/// that share is raised by 1.4: what connects a body to a wall or to a slanted plane is thinner than the body. The
-/// share with the nearest end stands. Fewer than three depths, or an eps that overflows: `fixed`. O(n). Allocates only
+/// The rule reads the foreground's depth z at `min_share`, sets eps to `spacing_factor` mean spacings around it within
+/// [min_eps_m, max_eps_m], but at least noise_factor sigmas at z, counts the neighbours of the points up to z + eps,
+/// and asks of a core point `density` of the largest count, at least 2. So min_pts grows with n and with the density of
+/// the foreground, not of the wall. Fewer than three depths, or an eps that overflows: `fixed`. O(n). Allocates only
 /// when the workspace grows. Source: ours; paper IV-C leaves it open.
 template <typename Scalar>
 [[nodiscard]] DbscanOptions adaptive_options(span<const non_deduced<Scalar>> depths, const AdaptiveOptions& options,
@@ -145,10 +93,23 @@ template <typename Scalar>
   CFP_ASSERT(std::is_sorted(depths.begin(), depths.end()));
   const std::size_t n = depths.size();
   if (n < 3 || options.rule == AdaptiveRule::fixed) return options.fixed;
+  const auto depth = [&](std::size_t i) { return static_cast<double>(depths[i]); };
   const std::size_t at = detail::position_of_share(options.min_share, n);
-  const double floor_m = options.noise_factor * options.noise.sigma_m(static_cast<double>(depths[at]));
-  const DbscanOptions chosen = detail::density_options(depths, options, floor_m, at, workspace.neighbours);
-  return is_finite(chosen.eps) ? chosen : options.fixed;
+  const std::size_t around = 3 + static_cast<std::size_t>(0.5 * std::sqrt(static_cast<double>(n)));
+  const std::size_t low = at > around ? at - around : 0, high = (std::min)(n - 1, at + around);
+  const double spacing = (depth(high) - depth(low)) / static_cast<double>(high - low);
+  DbscanOptions chosen;
+  chosen.eps = (std::min)((std::max)(options.min_eps_m, options.spacing_factor * spacing), options.max_eps_m);
+  chosen.eps = (std::max)(chosen.eps, options.noise_factor * options.noise.sigma_m(depth(at)));
+  if (!is_finite(chosen.eps)) return options.fixed;
+
+  const Scalar eps = detail::radius<Scalar>(chosen.eps);
+  detail::count_neighbours(depths, eps, workspace.neighbours);
+  std::uint32_t peak = 0;
+  for (std::size_t i = 0; i < n && (i <= at || depths[i] - depths[at] <= eps); ++i)
+    peak = (std::max)(peak, workspace.neighbours[i]);
+  chosen.min_pts = (std::max)(std::size_t(2), static_cast<std::size_t>(std::ceil(options.density * peak)));
+  return chosen;
 }
 
 }  // namespace CFP_ISA
