@@ -186,7 +186,8 @@ inline namespace CFP_ISA {
 /// everything nearer belongs to the person (an arm). One layer only is `ok`: everything is foreground. Points without a
 /// valid depth take no part and get the label `invalid_is_foreground` says, whatever the status. O(n log n), in
 /// practice O(n); deterministic; permuting the points permutes the mask; allocates only when the workspace grows.
-/// Departure from the paper, which clusters: a window is never worse on the scenes of foreground_study.
+/// Departure from the paper, which clusters: a window is better on every kind of scene of foreground_study with a
+/// person.
 template <typename Scalar>
 ForegroundResult depth_foreground(const ForegroundInput<non_deduced<Scalar>>& in, const ForegroundOptions& options,
                                   ForegroundWorkspace<Scalar>& workspace, span<char> mask) {
