@@ -1,68 +1,253 @@
 #include "cfp/frame/label_keypoints.hpp"
 
 #include <algorithm>
-#include <array>
+#include <limits>
+#include <numeric>
 #include <vector>
 
+#include "cfp/core/options.hpp"
 #include "cfp/core/random.hpp"
-#include "cfp/frame/static_probability.hpp"
+#include "cfp/geometry/radial_tangential_camera.hpp"
+#include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
+#include "support/frame_runs.hpp"
+
+using cfp::KeypointLabel;
+using cfp_test::DynamicScene;
+using cfp_test::DynamicSceneOptions;
+using cfp_test::FrameRun;
+using cfp_test::make_dynamic_scene;
 
 namespace {
 
-using cfp::KeypointLabel;
-
-// A box of 100 x 200 px with a person of 60 keypoints at 2.5 m before a wall; `chair`: 40 more at 1.5 m before the
-// person, all over the box.
-struct Scene {
-  std::vector<std::array<float, 2>> keypoints;
-  std::vector<float> depths;
-  std::vector<cfp::Detection<float>> detections{{{100, 100, 200, 300}, 0, 0.9F}};
-
-  Scene(cfp::Random& random, bool chair) {
-    const auto add = [&](std::size_t n, double depth_m) {
-      for (std::size_t i = 0; i < n; ++i) {
-        keypoints.push_back(
-            {static_cast<float>(random.uniform(105, 195)), static_cast<float>(random.uniform(105, 295))});
-        depths.push_back(static_cast<float>(depth_m + 0.05 * random.normal()));
-      }
-    };
-    add(60, 2.5);
-    add(30, 5.0);
-    if (chair) add(40, 1.5);
-  }
-  [[nodiscard]] cfp::Frame<float> frame(double timestamp_s) const {
-    cfp::Frame<float> out;
-    out.timestamp_s = timestamp_s;
-    out.keypoints = keypoints;
-    out.depths = depths;
-    out.detections = detections;
-    return out;
-  }
-};
+DynamicSceneOptions quiet() {
+  DynamicSceneOptions options;
+  options.pixel_noise_px = 0.1;
+  return options;
+}
 
 }  // namespace
 
-TEST_CASE("The depth of the person is remembered with the track", "[frame]") {
-  cfp::Random random(1, "label keypoints");
-  const Scene alone(random, false), covered(random, true);
-  cfp::StaticProbability probability(cfp::PinholeCamera<float>{525, 525, 320, 240});
-  const auto labels = [&](const Scene& scene, double timestamp_s) {
-    probability.coarse(scene.frame(timestamp_s));
-    return probability.state().label;
-  };
-  const auto all = [](const std::vector<KeypointLabel>& of, std::size_t first, std::size_t last, KeypointLabel l) {
-    return std::all_of(of.begin() + static_cast<std::ptrdiff_t>(first), of.begin() + static_cast<std::ptrdiff_t>(last),
-                       [l](KeypointLabel x) { return x == l; });
-  };
-  const auto first = labels(alone, 0.0), second = labels(covered, 1.0 / 30);
-  CHECK(all(first, 0, 60, KeypointLabel::foreground));
-  CHECK(all(first, 60, 90, KeypointLabel::background));
-  CHECK(all(second, 0, 60, KeypointLabel::foreground));
-  CHECK(all(second, 60, 130, KeypointLabel::background));
-  // After a reset the ids of the tracks begin anew, and nothing is known: the nearest layer is the person.
-  probability.reset();
-  const auto anew = labels(covered, 1.0);
-  CHECK(all(anew, 90, 130, KeypointLabel::foreground));
-  CHECK(all(anew, 0, 60, KeypointLabel::background));
+TEMPLATE_TEST_CASE("Moving people: their points get 0, points outside 1, the background in between", "[frame]", float,
+                   double) {
+  const DynamicScene<TestType> scene = make_dynamic_scene<TestType>(quiet(), 1);
+  FrameRun<TestType> run(scene);
+  const cfp::FrameReport result = run.coarse({});
+  CHECK(result.flow_model == cfp::FlowModelKind::fundamental);
+  CHECK(result.flow_support == cfp::FlowSupport::outside_pairs);
+  CHECK(result.unknown_objects == 0);
+  CHECK(result.outside + result.foreground + result.background == scene.keypoints.size());
+  for (const cfp::ObjectProbability& object : run.state.objects) CHECK(object.static_probability < 0.5);
+  std::size_t person = 0, person_as_foreground = 0, wall = 0, wall_as_background = 0;
+  for (std::size_t i = 0; i < scene.keypoints.size(); ++i) {
+    if (run.state.label[i] == KeypointLabel::outside) {
+      CHECK(run.state.static_probability[i] == 1);
+      CHECK(run.state.box[i] == cfp::no_box);
+      continue;
+    }
+    person += scene.is_person[i] ? 1 : 0;
+    wall += scene.is_person[i] ? 0 : 1;
+    person_as_foreground += scene.is_person[i] && run.state.label[i] == KeypointLabel::foreground ? 1 : 0;
+    wall_as_background += !scene.is_person[i] && run.state.label[i] == KeypointLabel::background ? 1 : 0;
+    if (run.state.label[i] == KeypointLabel::foreground) CHECK(run.state.static_probability[i] == 0);
+  }
+  CHECK(static_cast<double>(person_as_foreground) >= 0.97 * static_cast<double>(person));
+  CHECK(static_cast<double>(wall_as_background) >= 0.98 * static_cast<double>(wall));
+}
+
+TEST_CASE("People who stand still are low dynamic: their points keep O", "[frame]") {
+  DynamicSceneOptions options = quiet();
+  options.person_motion_m = 0;
+  FrameRun<double> run(make_dynamic_scene<double>(options, 2));
+  run.coarse();
+  REQUIRE(run.state.report.foreground > 150);
+  for (std::size_t i = 0; i < run.state.static_probability.size(); ++i) {
+    if (run.state.label[i] != KeypointLabel::foreground) continue;
+    const double o = run.state.objects[static_cast<std::size_t>(run.state.box[i])].static_probability;
+    CHECK(o > 0.9);
+    CHECK(run.state.static_probability[i] == o);
+  }
+}
+
+TEST_CASE("Each box's O and labels equal the equation groups called one by one", "[frame]") {
+  const DynamicScene<double> scene = make_dynamic_scene<double>({}, 3);
+  FrameRun<double> run(scene);
+  const cfp::FrameOptions options;
+  const cfp::Matrix3<double> F = cfp::fundamental_from_pose(scene.camera, scene.T_cur_prev);
+  cfp::Frame<double> frame = run.frame();
+  frame.fundamental = F;
+  const cfp::FrameReport result = run.coarse(options, frame, scene.camera);
+  CHECK(result.flow_support == cfp::FlowSupport::caller);
+  for (std::size_t b = 0; b < scene.boxes.size(); ++b) {
+    std::vector<double> distances, depths;
+    std::vector<std::size_t> members;
+    for (std::size_t i = 0; i < scene.keypoints.size(); ++i) {
+      const cfp::Vector2<double> prev(scene.previous_keypoints[i][0], scene.previous_keypoints[i][1]),
+          cur(scene.keypoints[i][0], scene.keypoints[i][1]);
+      if (!cfp::contains(scene.boxes[b], cur.x(), cur.y())) continue;
+      distances.push_back(cfp::epipolar_distance<double>(F, prev, cur));
+      depths.push_back(scene.depths[i]);
+      members.push_back(i);
+    }
+    std::vector<double> scratch(distances.size());
+    const auto o =
+        cfp::object_probability(cfp::span<const double>(distances), cfp::span<double>(scratch), options.coarse.object);
+    CHECK_THAT(run.state.objects[b].static_probability, WithinAbs(o.static_probability, 1e-9));
+    CHECK(run.state.objects[b].pairs == o.pairs);
+    std::vector<char> is_foreground(depths.size());
+    cfp::ForegroundWorkspace<double> work;
+    cfp::depth_foreground(cfp::span<const double>(depths), options.coarse.foreground, work,
+                          cfp::span<char>(is_foreground));
+    for (std::size_t j = 0; j < members.size(); ++j) {
+      const std::size_t i = members[j];
+      if (run.state.box[i] != static_cast<std::int32_t>(b)) continue;
+      const bool foreground = is_foreground[j] != 0;
+      CHECK((run.state.label[i] == KeypointLabel::foreground) == foreground);
+      CHECK_THAT(
+          run.state.static_probability[i],
+          WithinAbs(cfp::first_stage_probability(o.static_probability, foreground, options.object_threshold), 1e-9));
+    }
+  }
+}
+
+TEST_CASE("A keypoint in several boxes takes the smallest K, whatever the order of the boxes", "[frame]") {
+  DynamicSceneOptions options = quiet();
+  options.people = 1;
+  DynamicScene<double> scene = make_dynamic_scene<double>(options, 4);
+  scene.boxes.push_back({0, 0, 640, 480});
+  FrameRun<double> forward(scene);
+  forward.coarse({});
+  std::reverse(scene.boxes.begin(), scene.boxes.end());
+  FrameRun<double> backward(scene);
+  backward.coarse({});
+  CHECK(forward.state.static_probability == backward.state.static_probability);
+  CHECK(forward.state.label == backward.state.label);
+}
+
+TEST_CASE("Permuting the keypoints permutes the result", "[frame]") {
+  const DynamicScene<double> scene = make_dynamic_scene<double>({}, 5);
+  const cfp::Matrix3<double> F = cfp::fundamental_from_pose(scene.camera, scene.T_cur_prev);
+  FrameRun<double> run(scene);
+  cfp::Frame<double> frame = run.frame();
+  frame.fundamental = F;
+  run.coarse({}, frame, scene.camera);
+  std::vector<std::size_t> order(scene.keypoints.size());
+  std::iota(order.begin(), order.end(), std::size_t(0));
+  cfp::Random random(5, "permutation");
+  std::shuffle(order.begin(), order.end(), random);
+  DynamicScene<double> shuffled = scene;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    shuffled.keypoints[i] = scene.keypoints[order[i]];
+    shuffled.previous_keypoints[i] = scene.previous_keypoints[order[i]];
+    shuffled.depths[i] = scene.depths[order[i]];
+  }
+  FrameRun<double> permuted(shuffled);
+  cfp::Frame<double> permuted_frame = permuted.frame();
+  permuted_frame.fundamental = F;
+  permuted.coarse({}, permuted_frame, scene.camera);
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    CHECK(permuted.state.static_probability[i] == run.state.static_probability[order[i]]);
+    CHECK(permuted.state.label[i] == run.state.label[order[i]]);
+  }
+}
+
+TEST_CASE("A camera that only turns or rests judges people by a homography", "[frame]") {
+  for (const double rotation : {0.0, 0.02}) {
+    DynamicSceneOptions options = quiet();
+    options.translation_m = 0;
+    options.rotation_rad = rotation;
+    FrameRun<double> moving(make_dynamic_scene<double>(options, 6));
+    CHECK(moving.coarse({}).flow_model == cfp::FlowModelKind::homography);
+    for (const cfp::ObjectProbability& object : moving.state.objects) CHECK(object.static_probability < 0.5);
+    options.person_motion_m = 0;
+    FrameRun<double> still(make_dynamic_scene<double>(options, 6));
+    still.coarse({});
+    for (const cfp::ObjectProbability& object : still.state.objects) CHECK(object.static_probability > 0.9);
+    cfp::FrameOptions without;
+    without.coarse.flow.use_rotation_homography = false;
+    const cfp::FrameReport unknown = still.coarse(without);
+    CHECK(unknown.unknown_objects == 2);
+  }
+}
+
+TEST_CASE("Every ablation of the first stage is an option", "[frame]") {
+  FrameRun<double> run(make_dynamic_scene<double>(quiet(), 7));
+  SECTION("without the object stage every object is unknown") {
+    cfp::FrameOptions options;
+    options.coarse.use_object_probability = false;
+    const cfp::FrameReport report = run.coarse(options);
+    CHECK(report.unknown_objects == run.state.objects.size());
+    CHECK(report.unknown_objects == 2);
+    for (const cfp::ObjectProbability& object : run.state.objects)
+      CHECK(object.static_probability == options.coarse.object.unknown_object_probability);
+  }
+  SECTION("without depth clustering all in a box is foreground") {
+    cfp::FrameOptions options;
+    CHECK(run.coarse(options).background > 0);
+    options.coarse.use_depth_foreground = false;
+    CHECK(run.coarse(options).background == 0);
+    CHECK(run.state.report.foreground > 150);
+  }
+  SECTION("without a soft background it keeps 1") {
+    cfp::FrameOptions options;
+    options.coarse.soft_background = false;
+    run.coarse(options);
+    REQUIRE(run.state.report.background > 50);
+    for (std::size_t i = 0; i < run.state.static_probability.size(); ++i)
+      CHECK((run.state.static_probability[i] == 0 || run.state.static_probability[i] == 1));
+  }
+}
+
+TEST_CASE("A camera with zero distortion gives the pinhole's result", "[frame]") {
+  const DynamicScene<double> scene = make_dynamic_scene<double>({}, 8);
+  FrameRun<double> pinhole(scene), distorted(scene);
+  pinhole.coarse({});
+  distorted.coarse(
+      {}, distorted.frame(),
+      cfp::RadialTangentialCamera<double>{scene.camera.fx, scene.camera.fy, scene.camera.cx, scene.camera.cy});
+  for (std::size_t b = 0; b < pinhole.state.objects.size(); ++b) {
+    CHECK_THAT(distorted.state.objects[b].static_probability,
+               WithinAbs(pinhole.state.objects[b].static_probability, 1e-6));
+  }
+}
+
+TEMPLATE_TEST_CASE("The first stage survives hostile frames", "[frame]", float, double) {
+  using Limits = std::numeric_limits<TestType>;
+  const std::vector<TestType> hostile = {Limits::quiet_NaN(),  Limits::infinity(), -Limits::infinity(), TestType(0),
+                                         Limits::denorm_min(), Limits::max(),      TestType(-1)};
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    DynamicScene<TestType> scene = make_dynamic_scene<TestType>({}, 100 + seed);
+    cfp::Random random(seed, "hostile first stage");
+    const auto spoil = [&](TestType& x) {
+      if (random.uniform() < 0.2) x = hostile[random.index(static_cast<std::uint32_t>(hostile.size()))];
+    };
+    for (std::size_t i = 0; i < scene.keypoints.size(); ++i) {
+      for (TestType& x : scene.keypoints[i]) spoil(x);
+      for (TestType& x : scene.previous_keypoints[i]) spoil(x);
+      spoil(scene.depths[i]);
+    }
+    for (auto& box : scene.boxes) {
+      for (TestType* x : {&box.x1, &box.y1, &box.x2, &box.y2}) spoil(*x);
+    }
+    scene.boxes.push_back({TestType(600), TestType(400), TestType(100), TestType(100)});
+    FrameRun<TestType> run(scene);
+    run.coarse({});
+    for (std::size_t i = 0; i < run.state.static_probability.size(); ++i) {
+      CHECK((run.state.static_probability[i] >= 0 && run.state.static_probability[i] <= 1));
+      if (run.state.label[i] == KeypointLabel::invalid) CHECK(run.state.static_probability[i] == 0);
+    }
+    for (const auto& object : run.state.objects)
+      CHECK((object.static_probability >= 0 && object.static_probability <= 1));
+  }
+  FrameRun<TestType> empty{DynamicScene<TestType>{}};
+  CHECK(empty.coarse({}).outside == 0);
+}
+
+TEMPLATE_TEST_CASE("After a first call the stage allocates nothing and repeats its bits", "[frame]", float, double) {
+  FrameRun<TestType> run(make_dynamic_scene<TestType>({}, 9));
+  run.coarse({});
+  const std::vector<TestType> before = run.state.static_probability;
+  const cfp::FrameOptions options;
+  CHECK(cfp_test::allocations_in([&] { run.coarse(options); }) == 0);
+  CHECK(run.state.static_probability == before);
 }

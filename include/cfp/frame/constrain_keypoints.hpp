@@ -109,6 +109,7 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
   FrameScratch<Scalar>& scratch = state.scratch;
   state.posterior = state.static_probability;
   state.report.stage = Stage::fine;
+  state.report.constrained = 0;
   if (!options.fine.enabled) return;
 
   detail::gather_matches(state);

@@ -67,6 +67,8 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
   CFP_ASSERT(state.objects.size() == state.boxes.size());
   CFP_ASSERT(frame.object_of_keypoint.empty() || frame.object_of_keypoint.size() == state.size());
   FrameScratch<Scalar>& scratch = state.scratch;
+  FrameReport& report = state.report;
+  report.undecided_foregrounds = 0;
   scratch.members.reserve(state.size());
   scratch.depths.reserve(state.size());
   scratch.mask.reserve(state.size());
@@ -79,7 +81,7 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
     });
     if (!segmented && non_rigid && options.coarse.use_depth_foreground &&
         !detail::separate_foreground(state.boxes[b], options.coarse, state))
-      ++state.report.undecided_foregrounds;
+      ++report.undecided_foregrounds;
 
     const Scalar o = static_cast<Scalar>(state.objects[b].static_probability);
     const Scalar k_foreground = first_stage_probability(o, true, threshold);
@@ -97,12 +99,13 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
       state.box[i] = static_cast<std::int32_t>(b);
     }
   }
-  for (const KeypointLabel label : state.label) {
-    state.report.outside += label == KeypointLabel::outside ? 1U : 0U;
-    state.report.foreground += label == KeypointLabel::foreground ? 1U : 0U;
-    state.report.background += label == KeypointLabel::background ? 1U : 0U;
-    state.report.invalid += label == KeypointLabel::invalid ? 1U : 0U;
-  }
+  const auto count = [&](KeypointLabel label) {
+    return static_cast<std::size_t>(std::count(state.label.begin(), state.label.end(), label));
+  };
+  report.outside = count(KeypointLabel::outside);
+  report.foreground = count(KeypointLabel::foreground);
+  report.background = count(KeypointLabel::background);
+  report.invalid = count(KeypointLabel::invalid);
   state.posterior = state.static_probability;
 }
 

@@ -43,6 +43,7 @@ void match_in_boxes(const SE3<double>& T_cur_prev, span<const std::int32_t> matc
     state.match[i] = j >= 0 && static_cast<std::size_t>(j) < previous_size ? j : no_match;
   }
   FrameScratch<Scalar>& scratch = state.scratch;
+  state.report.matched_in_boxes = state.report.unmatched_foreground = 0;
   if (previous_size > 0 && !state.previous.descriptors.empty() && !state.current.descriptors.empty()) {
     scratch.members.clear();
     scratch.members.reserve(state.size());

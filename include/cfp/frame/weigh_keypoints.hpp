@@ -48,6 +48,7 @@ template <typename Scalar>
 void update_map_points(const FrameOptions& options, FrameState<Scalar>& state,
                        span<non_deduced<Scalar>> map_point_probability) noexcept {
   CFP_ASSERT(map_point_probability.size() == state.size());
+  state.report.deletable = 0;
   for (std::size_t i = 0; i < state.size(); ++i) {
     Scalar& m = map_point_probability[i];
     m = updated_map_point(i, m, options, state);

@@ -1,0 +1,315 @@
+#include "cfp/frame/constrain_keypoints.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "cfp/geometry/radial_tangential_camera.hpp"
+#include "support/allocation_counter.hpp"
+#include "support/catch.hpp"
+#include "support/frame_runs.hpp"
+
+using cfp::KeypointLabel;
+using cfp_test::DynamicScene;
+using cfp_test::DynamicSceneOptions;
+using cfp_test::make_dynamic_scene;
+
+namespace {
+
+/// A frame after stage 1.
+template <typename Scalar>
+struct FineRun : cfp_test::FrameRun<Scalar> {
+  explicit FineRun(DynamicScene<Scalar> s) : cfp_test::FrameRun<Scalar>(std::move(s)) { this->coarse(); }
+};
+
+/// One half of the true order: the share of (static, moving) pairs of in-box keypoints that K ranks rightly.
+template <typename Scalar>
+double ranked_rightly(const FineRun<Scalar>& run) {
+  double right = 0, pairs = 0;
+  for (std::size_t i = 0; i < run.state.static_probability.size(); ++i) {
+    if (run.state.label[i] == KeypointLabel::outside || !run.scene.is_static[i] || run.scene.match[i] < 0) continue;
+    for (std::size_t j = 0; j < run.state.static_probability.size(); ++j) {
+      if (run.state.label[j] == KeypointLabel::outside || run.scene.is_static[j] || run.scene.match[j] < 0) continue;
+      right += run.state.static_probability[i] > run.state.static_probability[j]
+                   ? 1
+                   : (run.state.static_probability[i] == run.state.static_probability[j] ? 0.5 : 0);
+      pairs += 1;
+    }
+  }
+  return right / pairs;
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("K after the second stage separates what moves in a box from what does not", "[frame]", float,
+                   double) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    FineRun<TestType> run(make_dynamic_scene<TestType>({}, seed));
+    const cfp::FrameReport result = run.fine({});
+    CHECK(result.projection.status == cfp::Status::ok);
+    CHECK(result.epipolar.status == cfp::Status::ok);
+    CHECK(result.constrained > 100);
+    CHECK(ranked_rightly(run) >= 0.95);
+  }
+}
+
+TEST_CASE("Every K, M and weight equals the scalar formulas applied one keypoint at a time", "[frame]") {
+  FineRun<double> run(make_dynamic_scene<double>({}, 11));
+  run.state.boxes[1].associated = false;
+  for (std::size_t i = 0; i < run.m.size(); i += 3) run.m[i] = 0.4;
+  for (std::size_t i = 0; i < run.m.size(); i += 7) run.m[i] = -1;
+  const std::vector<double> first_k = run.state.static_probability, first_m = run.m;
+  const cfp::FrameOptions options;
+  const cfp::FrameReport result = run.fine(options);
+
+  const auto& scene = run.scene;
+  const std::size_t n = scene.keypoints.size();
+  const cfp::Matrix3<double> F = cfp::fundamental_from_pose(scene.camera, scene.T_cur_prev);
+  std::vector<double> dt(n, -1), df(n, -1), outside_t, outside_f;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (scene.match[i] < 0) continue;
+    const cfp::Vector2<double> prev(scene.previous_keypoints[i][0], scene.previous_keypoints[i][1]),
+        cur(scene.keypoints[i][0], scene.keypoints[i][1]);
+    dt[i] = cfp::reprojection_distance<cfp::PinholeCamera<double>, double>(scene.camera, scene.T_cur_prev, prev,
+                                                                           scene.previous_depths[i], cur);
+    df[i] = cfp::epipolar_distance<double>(F, prev, cur);
+    if (run.state.label[i] != KeypointLabel::outside) continue;
+    outside_t.push_back(dt[i]);
+    outside_f.push_back(df[i]);
+  }
+  std::vector<double> scratch(n);
+  const auto projection =
+      cfp::fit_constraint(cfp::span<const double>(outside_t), cfp::span<double>(scratch), options.fine.projection);
+  const auto epipolar =
+      cfp::fit_constraint(cfp::span<const double>(outside_f), cfp::span<double>(scratch), options.fine.epipolar);
+  const double cs = cfp::statistical_confidence<double>(run.pose.inliers, 10);
+  CHECK_THAT(result.projection.threshold_px, WithinAbs(projection.threshold_px, 1e-9));
+  CHECK_THAT(result.epipolar.confidence, WithinAbs(cs * epipolar.calculation_confidence, 1e-9));
+  for (std::size_t i = 0; i < n; ++i) {
+    double k = first_k[i];
+    if (run.state.box[i] >= 0) {
+      const auto b = static_cast<std::size_t>(run.state.box[i]);
+      cfp::SecondStageKeypoint<double> p;
+      p.projection = {cfp::static_probability(projection, dt[i]), cs * projection.calculation_confidence, dt[i] >= 0};
+      p.epipolar = {cfp::static_probability(epipolar, df[i]), cs * epipolar.calculation_confidence, df[i] >= 0};
+      p.object_probability = run.state.objects[b].static_probability;
+      p.map_point_probability = first_m[i] >= 0 ? first_m[i] : 1;
+      p.foreground = run.state.label[i] == KeypointLabel::foreground;
+      p.matched = scene.match[i] >= 0;
+      p.box_associated = run.state.boxes[b].associated;
+      k = cfp::second_stage_probability(p, 0.9);
+    }
+    INFO("keypoint " << i);
+    CHECK_THAT(run.state.static_probability[i], WithinAbs(k, 1e-9));
+    const double m = first_m[i] >= 0 ? cfp::updated_map_point(first_m[i], k, options.map_point) : first_m[i];
+    CHECK_THAT(run.m[i], WithinAbs(m, 1e-9));
+    const double weight = m < 0 ? k : (cfp::is_mismatch(k, m, options.map_point) ? 0 : k * m);
+    CHECK_THAT(run.state.weight[i], WithinAbs(weight, 1e-9));
+  }
+}
+
+TEST_CASE("Too little translation leaves the projection constraint alone", "[frame]") {
+  DynamicSceneOptions scene;
+  scene.translation_m = 0.004;
+  FineRun<double> run(make_dynamic_scene<double>(scene, 12));
+  const cfp::FrameReport result = run.fine({});
+  CHECK(result.epipolar.status == cfp::Status::degenerate);
+  CHECK(result.projection.status == cfp::Status::ok);
+  CHECK(result.epipolar.confidence == 0);
+  cfp::FrameOptions by_parallax;
+  by_parallax.fine.min_translation_m = 0;
+  by_parallax.fine.min_parallax = 0.01;
+  FineRun<double> again(make_dynamic_scene<double>(scene, 12));
+  CHECK(again.fine(by_parallax).epipolar.status == cfp::Status::degenerate);
+  by_parallax.fine.min_parallax = 1e-5;
+  CHECK(again.fine(by_parallax).epipolar.status == cfp::Status::ok);
+}
+
+TEST_CASE("Without enough keypoints outside the boxes the first stage's K stays", "[frame]") {
+  DynamicSceneOptions options;
+  options.wall_points = 5;
+  FineRun<double> run(make_dynamic_scene<double>(options, 13));
+  const std::vector<double> before = run.state.static_probability;
+  const cfp::FrameReport result = run.fine({});
+  CHECK(result.projection.status == cfp::Status::not_enough_data);
+  CHECK(result.constrained == 0);
+  CHECK(run.state.static_probability == before);
+}
+
+TEST_CASE("Disabled, the second stage keeps K and still updates M and the weights", "[frame]") {
+  FineRun<double> run(make_dynamic_scene<double>({}, 14));
+  const std::vector<double> before = run.state.static_probability;
+  cfp::FrameOptions options;
+  options.fine.enabled = false;
+  run.fine(options);
+  CHECK(run.state.static_probability == before);
+  for (std::size_t i = 0; i < run.state.static_probability.size(); ++i)
+    CHECK(run.m[i] == cfp::updated_map_point(1.0, before[i], options.map_point));
+}
+
+TEST_CASE("The posterior is K with M of before as its prior, where a match says anything", "[frame]") {
+  FineRun<double> run(make_dynamic_scene<double>({}, 14));
+  for (std::size_t i = 0; i < run.m.size(); ++i) run.m[i] = i % 5 == 0 ? -1 : (run.scene.is_static[i] ? 0.9 : 0.1);
+  const std::vector<double> m = run.m;
+  const cfp::FrameOptions options;
+  run.fine(options);
+  std::size_t changed = 0;
+  for (std::size_t i = 0; i < m.size(); ++i) {
+    const double k = run.state.static_probability[i], posterior = run.state.posterior[i];
+    const bool applies = run.state.label[i] != KeypointLabel::outside && run.scene.match[i] >= 0 && m[i] >= 0;
+    CHECK(posterior == (applies ? cfp::posterior_probability(k, m[i], options.map_point) : k));
+    changed += posterior != k ? 1U : 0U;
+    // Apart from the bound on evidence, M of 0.9 raises K and M of 0.1 lowers it.
+    if (applies && run.scene.is_static[i]) CHECK(posterior >= (std::min)(k, 0.99));
+    if (applies && !run.scene.is_static[i]) CHECK(posterior <= (std::max)(k, 0.02));
+  }
+  CHECK(changed > 50);
+}
+
+TEST_CASE("In the posterior, a match that no constraint can judge keeps M", "[frame]") {
+  FineRun<double> run(make_dynamic_scene<double>({}, 15));
+  cfp::FrameOptions options;
+  options.fine.min_translation_m = 1e6;  // no epipolar constraint
+  std::size_t silent = 0;
+  for (std::size_t i = 0; i < run.m.size(); ++i) {
+    run.m[i] = 0.7;
+    const bool inside = run.state.label[i] != KeypointLabel::outside && run.scene.match[i] >= 0;
+    if (inside && i % 2 == 0)
+      run.scene.previous_depths[static_cast<std::size_t>(run.scene.match[i])] = 0;  // and no projection
+    silent += inside && i % 2 == 0 ? 1U : 0U;
+  }
+  run.state.boxes[1].associated = false;
+  run.fine(options);
+  REQUIRE(silent > 20);
+  for (std::size_t i = 0; i < run.m.size(); ++i) {
+    if (run.state.label[i] == KeypointLabel::outside || run.scene.match[i] < 0 || i % 2 != 0) continue;
+    const bool came_from_nowhere = run.state.box[i] == 1 && run.state.label[i] == KeypointLabel::foreground;
+    CHECK(run.state.posterior[i] == Approx(came_from_nowhere ? 0 : 0.7));
+  }
+}
+
+TEST_CASE("Keypoints outside all boxes keep K = 1", "[frame]") {
+  FineRun<float> run(make_dynamic_scene<float>({}, 15));
+  run.fine({});
+  for (std::size_t i = 0; i < run.state.static_probability.size(); ++i) {
+    if (run.state.label[i] == KeypointLabel::outside) CHECK(run.state.static_probability[i] == 1);
+  }
+}
+
+TEST_CASE("Scaling the scene scales nothing but the translation threshold", "[frame]") {
+  FineRun<double> run(make_dynamic_scene<double>({}, 16));
+  run.fine({});
+  FineRun<double> scaled(make_dynamic_scene<double>({}, 16));
+  for (double& z : scaled.scene.previous_depths) z *= 4;
+  scaled.pose.T_cur_prev.translation *= 4;
+  scaled.fine({});
+  for (std::size_t i = 0; i < run.state.static_probability.size(); ++i)
+    CHECK_THAT(scaled.state.static_probability[i], WithinAbs(run.state.static_probability[i], 1e-9));
+}
+
+TEST_CASE("Float agrees with double", "[frame]") {
+  FineRun<double> exact(make_dynamic_scene<double>({}, 17));
+  exact.fine({});
+  FineRun<float> single(make_dynamic_scene<float>({}, 17));
+  single.fine({});
+  double worst = 0;
+  for (std::size_t i = 0; i < exact.state.static_probability.size(); ++i) {
+    // O of an object decides between two formulas: compare where both took the same.
+    if (exact.state.label[i] != single.state.label[i]) continue;
+    worst = std::max(
+        worst, std::abs(exact.state.static_probability[i] - static_cast<double>(single.state.static_probability[i])));
+  }
+  CHECK(worst < 0.01);
+}
+
+TEST_CASE("A camera with zero distortion gives the pinhole's result in the second stage", "[frame]") {
+  FineRun<double> pinhole(make_dynamic_scene<double>({}, 18)), distorted(make_dynamic_scene<double>({}, 18));
+  pinhole.fine({});
+  const auto& c = pinhole.scene.camera;
+  distorted.fine({}, cfp::RadialTangentialCamera<double>{c.fx, c.fy, c.cx, c.cy});
+  for (std::size_t i = 0; i < pinhole.state.static_probability.size(); ++i)
+    CHECK_THAT(distorted.state.static_probability[i], WithinAbs(pinhole.state.static_probability[i], 1e-6));
+}
+
+TEMPLATE_TEST_CASE("The second stage survives hostile frames and poses", "[frame]", float, double) {
+  using Limits = std::numeric_limits<TestType>;
+  const std::vector<TestType> hostile = {Limits::quiet_NaN(),  Limits::infinity(), -Limits::infinity(), TestType(0),
+                                         Limits::denorm_min(), Limits::max(),      TestType(-1)};
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    FineRun<TestType> run(make_dynamic_scene<TestType>({}, 200 + seed));
+    cfp::Random random(seed, "hostile second stage");
+    const auto spoil = [&](TestType& x) {
+      if (random.uniform() < 0.2) x = hostile[random.index(static_cast<std::uint32_t>(hostile.size()))];
+    };
+    for (std::size_t i = 0; i < run.state.static_probability.size(); ++i) {
+      for (TestType& x : run.scene.keypoints[i]) spoil(x);
+      for (TestType& x : run.scene.previous_keypoints[i]) spoil(x);
+      spoil(run.scene.previous_depths[i]);
+      spoil(run.m[i]);
+      if (random.uniform() < 0.1) run.scene.match[i] = random.uniform() < 0.5 ? -7 : 1 << 30;
+    }
+    if (seed % 3 == 1) run.pose.T_cur_prev.translation[seed % 2] = std::numeric_limits<double>::quiet_NaN();
+    if (seed % 3 == 2) run.pose.T_cur_prev.rotation.setConstant(1e300);
+    run.fine({});
+    for (std::size_t i = 0; i < run.state.static_probability.size(); ++i) {
+      CHECK((run.state.static_probability[i] >= 0 && run.state.static_probability[i] <= 1));
+      CHECK((run.state.weight[i] >= 0 && run.state.weight[i] <= 1));
+      CHECK((!(run.m[i] >= 0) || run.m[i] <= 1));
+    }
+  }
+}
+
+TEMPLATE_TEST_CASE("After a first call the second stage allocates nothing and repeats its bits", "[frame]", float,
+                   double) {
+  FineRun<TestType> run(make_dynamic_scene<TestType>({}, 19));
+  const std::vector<TestType> k = run.state.static_probability, m = run.m;
+  run.fine({});
+  const std::vector<TestType> after = run.state.static_probability;
+  run.state.static_probability = k;
+  run.m = m;
+  const cfp::FrameOptions options;
+  CHECK(cfp_test::allocations_in([&] { run.fine(options); }) == 0);
+  CHECK(run.state.static_probability == after);
+}
+
+TEST_CASE("Both stages through a lens equal both stages through the pinhole on undistorted pixels", "[frame]") {
+  const cfp_test::DynamicScene<double> straight = make_dynamic_scene<double>({}, 20);
+  const auto& c = straight.camera;
+  const cfp::RadialTangentialCamera<double> lens{c.fx, c.fy, c.cx, c.cy, 0.12, -0.2, 0.001, -0.0015, 0.05};
+  cfp_test::DynamicScene<double> bent = straight;
+  const auto distort = [&](std::vector<std::array<double, 2>>& points) {
+    for (auto& point : points) {
+      cfp::Vector3<double> ray = cfp::Vector3<double>::Zero();
+      cfp::Vector2<double> pixel(point[0], point[1]);
+      REQUIRE(c.unproject(pixel, ray));
+      REQUIRE(lens.project(ray, pixel));
+      point = {pixel.x(), pixel.y()};
+    }
+  };
+  distort(bent.keypoints);
+  distort(bent.previous_keypoints);
+  cfp_test::FrameRun<double> pinhole(straight), through_lens(bent);
+  // The boxes bend, too: membership is given so that both runs have the same keypoints on each person.
+  std::vector<std::int32_t> object(straight.keypoints.size(), cfp::no_object);
+  for (std::size_t i = 0; i < object.size(); ++i) {
+    for (std::size_t b = 0; b < straight.boxes.size(); ++b) {
+      if (cfp::contains(straight.boxes[b], straight.keypoints[i][0], straight.keypoints[i][1]))
+        object[i] = static_cast<std::int32_t>(b);
+    }
+  }
+  cfp::Frame<double> frame = pinhole.frame(), bent_frame = through_lens.frame();
+  frame.object_of_keypoint = bent_frame.object_of_keypoint = object;
+  frame.fundamental = bent_frame.fundamental = cfp::fundamental_from_pose(c, straight.T_cur_prev);
+  pinhole.coarse({}, frame, c);
+  through_lens.coarse({}, bent_frame, lens);
+  CHECK(pinhole.state.label == through_lens.state.label);
+  CHECK(pinhole.state.report.foreground > 200);
+  pinhole.fine({}, c);
+  const cfp::FrameReport report = through_lens.fine({}, lens);
+  CHECK_THAT(report.projection.threshold_px, WithinAbs(pinhole.state.report.projection.threshold_px, 0.1));
+  CHECK_THAT(report.epipolar.threshold_px, WithinAbs(pinhole.state.report.epipolar.threshold_px, 1e-6));
+  // d^T is measured among distorted pixels, so that K agrees up to the lens' magnification.
+  for (std::size_t i = 0; i < object.size(); ++i) CHECK_THAT(through_lens.k(i), WithinAbs(pinhole.k(i), 0.15));
+}

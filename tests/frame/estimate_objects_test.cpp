@@ -1,0 +1,87 @@
+#include "cfp/frame/estimate_objects.hpp"
+
+#include <array>
+#include <vector>
+
+#include "cfp/geometry/radial_tangential_camera.hpp"
+#include "support/catch.hpp"
+#include "support/frame_runs.hpp"
+
+using cfp_test::DynamicScene;
+using cfp_test::FrameRun;
+using cfp_test::make_dynamic_scene;
+
+TEST_CASE("The host's F is taken as it is", "[frame]") {
+  const DynamicScene<double> scene = make_dynamic_scene<double>({}, 61);
+  FrameRun<double> run(scene);
+  cfp::Frame<double> frame = run.frame();
+  frame.fundamental = cfp::fundamental_from_pose(scene.camera, scene.T_cur_prev);
+  const cfp::FrameReport report = run.coarse({}, frame, scene.camera);
+  CHECK(report.flow_model == cfp::FlowModelKind::fundamental);
+  CHECK(report.flow_support == cfp::FlowSupport::caller);
+  CHECK(report.unknown_objects == 0);
+  // An F of another motion judges another way.
+  frame.fundamental = cfp::fundamental_from_pose(scene.camera, scene.T_cur_prev.inverse());
+  const std::vector<cfp::ObjectProbability> objects = run.state.objects;
+  run.coarse({}, frame, scene.camera);
+  CHECK(run.state.objects[0].static_probability != objects[0].static_probability);
+}
+
+TEST_CASE("Through a lens O is measured in the undistorted image", "[frame]") {
+  const DynamicScene<double> straight = make_dynamic_scene<double>({}, 62);
+  const auto& c = straight.camera;
+  const cfp::RadialTangentialCamera<double> lens{c.fx, c.fy, c.cx, c.cy, 0.15, -0.25, 0.002, -0.001, 0.1};
+  std::vector<std::array<double, 2>> previous, current;
+  const auto bend = [&](const std::array<double, 2>& point) {
+    cfp::Vector3<double> ray = cfp::Vector3<double>::Zero();
+    cfp::Vector2<double> pixel(point[0], point[1]);
+    REQUIRE(c.unproject(pixel, ray));
+    REQUIRE(lens.project(ray, pixel));
+    return std::array<double, 2>{pixel.x(), pixel.y()};
+  };
+  for (const auto& point : straight.previous_keypoints) previous.push_back(bend(point));
+  for (const auto& point : straight.keypoints) current.push_back(bend(point));
+  // Labels, so that the same pairs lie on each person whatever the lens does to the boxes: one cell per pixel.
+  FrameRun<double> plain(straight), bent(straight);
+  cfp::Frame<double> frame = plain.frame(), bent_frame = bent.frame();
+  bent_frame.flow = {previous, current};
+  frame.fundamental = bent_frame.fundamental = cfp::fundamental_from_pose(c, straight.T_cur_prev);
+  const auto whole_image = [](FrameRun<double>& run) { run.scene.boxes = {{-100, -100, 900, 700}}; };
+  whole_image(plain);
+  whole_image(bent);
+  plain.coarse({}, frame, c);
+  bent.coarse({}, bent_frame, lens);
+  CHECK(bent.state.objects[0].pairs == plain.state.objects[0].pairs);
+  CHECK_THAT(bent.state.objects[0].static_probability, WithinAbs(plain.state.objects[0].static_probability, 1e-6));
+  // Taken for a pinhole's, the bent pixels are off their lines.
+  FrameRun<double> wrong(straight);
+  whole_image(wrong);
+  wrong.coarse({}, bent_frame, c);
+  CHECK(wrong.state.objects[0].static_probability < plain.state.objects[0].static_probability - 0.01);
+}
+
+TEST_CASE("With a label image, the pairs on an object are those on its label", "[frame]") {
+  const DynamicScene<double> scene = make_dynamic_scene<double>({}, 63);
+  std::vector<std::uint8_t> pixels(640 * 480, 0);
+  std::size_t labelled = 0;
+  for (std::size_t i = 0; i < scene.keypoints.size(); ++i) {
+    if (!scene.is_person[i]) continue;
+    const auto x = static_cast<std::size_t>(scene.keypoints[i][0] + 0.5),
+               y = static_cast<std::size_t>(scene.keypoints[i][1] + 0.5);
+    pixels[y * 640 + x] = cfp::contains(scene.boxes[0], scene.keypoints[i][0], scene.keypoints[i][1]) ? 1 : 2;
+  }
+  FrameRun<double> run(scene);
+  cfp::Frame<double> frame = run.frame();
+  frame.labels = {pixels.data(), 640, 480, 640};
+  const cfp::FrameReport report = run.coarse({}, frame, scene.camera);
+  for (std::size_t i = 0; i < scene.keypoints.size(); ++i) {
+    const int label = cfp::label_at(frame.labels, scene.keypoints[i][0], scene.keypoints[i][1]);
+    CHECK((run.label(i) == cfp::KeypointLabel::foreground) == (label > 0));
+    CHECK(run.state.box[i] == label - 1);
+    labelled += label > 0 ? 1U : 0U;
+  }
+  CHECK(labelled > 200);
+  CHECK(run.state.objects[0].pairs + run.state.objects[1].pairs == labelled);
+  CHECK(report.foreground == labelled);
+  CHECK(report.background == 0);
+}

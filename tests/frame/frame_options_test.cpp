@@ -1,0 +1,42 @@
+#include "cfp/frame/frame_options.hpp"
+
+#include "support/catch.hpp"
+#include "support/frame_runs.hpp"
+
+TEST_CASE("Frame options outside their range are named by their whole path", "[frame]") {
+  cfp::FrameOptions options;
+  CHECK(!cfp::invalid_field(options));
+  options.object_threshold = 1;
+  CHECK_THROWS_WITH(cfp::validate(options), Catch::Matchers::Contains("object_threshold"));
+  const auto named = [](auto&& change) {
+    cfp::FrameOptions changed;
+    change(changed);
+    return cfp::invalid_field(changed).string();
+  };
+  CHECK(named([](auto& o) { o.coarse.flow.ransac.confidence = 2; }) == "coarse.flow.ransac.confidence");
+  CHECK(named([](auto& o) { o.fine.min_parallax = -1; }) == "fine.min_parallax");
+  CHECK(named([](auto& o) { o.fine.epipolar.quantile = 2; }) == "fine.epipolar.quantile");
+  CHECK(named([](auto& o) { o.fine.matching.max_ratio = 0; }) == "fine.matching.max_ratio");
+  CHECK(named([](auto& o) { o.tracker.max_coast = -1; }) == "tracker.max_coast");
+  CHECK(named([](auto& o) { o.map_point.rate = 0; }) == "map_point.rate");
+  CHECK(named([](auto& o) { o.health.min_effective_points = -1; }) == "health.min_effective_points");
+  CHECK(named([](auto& o) { o.min_inlier_weight = 1; }) == "min_inlier_weight");
+  CHECK(named([](auto& o) { o.min_creation_probability = -0.1; }) == "min_creation_probability");
+  CHECK(named([](auto& o) { o.classes.clear(); }) == "classes");
+}
+
+TEST_CASE("Variants without the object stage hold for every unknown_object_probability", "[frame]") {
+  const auto scene = cfp_test::make_dynamic_scene<double>({}, 75);
+  for (const cfp::Variant variant : {cfp::Variant::only_boxes, cfp::Variant::no_ksp, cfp::Variant::cfp_minus}) {
+    INFO(cfp::to_string(variant));
+    cfp::FrameOptions base;
+    base.coarse.object.unknown_object_probability = 0.95;
+    const cfp::FrameOptions options = cfp::variant_options(variant, base);
+    cfp_test::FrameRun<double> run(scene);
+    run.coarse(options);
+    REQUIRE(run.state.report.foreground > 100);
+    for (std::size_t i = 0; i < run.m.size(); ++i) {
+      if (run.label(i) == cfp::KeypointLabel::foreground) CHECK(run.k(i) == 0);
+    }
+  }
+}

@@ -1,0 +1,334 @@
+#include "cfp/frame/static_probability.hpp"
+
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "cfp/core/random.hpp"
+#include "support/allocation_counter.hpp"
+#include "support/catch.hpp"
+#include "support/frame_runs.hpp"
+
+using cfp::KeypointLabel;
+using cfp::Stage;
+using cfp_test::DynamicScene;
+using cfp_test::make_dynamic_scene;
+
+namespace {
+
+/// Feeds pairs of frames: the previous one first, so that matches index into it. The pose solver knows the truth.
+struct Host {
+  explicit Host(const DynamicScene<double>& s, const cfp::FrameOptions& options = {})
+      : scene(s), probability(s.camera, options), m(s.keypoints.size(), 1.0) {
+    detect();
+  }
+  void detect() {
+    detections.clear();
+    for (const auto& box : scene.boxes) detections.push_back({box, 0, 0.8});
+  }
+  cfp::Frame<double> previous() {
+    cfp::Frame<double> frame;
+    frame.timestamp_s = time += 1.0 / 30;
+    frame.keypoints = scene.previous_keypoints;
+    frame.depths = scene.previous_depths;
+    frame.detections = detections;
+    return frame;
+  }
+  cfp::Frame<double> current() {
+    cfp::Frame<double> frame = previous();
+    frame.keypoints = scene.keypoints;
+    frame.depths = scene.depths;
+    frame.flow = {scene.previous_keypoints, scene.keypoints};
+    return frame;
+  }
+  cfp::StageResult<double> both() {
+    probability.coarse(previous());
+    cfp::Frame<double> frame = current();
+    frame.map_point_probability = m;
+    coarse = probability.coarse(frame).report;
+    return probability.fine({scene.T_cur_prev, 300}, scene.match, m);
+  }
+
+  DynamicScene<double> scene;
+  cfp::StaticProbability<cfp::PinholeCamera<double>> probability;
+  std::vector<cfp::Detection<double>> detections;
+  std::vector<double> m;
+  cfp::FrameReport coarse;
+  double time = 1341846434.0;
+};
+
+std::vector<double> copy(cfp::span<const double> values) { return {values.begin(), values.end()}; }
+
+}  // namespace
+
+TEST_CASE("Two calls take the weight from people who walk and leave it to the wall", "[frame]") {
+  Host host(make_dynamic_scene<double>({}, 31));
+  const auto result = host.both();
+  CHECK(host.coarse.stage == Stage::coarse);
+  CHECK(host.coarse.foreground > 150);
+  CHECK(host.coarse.unknown_objects == 0);
+  CHECK(result.report.stage == Stage::fine);
+  CHECK(result.report.time == cfp::Status::ok);
+  CHECK(result.report.constrained > 100);
+  CHECK(result.report.health.fallback == cfp::WeightFallback::none);
+  CHECK(host.probability.state().boxes.size() == 2);
+  CHECK(host.probability.state().boxes[0].associated);
+  double person = 0, wall = 0, people = 0, walls = 0;
+  for (std::size_t i = 0; i < result.weight.size(); ++i) {
+    (host.scene.is_person[i] ? person : wall) += result.weight[i];
+    (host.scene.is_person[i] ? people : walls) += 1;
+  }
+  CHECK(person / people < 0.02);
+  CHECK(wall / walls > 0.8);
+}
+
+TEST_CASE("The two calls equal the steps called one by one", "[frame]") {
+  Host host(make_dynamic_scene<double>({}, 32));
+  const auto result = host.both();
+  const auto run = cfp_test::run_stages(host.scene);
+  CHECK(copy(result.static_probability) == run.state.static_probability);
+  CHECK(copy(result.weight) == run.state.weight);
+  CHECK(host.m == run.m);
+}
+
+TEST_CASE("A frame without `fine` needs no care: matches index the frame of the coarse call before", "[frame]") {
+  const DynamicScene<double> scene = make_dynamic_scene<double>({}, 33);
+  Host steady(scene), troubled(scene);
+  // A frame with other keypoints, after which the host's solver threw.
+  cfp::Frame<double> lost = troubled.previous();
+  const auto other = make_dynamic_scene<double>({}, 34);
+  lost.keypoints = other.keypoints;
+  lost.depths = other.depths;
+  troubled.probability.coarse(lost);
+  steady.probability.coarse(steady.previous());
+  const auto expected = copy(steady.both().static_probability);
+  CHECK(copy(troubled.both().static_probability) == expected);
+}
+
+TEST_CASE("Without a frame before, and without matches, stage 1 stands", "[frame]") {
+  const DynamicScene<double> scene = make_dynamic_scene<double>({}, 35);
+  Host host(scene);
+  const auto coarse = host.probability.coarse(host.current());
+  const std::vector<double> k = copy(coarse.static_probability), weight = copy(coarse.weight);
+  auto fine = host.probability.fine({scene.T_cur_prev, 300}, scene.match, host.m);
+  CHECK(fine.report.stage == Stage::coarse);
+  CHECK(copy(fine.static_probability) == k);
+  CHECK(copy(fine.weight) == weight);
+  CHECK(host.m == std::vector<double>(host.m.size(), 1.0));
+  host.probability.coarse(host.current());
+  fine = host.probability.fine({scene.T_cur_prev, 300}, {}, host.m);
+  CHECK(fine.report.stage == Stage::coarse);
+  CHECK(fine.report.unmatched_foreground == fine.report.foreground);
+  host.probability.reset();
+  host.probability.coarse(host.current());
+  CHECK(host.probability.fine({scene.T_cur_prev, 300}, scene.match).report.stage == Stage::coarse);
+}
+
+TEST_CASE("Weights of matches made later: motion model, then local map", "[frame]") {
+  const DynamicScene<double> scene = make_dynamic_scene<double>({}, 36);
+  Host host(scene);
+  host.probability.coarse(host.previous());
+  const std::vector<double> k = copy(host.probability.coarse(host.current()).static_probability);
+  std::vector<double> m(k.size());
+  for (std::size_t i = 0; i < m.size(); ++i) m[i] = i % 4 == 0 ? -1.0 : 0.25 * static_cast<double>(1 + i % 4);
+  const auto weights = copy(host.probability.weights(m));
+  for (std::size_t i = 0; i < m.size(); ++i) {
+    CHECK(weights[i] == (m[i] < 0 ? k[i] : k[i] * m[i]));
+    CHECK(host.probability.weight(i, m[i]) == weights[i]);
+  }
+  const auto fine = host.probability.fine({scene.T_cur_prev, 300}, scene.match, m);
+  for (std::size_t i = 0; i < m.size(); ++i) CHECK(host.probability.weight(i, m[i]) == fine.weight[i]);
+  // A map point that joins after `fine` learns as the others did, and gets the weight that they would get.
+  const auto joined = static_cast<std::size_t>(
+      std::find(host.probability.state().label.begin(), host.probability.state().label.end(), KeypointLabel::outside) -
+      host.probability.state().label.begin());
+  const double learnt = host.probability.updated_map_point(joined, 0.6);
+  CHECK(learnt > 0.6);
+  CHECK(host.probability.weight(joined, learnt) == learnt);
+  CHECK(host.probability.may_create_map_point(joined));
+}
+
+TEST_CASE("A host that matches map points only loses people's keypoints, unless it hands over descriptors", "[frame]") {
+  cfp_test::DynamicSceneOptions options;
+  options.person_motion_m = 0;  // they stand, and are worth having
+  options.pixel_noise_px = 0.2;
+  const DynamicScene<double> scene = make_dynamic_scene<double>(options, 37);
+  cfp::Random random(37, "descriptors");
+  std::vector<std::uint8_t> previous, current;  // 32 bytes each, with a few bits of noise
+  for (std::size_t i = 0; i < 32 * scene.keypoints.size(); ++i) {
+    previous.push_back(static_cast<std::uint8_t>(random.index(256)));
+    current.push_back(previous.back() ^ static_cast<std::uint8_t>(random.index(20) == 0 ? 1 : 0));
+  }
+  std::vector<std::int32_t> match = scene.match;
+  std::size_t people = 0;
+  const auto run = [&](bool with_descriptors) {
+    Host host(scene);
+    cfp::Frame<double> before = host.previous(), now = host.current();
+    if (with_descriptors) {
+      before.descriptors = {previous.data(), scene.keypoints.size(), 32, 32};
+      now.descriptors = {current.data(), scene.keypoints.size(), 32, 32};
+    }
+    host.probability.coarse(before);
+    host.probability.coarse(now);
+    for (std::size_t i = 0; i < match.size(); ++i) {
+      if (host.probability.state().box[i] != cfp::no_box) match[i] = cfp::no_match;
+    }
+    const auto fine = host.probability.fine({scene.T_cur_prev, 300}, match);
+    double k = 0;
+    people = 0;
+    for (std::size_t i = 0; i < match.size(); ++i) {
+      if (host.probability.state().label[i] != KeypointLabel::foreground) continue;
+      k += fine.static_probability[i];
+      ++people;
+    }
+    return std::pair(fine.report, k / static_cast<double>(people));
+  };
+  const auto [silent, k_without] = run(false);
+  CHECK(silent.unmatched_foreground == people);
+  CHECK(silent.matched_in_boxes == 0);
+  CHECK(k_without == 0);
+  const auto [report, k_with] = run(true);
+  CHECK(static_cast<double>(report.unmatched_foreground) < 0.05 * static_cast<double>(people));
+  CHECK(static_cast<double>(report.matched_in_boxes) > 0.95 * static_cast<double>(people));
+  CHECK(k_with > 0.7);
+}
+
+TEST_CASE("An object index per keypoint replaces boxes and depths", "[frame]") {
+  const DynamicScene<double> scene = make_dynamic_scene<double>({}, 38);
+  Host host(scene);
+  host.probability.coarse(host.previous());
+  cfp::Frame<double> frame = host.current();
+  std::vector<std::int32_t> object(scene.keypoints.size(), cfp::no_object);
+  for (std::size_t i = 0; i < object.size(); ++i) {
+    if (scene.is_person[i])
+      object[i] = cfp::contains(scene.boxes[0], scene.keypoints[i][0], scene.keypoints[i][1]) ? 0 : 1;
+  }
+  frame.object_of_keypoint = object;
+  const auto coarse = host.probability.coarse(frame);
+  const auto& state = host.probability.state();
+  for (std::size_t i = 0; i < object.size(); ++i) {
+    CHECK(state.label[i] == (scene.is_person[i] ? KeypointLabel::foreground : KeypointLabel::outside));
+    if (scene.is_person[i]) CHECK(state.boxes[static_cast<std::size_t>(state.box[i])].detection == object[i]);
+  }
+  CHECK(coarse.report.undecided_foregrounds == 0);
+  // A missed detection has no segmentation: its compensated box is separated by depth again.
+  host.detections.clear();
+  frame = host.current();
+  frame.object_of_keypoint = object;
+  const auto missed = host.probability.coarse(frame);
+  CHECK(host.probability.state().boxes.size() == 2);
+  CHECK(missed.report.background > 0);
+  CHECK(missed.report.foreground > 100);
+}
+
+TEST_CASE("A missed detection is compensated, and with no-mdc it is not", "[frame]") {
+  const DynamicScene<double> scene = make_dynamic_scene<double>({}, 34);
+  for (const cfp::Variant variant : {cfp::Variant::cfp, cfp::Variant::no_mdc}) {
+    Host host(scene, cfp::variant_options(variant));
+    host.both();
+    host.detections.clear();
+    const auto missed = host.both();
+    CHECK(host.probability.state().boxes.size() == (variant == cfp::Variant::cfp ? 2U : 0U));
+    CHECK(missed.report.frames_without_detections == 2);
+  }
+}
+
+TEST_CASE("Each variant of the ablation does what its name says", "[frame]") {
+  cfp_test::DynamicSceneOptions options;
+  options.translation_m = 0.1;  // enough parallax over the far wall for an F at this noise
+  const DynamicScene<double> scene = make_dynamic_scene<double>(options, 35);
+  const auto run = [&](cfp::Variant variant, const auto& check) {
+    INFO(cfp::to_string(variant));
+    Host host(scene, cfp::variant_options(variant));
+    const auto result = host.both();
+    check(result, host.probability.state());
+  };
+  run(cfp::Variant::plain, [](const auto& r, const auto& state) {
+    CHECK(state.boxes.empty());
+    for (const double w : r.weight) CHECK(w == 1);
+  });
+  run(cfp::Variant::only_boxes, [](const auto& r, const auto& state) {
+    CHECK(r.report.foreground > 150);
+    CHECK(r.report.background == 0);
+    for (std::size_t i = 0; i < r.weight.size(); ++i)
+      CHECK(r.weight[i] == (state.label[i] == KeypointLabel::outside ? 1 : 0));
+  });
+  run(cfp::Variant::no_ksp, [](const auto& r, const auto& state) {
+    CHECK(r.report.foreground > 150);
+    CHECK(r.report.background > 0);
+    for (std::size_t i = 0; i < r.static_probability.size(); ++i)
+      CHECK(r.static_probability[i] == (state.label[i] == KeypointLabel::foreground ? 0 : 1));
+  });
+  run(cfp::Variant::no_dbscan, [](const auto& r, const auto&) {
+    CHECK(r.report.background == 0);
+    CHECK(r.report.stage == Stage::fine);
+  });
+  run(cfp::Variant::cfp_minus, [](const auto& r, const auto& s) { CHECK(r.report.unknown_objects == s.boxes.size()); });
+  run(cfp::Variant::cfp, [](const auto& r, const auto&) { CHECK(r.report.unknown_objects == 0); });
+}
+
+TEST_CASE("With map_point_prior the K that is returned is the posterior, and the weights stay", "[frame]") {
+  const DynamicScene<double> scene = make_dynamic_scene<double>({}, 39);
+  cfp::FrameOptions options;
+  options.fine.map_point_prior = true;
+  Host printed(scene), prior(scene, options);
+  for (std::size_t i = 0; i < printed.m.size(); ++i) printed.m[i] = prior.m[i] = 0.7;
+  const auto a = printed.both(), b = prior.both();
+  CHECK(copy(a.weight) == copy(b.weight));
+  CHECK(printed.m == prior.m);
+  CHECK(copy(b.static_probability) == prior.probability.state().posterior);
+  CHECK(copy(a.static_probability) != copy(b.static_probability));
+}
+
+TEMPLATE_TEST_CASE("Everything optional may be missing, and keypoint counts may change", "[frame]", float, double) {
+  using Scalar = TestType;
+  cfp::Random random(40, "changing frames");
+  cfp::StaticProbability probability(cfp::PinholeCamera<Scalar>{500, 500, 320, 240});
+  for (int frame_index = 0; frame_index < 200; ++frame_index) {
+    const std::size_t n = random.index(60);
+    std::vector<std::array<Scalar, 2>> keypoints(n);
+    std::vector<Scalar> depths(n), m(n);
+    std::vector<std::int32_t> match(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      keypoints[i] = {Scalar(random.uniform(0, 640)), Scalar(random.uniform(0, 480))};
+      depths[i] = Scalar(random.uniform(-1, 5));
+      m[i] = Scalar(random.uniform(-0.5, 1));
+      match[i] = static_cast<std::int32_t>(random.index(100)) - 20;  // often beyond the frame before
+    }
+    std::vector<std::uint8_t> descriptors(n * 16);
+    for (auto& byte : descriptors) byte = static_cast<std::uint8_t>(random.index(4));
+    const std::vector<cfp::Detection<Scalar>> detections = {
+        {{Scalar(random.uniform(0, 320)), 0, Scalar(random.uniform(320, 640)), 480}, 0, Scalar(1)}};
+    cfp::Frame<Scalar> frame;
+    frame.timestamp_s = 0.03 * frame_index;
+    frame.keypoints = keypoints;
+    if (random.uniform() < 0.7) frame.depths = depths;
+    if (random.uniform() < 0.7) frame.detections = detections;
+    if (random.uniform() < 0.5) frame.descriptors = {descriptors.data(), n, 16, 16};
+    if (random.uniform() < 0.5) frame.map_point_probability = m;
+    const auto check = [&](const cfp::StageResult<Scalar>& result) {
+      REQUIRE(result.weight.size() == n);
+      for (std::size_t i = 0; i < n; ++i) {
+        CHECK((result.weight[i] >= 0 && result.weight[i] <= 1));
+        CHECK((result.static_probability[i] >= 0 && result.static_probability[i] <= 1));
+      }
+    };
+    check(probability.coarse(frame));
+    if (random.uniform() < 0.7) {
+      cfp::PoseEstimate pose;
+      pose.T_cur_prev.translation = {random.uniform(-0.1, 0.1), 0, 0};
+      pose.inliers = 20;
+      check(random.uniform() < 0.5 ? probability.fine(pose, match, m) : probability.fine(pose, match));
+    }
+  }
+}
+
+TEST_CASE("After warm-up a frame allocates nothing, and equal runs give equal bits", "[frame]") {
+  const DynamicScene<double> scene = make_dynamic_scene<double>({}, 41);
+  Host first(scene), second(scene);
+  for (int i = 0; i < 3; ++i) {
+    const auto a = copy(first.both().weight);
+    CHECK(copy(second.both().weight) == a);
+  }
+  CHECK(cfp_test::allocations_in([&] { first.both(); }) == 0);
+}

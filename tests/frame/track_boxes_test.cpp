@@ -1,0 +1,90 @@
+#include "cfp/frame/track_boxes.hpp"
+
+#include <limits>
+#include <vector>
+
+#include "support/catch.hpp"
+
+namespace {
+
+struct Camera {
+  explicit Camera(const cfp::FrameOptions& o = {}) : options(o), tracker(o.tracker) {}
+
+  const cfp::FrameState<double>& see(double time, std::optional<std::vector<cfp::Detection<double>>> detections,
+                                     std::optional<cfp::Matrix3<double>> motion = {}) {
+    cfp::Frame<double> frame;
+    frame.timestamp_s = time;
+    if (detections) frame.detections = *detections;
+    frame.image_motion = motion;
+    cfp::begin_frame(frame, state);
+    cfp::track_boxes(frame, options, tracker, state);
+    return state;
+  }
+
+  cfp::FrameOptions options;
+  cfp::BoxTracker<double> tracker;
+  cfp::FrameState<double> state;
+};
+
+const std::vector<cfp::Detection<double>> person = {{{100, 100, 200, 400}, 0, 0.9}};
+const std::vector<cfp::Detection<double>> nothing;
+
+}  // namespace
+
+TEST_CASE("A detector that did not run differs from one that saw nothing", "[frame]") {
+  Camera idle, blind;
+  idle.see(0, person);
+  blind.see(0, person);
+  // After one detection only: nothing was missed without a detector, so the track lives on.
+  CHECK(idle.see(0.03, std::nullopt).report.frames_since_detector == 1);
+  CHECK(idle.see(0.06, std::nullopt).report.frames_since_detector == 2);
+  CHECK(idle.state.report.frames_without_detections == 0);
+  CHECK(blind.see(0.03, nothing).report.frames_without_detections == 1);
+  CHECK(blind.see(0.06, nothing).report.frames_without_detections == 2);
+  CHECK(blind.state.report.frames_since_detector == 0);
+  idle.see(0.09, person);
+  blind.see(0.09, person);
+  REQUIRE(idle.state.boxes.size() == 1);
+  CHECK(idle.state.boxes[0].id == 1);
+  CHECK(blind.state.boxes[0].id == 2);
+  CHECK(idle.state.report.frames_since_detector == 0);
+  CHECK(blind.state.report.frames_without_detections == 0);
+}
+
+TEST_CASE("A time stamp that does not grow is reported, and the boxes stay", "[frame]") {
+  for (const double second : {10.0, 9.0, std::numeric_limits<double>::quiet_NaN(),
+                              std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()}) {
+    INFO(second);
+    Camera camera;
+    CHECK(camera.see(9.9, person).report.time == cfp::Status::ok);
+    CHECK(camera.see(10, person).report.time == cfp::Status::ok);
+    CHECK(camera.see(second, nothing).report.time == cfp::Status::invalid_input);
+    REQUIRE(camera.state.boxes.size() == 1);
+    CHECK_THAT(camera.state.boxes[0].box.x1, WithinAbs(100, 1));
+  }
+}
+
+TEST_CASE("The image motion moves a compensated box", "[frame]") {
+  Camera still, turning;
+  cfp::Matrix3<double> shift = cfp::Matrix3<double>::Identity();
+  shift(0, 2) = 25;
+  for (Camera* camera : {&still, &turning}) {
+    camera->see(0, person);
+    camera->see(0.03, person);
+  }
+  still.see(0.06, nothing);
+  turning.see(0.06, nothing, shift);
+  REQUIRE(still.state.boxes.size() == 1);
+  REQUIRE(turning.state.boxes.size() == 1);
+  CHECK_THAT(turning.state.boxes[0].box.x1 - still.state.boxes[0].box.x1, WithinAbs(25, 1e-6));
+}
+
+TEST_CASE("Boxes of classes that cannot move, and all boxes when they are off, are ignored", "[frame]") {
+  cfp::FrameOptions other;
+  other.classes = {{17, false}};
+  CHECK(Camera(other).see(0, person).boxes.empty());
+  cfp::FrameOptions off;
+  off.use_boxes = false;
+  CHECK(Camera(off).see(0, person).boxes.empty());
+  CHECK(Camera().see(0, person).boxes.size() == 1);
+}
