@@ -13,7 +13,7 @@
 #include "cfp/evaluation/calibration.hpp"
 #include "cfp/geometry/epipolar.hpp"
 #include "support/call_times.hpp"
-#include "support/pipeline_runs.hpp"
+#include "support/frame_runs.hpp"
 
 namespace {
 
@@ -21,7 +21,7 @@ constexpr std::size_t frames = 16, flow_pairs = 500;
 
 template <typename Scalar>
 struct Frame {
-  cfp_test::SecondStageRun<Scalar> run;
+  cfp_test::FrameRun<Scalar> run;
   std::vector<std::array<Scalar, 2>> flow_previous, flow_current;
   cfp::Matrix3<Scalar> F;
 
@@ -36,15 +36,15 @@ struct Frame {
                                             static_cast<double>(s.camera.cx), static_cast<double>(s.camera.cy)};
     F = cfp::fundamental_from_pose(camera, s.T_cur_prev).template cast<Scalar>();
   }
-  void first_stage(const cfp::FirstStageOptions& options, bool F_given) {
-    const auto& s = run.scene;
-    const cfp::FirstStageInput<Scalar> in{s.keypoints,   s.depths,     run.boxes,
-                                          flow_previous, flow_current, F_given ? &F : nullptr};
-    cfp::first_stage(in, s.camera, {run.k, run.label, run.ruling_box, run.objects}, options, run.work);
+  void coarse(const cfp::FrameOptions& options, bool F_given) {
+    cfp::Frame<Scalar> frame = run.frame();
+    frame.flow = {flow_previous, flow_current};
+    if (F_given) frame.fundamental = F;
+    run.coarse(options, frame, run.scene.camera);
   }
-  void second_stage(const cfp::SecondStageOptions& options) {
+  void fine(const cfp::FrameOptions& options) {
     std::fill(run.m.begin(), run.m.end(), Scalar(1));
-    run.second(options);
+    run.fine(options);
   }
 };
 
@@ -59,19 +59,18 @@ std::vector<Frame<Scalar>> make_frames() {
   return all;
 }
 
-enum class Stages { first, second, both };
+enum class Stages { coarse, fine, both };
 
 template <typename Scalar, Stages stages, bool F_given>
 void frame(benchmark::State& state) {
   std::vector<Frame<Scalar>> all = make_frames<Scalar>();
-  const cfp::FirstStageOptions first_options;
-  const cfp::SecondStageOptions second_options;
+  const cfp::FrameOptions options;
   const auto run = [&](Frame<Scalar>& f) {
-    if (stages != Stages::second) f.first_stage(first_options, F_given);
-    if (stages != Stages::first) f.second_stage(second_options);
+    if (stages != Stages::fine) f.coarse(options, F_given);
+    if (stages != Stages::coarse) f.fine(options);
   };
   for (Frame<Scalar>& f : all) {
-    f.first_stage(first_options, F_given);
+    f.coarse(options, F_given);
     run(f);
   }
   cfp_benchmark::CallTimes times(state);
@@ -86,13 +85,13 @@ void frame(benchmark::State& state) {
   std::vector<char> is_static;
   double keypoints = 0;
   for (Frame<Scalar>& f : all) {
-    f.first_stage(first_options, F_given);
-    if (stages != Stages::first) f.second_stage(second_options);
-    keypoints += static_cast<double>(f.run.k.size()) / frames;
-    for (std::size_t i = 0; i < f.run.k.size(); ++i) {
-      if (f.run.label[i] != cfp::KeypointLabel::foreground && f.run.label[i] != cfp::KeypointLabel::background)
+    f.coarse(options, F_given);
+    if (stages != Stages::coarse) f.fine(options);
+    keypoints += static_cast<double>(f.run.m.size()) / frames;
+    for (std::size_t i = 0; i < f.run.m.size(); ++i) {
+      if (f.run.label(i) != cfp::KeypointLabel::foreground && f.run.label(i) != cfp::KeypointLabel::background)
         continue;
-      k.push_back(static_cast<double>(f.run.k[i]));
+      k.push_back(static_cast<double>(f.run.k(i)));
       is_static.push_back(f.run.scene.is_static[i]);
     }
   }
@@ -109,7 +108,7 @@ BENCHMARK(frame<float, Stages::both, false>)->Unit(benchmark::kMicrosecond);
 BENCHMARK(frame<float, Stages::both, true>)->Unit(benchmark::kMicrosecond);
 BENCHMARK(frame<double, Stages::both, false>)->Unit(benchmark::kMicrosecond);
 BENCHMARK(frame<double, Stages::both, true>)->Unit(benchmark::kMicrosecond);
-BENCHMARK(frame<float, Stages::first, false>)->Unit(benchmark::kMicrosecond);
-BENCHMARK(frame<float, Stages::first, true>)->Unit(benchmark::kMicrosecond);
-BENCHMARK(frame<float, Stages::second, true>)->Unit(benchmark::kMicrosecond);
+BENCHMARK(frame<float, Stages::coarse, false>)->Unit(benchmark::kMicrosecond);
+BENCHMARK(frame<float, Stages::coarse, true>)->Unit(benchmark::kMicrosecond);
+BENCHMARK(frame<float, Stages::fine, true>)->Unit(benchmark::kMicrosecond);
 BENCHMARK_MAIN();

@@ -23,7 +23,7 @@
 #include <opencv2/core.hpp>
 #endif
 
-#include "cfp/frame/static_probability_pipeline.hpp"
+#include "cfp/frame/static_probability.hpp"
 #include "cfp/optimization/pose/pose_refinement.hpp"
 
 namespace {
@@ -236,7 +236,7 @@ void run(int n, double outliers, bool stereo, int repetitions) {
   }
 }
 
-/// 60 % of the matched points on moving people: the pipeline's weights beside the true static labels and no weights.
+/// 60 % of the matched points on moving people: cfp's weights beside the true static labels and no weights.
 void contaminated(int people) {
   cfp_test::DynamicSceneOptions options;
   options.people = static_cast<std::size_t>(people);
@@ -263,30 +263,22 @@ void contaminated(int people) {
       view.weights = weights;
       return cfp::refine_pose(view, scene.camera, cfp::SE3<double>(), cfp::PoseOptions(), workspace);
     };
-    const auto host = [&](cfp::Stage, cfp::span<const double> weights) {
-      const auto result = solve(weights);
-      return cfp::PoseEstimate{result.T_cam_world, static_cast<std::size_t>(result.inliers),
-                               cfp::is_solved(result.status)};
-    };
     std::vector<cfp::Detection<double>> detections;
     for (const auto& box : scene.boxes) detections.push_back({box, 0, 0.8});
-    cfp::StaticProbabilityPipeline<double> pipeline;
-    cfp::FrameInput<double> before;
-    before.timestamp_s = 1;
-    before.keypoints = scene.previous_keypoints;
-    before.depths_m = scene.previous_depths;
-    before.detections = detections;
-    pipeline.process(before, scene.camera, [](cfp::Stage, cfp::span<const double>) { return cfp::PoseEstimate{}; });
-    cfp::FrameInput<double> now = before;
-    now.timestamp_s += 1.0 / 30;
-    now.keypoints = scene.keypoints;
-    now.depths_m = scene.depths;
-    now.flow_previous = scene.previous_keypoints;
-    now.flow_current = scene.keypoints;
-    now.match = scene.match;
-    now.map_point_probability = m;
-    const cfp::FrameResult<double> frame = pipeline.process(now, scene.camera, host);
-    const cfp::SE3<double> answers[3] = {solve(labels).T_cam_world, frame.pose.T_cur_prev, solve({}).T_cam_world};
+    cfp::StaticProbability probability(scene.camera);
+    cfp::Frame<double> frame;
+    frame.keypoints = scene.previous_keypoints;
+    frame.depths = scene.previous_depths;
+    frame.detections = detections;
+    probability.coarse(frame);
+    frame.timestamp_s = 1.0 / 30;
+    frame.keypoints = scene.keypoints;
+    frame.depths = scene.depths;
+    frame.flow = {scene.previous_keypoints, scene.keypoints};
+    const cfp::PoseResult first = solve(probability.coarse(frame).weight);
+    const auto fine = probability.fine({first.T_cam_world, static_cast<std::size_t>(first.inliers)}, scene.match, m);
+    const cfp::SE3<double> answers[3] = {solve(labels).T_cam_world, solve(fine.weight).T_cam_world,
+                                         solve({}).T_cam_world};
     for (std::size_t k = 0; k < 3; ++k)
       error_mm[k].push_back(1e3 * cfp_test::centre_distance(answers[k], scene.T_cur_prev));
   }

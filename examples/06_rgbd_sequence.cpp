@@ -1,10 +1,11 @@
-// One call per frame on a recording: OpenCV makes the arrays, cfp the static probabilities and the pose of every frame
+// Two calls per frame on a recording: OpenCV makes the arrays, cfp the static probabilities and the pose of every frame
 // against the one before. Writes a picture per frame: boxes (yellow: detected, orange: compensated) with O, keypoints
 // from red (K = 0) to green (K = 1), prints a line per frame and, with a groundtruth.txt, the error of the chained
 // poses. There is no map: this is odometry from frame to frame, made to show the calls, not to be a SLAM system.
 //   06_rgbd_sequence TUM_FOLDER OUT_FOLDER [VARIANT]
 // TUM_FOLDER holds rgb.txt, depth.txt, camera.txt and detections.txt, optionally groundtruth.txt; VARIANT is cfp
 // (default), cfp-minus, no-mdc, no-dbscan, no-ksp, only-boxes or plain.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -85,7 +86,8 @@ class PoseSolver {
     }
   }
 
-  cfp::PoseEstimate operator()(cfp::Stage, cfp::span<const float> weight) {
+  // Refines the pose of the call before. No inliers: there is none.
+  cfp::PoseEstimate operator()(cfp::span<const float> weight) {
     std::vector<float> weights;
     for (const std::size_t i : keypoint_) weights.push_back(weight[i]);
     cfp::PoseObservations<float> observations;
@@ -98,7 +100,7 @@ class PoseSolver {
     const cfp::PoseResult result = cfp::refine_pose(observations, camera_, start_, cfp::PoseOptions{}, workspace_);
     if (!cfp::is_solved(result.status)) return {};
     start_ = result.T_cam_world;
-    return {result.T_cam_world, static_cast<std::size_t>(result.inliers), true};
+    return {result.T_cam_world, static_cast<std::size_t>(result.inliers)};
   }
 
  private:
@@ -111,23 +113,24 @@ class PoseSolver {
   cfp::PoseWorkspace<double> workspace_;
 };
 
-void draw(cv::Mat& picture, const View& view, const cfp::FrameResult<float>& result) {
+void draw(cv::Mat& picture, const View& view, cfp::span<const float> static_probability,
+          const cfp::FrameState<float>& state) {
   for (std::size_t i = 0; i < view.keypoints.size(); ++i) {
-    if (result.label[i] == cfp::KeypointLabel::outside) {
+    if (state.label[i] == cfp::KeypointLabel::outside) {
       cv::circle(picture, view.keypoints[i].pt, 2, {160, 160, 160}, 1, cv::LINE_AA);
       continue;
     }
-    const double k = static_cast<double>(result.static_probability[i]);
+    const double k = static_cast<double>(static_probability[i]);
     cv::circle(picture, view.keypoints[i].pt, 3, {0, 255 * k, 255 * (1 - k)}, cv::FILLED, cv::LINE_AA);
   }
-  for (std::size_t b = 0; b < result.boxes.size(); ++b) {
-    const auto& box = result.boxes[b];
+  for (std::size_t b = 0; b < state.boxes.size(); ++b) {
+    const auto& box = state.boxes[b];
     const cv::Scalar colour = box.compensated() ? cv::Scalar(0, 140, 255) : cv::Scalar(0, 255, 255);
     const cv::Point corner(static_cast<int>(box.box.x1), static_cast<int>(box.box.y1));
     cv::rectangle(picture, corner, {static_cast<int>(box.box.x2), static_cast<int>(box.box.y2)}, colour, 2);
     char text[64];
     std::snprintf(text, sizeof text, "%lld%s O %.2f", static_cast<long long>(box.id),
-                  box.compensated() ? " compensated" : "", result.objects[b].static_probability);
+                  box.compensated() ? " compensated" : "", state.objects[b].static_probability);
     cv::putText(picture, text, corner + cv::Point(4, 16), cv::FONT_HERSHEY_SIMPLEX, 0.5, colour, 1, cv::LINE_AA);
   }
 }
@@ -157,16 +160,15 @@ void run(const std::filesystem::path& folder, const std::filesystem::path& out, 
   if (!detected.error.empty()) throw std::runtime_error(detected.error);
   std::filesystem::create_directories(out);
 
-  cfp::PipelineOptions options = cfp::variant_options(variant, cfp::PipelineOptions{});
+  cfp::FrameOptions options = cfp::variant_options(variant);
   options.tracker.image_width = tum.width;
   options.tracker.image_height = tum.height;
-  options.classes.clear();
-  for (std::size_t id = 0; id < detected.classes.size(); ++id) {
-    if (detected.classes[id] == "person") options.classes.push_back({static_cast<int>(id), true});
-  }
-  cfp::StaticProbabilityPipeline<float> pipeline(options);
+  const auto person = std::find(detected.classes.begin(), detected.classes.end(), "person");
+  options.use_boxes = options.use_boxes && person != detected.classes.end();
+  options.classes = {{static_cast<int>(person - detected.classes.begin()), true}};
   const cfp::PinholeCamera<float> camera{static_cast<float>(tum.fx), static_cast<float>(tum.fy),
                                          static_cast<float>(tum.cx), static_cast<float>(tum.cy)};
+  cfp::StaticProbability probability(camera, options);
   const cv::Ptr<cv::ORB> orb = cv::ORB::create(1000, 1.2F, 8, 15, 0, 2, cv::ORB::HARRIS_SCORE, 31, 10);
   View previous;
   std::vector<cfp::StampedPose<double>> trajectory;
@@ -202,36 +204,41 @@ void run(const std::filesystem::path& folder, const std::filesystem::path& out, 
     }
 
     // [driver]
-    cfp::FrameInput<float> frame;
+    cfp::Frame<float> frame;
     frame.timestamp_s = image.time_s;
     frame.keypoints = cfp::view(current.keypoints);
-    frame.depths_m = current.depths;
+    frame.depths = current.depths;
     frame.detections = detections;
-    frame.flow_previous = cfp::view(flow_from);
-    frame.flow_current = cfp::view(flow_to);
-    frame.match = matches;
+    frame.flow = {cfp::view(flow_from), cfp::view(flow_to)};
     frame.map_point_probability = current.map_points;
-    const cfp::FrameResult<float> result =
-        pipeline.process(frame, camera, PoseSolver(camera, previous, current, matches));
+    cfp::StageResult<float> stage = probability.coarse(frame);
+    PoseSolver solve(camera, previous, current, matches);
+    cfp::PoseEstimate pose = solve(stage.weight);
+    if (pose.inliers > 0) {
+      stage = probability.fine(pose, matches, current.map_points);
+      if (const cfp::PoseEstimate refined = solve(stage.weight); refined.inliers > 0) pose = refined;
+    }
     // [driver]
 
+    const cfp::FrameReport& report = stage.report;
     std::printf(
-        "%s: %zu keypoints (%zu foreground, %zu background), flow %s, D_Th %.2f px, pose %s with %zu inliers, "
-        "effective points %.0f\n",
-        image.file.c_str(), current.keypoints.size(), result.first.foreground, result.first.background,
-        cfp::to_string(result.first.flow_status), result.second.projection_threshold_px,
-        result.pose.valid ? "ok" : "none", result.pose.inliers, result.health.effective_points);
-    for (std::size_t b = 0; b < result.boxes.size(); ++b) {
-      std::printf("  box %lld %s, O %.3f from %zu flow pairs (%s)\n", static_cast<long long>(result.boxes[b].id),
-                  result.boxes[b].compensated() ? "compensated" : "detected", result.objects[b].static_probability,
-                  result.objects[b].pairs, cfp::to_string(result.objects[b].status));
+        "%s: %zu keypoints (%zu foreground, %zu background), flow %s, D_Th %.2f px, %zu inliers, effective points "
+        "%.0f\n",
+        image.file.c_str(), current.keypoints.size(), report.foreground, report.background,
+        cfp::to_string(report.flow_status), report.projection.threshold_px, pose.inliers,
+        report.health.effective_points);
+    const cfp::FrameState<float>& state = probability.state();
+    for (std::size_t b = 0; b < state.boxes.size(); ++b) {
+      std::printf("  box %lld %s, O %.3f from %zu flow pairs (%s)\n", static_cast<long long>(state.boxes[b].id),
+                  state.boxes[b].compensated() ? "compensated" : "detected", state.objects[b].static_probability,
+                  state.objects[b].pairs, cfp::to_string(state.objects[b].status));
     }
-    draw(picture, current, result);
+    draw(picture, current, stage.static_probability, state);
     cv::imwrite((out / std::filesystem::path(image.file).filename()).string(), picture);
     // A frame without a pose breaks the chain: what follows is relative to the last pose known.
     cfp::SE3<double> T_world_cam = trajectory.empty() ? cfp::SE3<double>{} : trajectory.back().T_world_cam;
-    if (result.pose.valid) T_world_cam = T_world_cam * result.pose.T_cur_prev.inverse();
-    lost += result.pose.valid || trajectory.empty() ? 0U : 1U;
+    if (pose.inliers > 0) T_world_cam = T_world_cam * pose.T_cur_prev.inverse();
+    lost += pose.inliers > 0 || trajectory.empty() ? 0U : 1U;
     trajectory.push_back({image.time_s, T_world_cam});
     previous = current;
   }

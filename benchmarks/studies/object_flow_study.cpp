@@ -2,7 +2,7 @@
 // time? The usual way (1000 corners over the whole image, 22x22, five levels, no check) against keypoints of the
 // previous frame on pyramids that are kept. On rendered sequences with labels: time on one core for flow and for F and
 // O, and how well O tells moving people from still ones (AUC; a box is moving when at least half, still when at most 2
-// % of its person pixels move). Supports cfp_slam::FlowOptions.
+// % of its person pixels move). Supports cfp::OpticalFlowOptions.
 //   cfp_object_flow_study [--smoke | --frames N | TUM_FOLDER...]   instead of rendering, folders of cfp_synthetic; one
 //   without
 // labels, with a detections.txt, gives times and mean O alone (as "partly")
@@ -21,11 +21,11 @@
 #include <opencv2/video/tracking.hpp>
 
 #include "../../examples/detection/simple_detectors.hpp"
-#include "../../examples/slam/loop/flow.hpp"
+#include "cfp/interop/opencv_flow.hpp"
 #include "../../examples/support/sequence.hpp"
 #include "../../examples/synthetic/sequence.hpp"
 #include "cfp/evaluation/calibration.hpp"
-#include "cfp/frame/first_stage.hpp"
+#include "cfp/frame/estimate_objects.hpp"
 #include "cfp/interop/opencv.hpp"
 
 namespace {
@@ -86,9 +86,9 @@ Candidate corners(const std::string& name, int count, double quality, double dis
           }};
 }
 
-Candidate tracker(const std::string& name, const cfp_slam::FlowOptions& options) {
-  auto state = std::make_shared<std::pair<cfp_slam::FlowTracker, std::vector<cfp::Box<float>>>>(
-      cfp_slam::FlowTracker(options), std::vector<cfp::Box<float>>());
+Candidate tracker(const std::string& name, const cfp::OpticalFlowOptions& options) {
+  auto state = std::make_shared<std::pair<cfp::OpticalFlowTracker, std::vector<cfp::Box<float>>>>(
+      cfp::OpticalFlowTracker(options), std::vector<cfp::Box<float>>());
   return {name, [state](const cv::Mat& previous, const Image& before, const Image& now, Pairs& pairs) {
             auto& [flow, boxes] = *state;
             boxes.clear();
@@ -101,7 +101,7 @@ Candidate tracker(const std::string& name, const cfp_slam::FlowOptions& options)
 
 std::vector<Candidate> candidates() {
   const auto with = [](auto change) {
-    cfp_slam::FlowOptions o;
+    cfp::OpticalFlowOptions o;
     change(o);
     return o;
   };
@@ -136,8 +136,8 @@ double moving_share(const cv::Mat& labels, const cfp::Box<float>& box) {
 }
 
 void judge(std::vector<Candidate>& all, const std::vector<Image>& images, const cfp::PinholeCamera<float>& camera) {
-  const cfp::FirstStageOptions options;
-  cfp::FirstStageWorkspace<float> work;
+  const cfp::FrameOptions options;
+  cfp::FrameState<float> state;
   for (std::size_t k = 0; k < images.size(); ++k) {
     for (std::size_t turn = 0; turn < all.size(); ++turn) {
       Candidate& c = all[(turn + k) % all.size()];
@@ -150,16 +150,17 @@ void judge(std::vector<Candidate>& all, const std::vector<Image>& images, const 
       }
       c.track(images[k - 1].gray, images[k - 1], images[k], pairs);
       const double tracked = processor_ms();
-      std::vector<cfp::ObjectBox<float>> boxes;
-      for (const Person& person : images[k].people) boxes.push_back({person.box, true, true});
-      std::vector<cfp::ObjectProbability> objects(boxes.size());
-      cfp::FirstStageInput<float> in;
-      in.boxes = boxes;
-      in.flow_previous = cfp::view(pairs.first);
-      in.flow_current = cfp::view(pairs.second);
-      cfp::FirstStageOutput<float> out;
-      out.objects = objects;
-      const cfp::FirstStageResult result = cfp::first_stage(in, camera, out, options, work);
+      cfp::Frame<float> frame;
+      frame.flow = {cfp::view(pairs.first), cfp::view(pairs.second)};
+      cfp::begin_frame(frame, state);
+      for (const Person& person : images[k].people) {
+        cfp::TrackedBox<float> box;
+        box.box = person.box;
+        state.boxes.push_back(box);
+      }
+      cfp::estimate_objects(frame, camera, options, state);
+      const std::vector<cfp::ObjectProbability>& objects = state.objects;
+      const cfp::FrameReport& result = state.report;
       const double end = processor_ms();
       c.flow_ms.push_back(tracked - start);
       c.object_ms.push_back(end - tracked);
@@ -168,7 +169,7 @@ void judge(std::vector<Candidate>& all, const std::vector<Image>& images, const 
       ++c.frames;
       c.no_model += result.flow_model == cfp::FlowModelKind::none ? 1U : 0U;
       c.homographies += result.flow_model == cfp::FlowModelKind::homography ? 1U : 0U;
-      for (std::size_t b = 0; b < boxes.size(); ++b) {
+      for (std::size_t b = 0; b < objects.size(); ++b) {
         const double share = images[k].people[b].moving_share, o = objects[b].static_probability;
         if (objects[b].status != cfp::Status::ok) ++c.unknown;
         if (!(share <= 0.02 || share >= 0.5)) {

@@ -57,7 +57,7 @@ inline std::vector<Saving> savings_of(const RunSummary& s, int features) {
        without(Module::features, 0.75 * median(Module::features)) +
            (median(Module::matching) + median(Module::pose) + median(Module::fine)) / 2},
       {"a smaller network, or --detector FILE.txt from an earlier pass", without(Module::detection, 0)},
-      {"half the flow points (FlowOptions)", without(Module::flow, median(Module::flow) / 2)},
+      {"half the flow points (OpticalFlowOptions)", without(Module::flow, median(Module::flow) / 2)},
       {"--variant no-ksp: no second stage", median(Module::fine)}};
   if (median(Module::flow) > 0) {
     savings.push_back({"--variant cfp-minus: no optical flow, no object probability",

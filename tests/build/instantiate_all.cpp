@@ -189,34 +189,33 @@ static void instantiate_evaluation() noexcept {
   use(&cfp::relative_pose_error<Scalar>);
 }
 
-// ---- pipeline ----
-
-// ---- pipeline ----
-template struct cfp::ObjectBox<float>;
-template struct cfp::ObjectBox<double>;
+// ---- frame ----
+template struct cfp::Frame<float>;
+template struct cfp::Frame<double>;
+template struct cfp::FrameState<float>;
+template struct cfp::FrameState<double>;
 template struct cfp::FlowModel<float>;
 template struct cfp::FlowModel<double>;
-template struct cfp::FirstStageWorkspace<float>;
-template struct cfp::FirstStageWorkspace<double>;
-template struct cfp::SecondStageWorkspace<float>;
-template struct cfp::SecondStageWorkspace<double>;
-template class cfp::StaticProbabilityPipeline<float>;
-template class cfp::StaticProbabilityPipeline<double>;
+template class cfp::StaticProbability<cfp::PinholeCamera<float>>;
+template class cfp::StaticProbability<cfp::PinholeCamera<double>>;
+template class cfp::StaticProbability<cfp::RadialTangentialCamera<float>>;
+template class cfp::StaticProbability<cfp::RadialTangentialCamera<double>>;
 template <typename Scalar>
-static void instantiate_pipeline() noexcept {
+static void instantiate_frame() noexcept {
+  use(&cfp::detections_of<Scalar>);
+  use(&cfp::label_at<Scalar>);
+  use(&cfp::match_descriptors<Scalar>);
   use(&cfp::estimate_flow_model<Scalar>);
   use(&cfp::flow_distances<Scalar>);
   use(&cfp::frame_health<Scalar>);
   use(&cfp::apply_fallback<Scalar>);
-  use(&cfp::first_stage<Scalar, cfp::PinholeCamera<Scalar>>);
-  use(&cfp::first_stage<Scalar, cfp::RadialTangentialCamera<Scalar>>);
-  use(&cfp::second_stage<Scalar, cfp::PinholeCamera<Scalar>>);
-  use(&cfp::second_stage<Scalar, cfp::RadialTangentialCamera<Scalar>>);
+  use(&cfp::may_create_map_point<Scalar>);
+  use(&cfp::counts_as_inlier<Scalar>);
 }
 
 template <typename Scalar>
 static void instantiate() noexcept {
-  instantiate_pipeline<Scalar>();
+  instantiate_frame<Scalar>();
   instantiate_evaluation<Scalar>();
   instantiate_optimization<Scalar>();
   instantiate_probability<Scalar>();

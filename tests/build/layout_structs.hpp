@@ -143,13 +143,6 @@
   CFP_LAYOUT_OPAQUE(cfp::PnpRansacResult<float>)                         \
   CFP_LAYOUT_OPAQUE(cfp::PnpRansacResult<double>)                        \
   CFP_LAYOUT(cfp::BundleWorkspace, schur)                            \
-  CFP_LAYOUT(cfp::FirstStageInput<float>, fundamental)                   \
-  CFP_LAYOUT(cfp::FirstStageInput<double>, fundamental)                  \
-  CFP_LAYOUT(cfp::FirstStageOutput<float>, objects)                      \
-  CFP_LAYOUT(cfp::FirstStageOutput<double>, objects)                     \
-  CFP_LAYOUT(cfp::FirstStageResult, undecided_foregrounds)               \
-  CFP_LAYOUT(cfp::FirstStageWorkspace<float>, is_foreground)             \
-  CFP_LAYOUT(cfp::FirstStageWorkspace<double>, is_foreground)            \
   CFP_LAYOUT(cfp::FlowModelOptions, ransac)                              \
   CFP_LAYOUT(cfp::FlowModel<float>, matrix)                              \
   CFP_LAYOUT(cfp::FlowModel<double>, matrix)                             \
@@ -157,25 +150,30 @@
   CFP_LAYOUT(cfp::FlowModelWorkspace<double>, ransac)                    \
   CFP_LAYOUT(cfp::HealthOptions, min_effective_points)                   \
   CFP_LAYOUT(cfp::FrameHealth, fallback)                                 \
-  CFP_LAYOUT(cfp::ObjectBox<float>, associated)                          \
-  CFP_LAYOUT(cfp::ObjectBox<double>, associated)                         \
-  CFP_LAYOUT(cfp::FirstStageOptions, foreground)                         \
-  CFP_LAYOUT(cfp::SecondStageOptions, map_point)                         \
   CFP_LAYOUT(cfp::ObjectClass, non_rigid)                                \
-  CFP_LAYOUT(cfp::PipelineOptions, health)                               \
-  CFP_LAYOUT(cfp::SecondStageInput<float>, pose_inliers)                 \
-  CFP_LAYOUT(cfp::SecondStageInput<double>, pose_inliers)                \
-  CFP_LAYOUT(cfp::SecondStageOutput<float>, weight)                      \
-  CFP_LAYOUT(cfp::SecondStageOutput<double>, weight)                     \
-  CFP_LAYOUT(cfp::SecondStageResult, deletable)                          \
-  CFP_LAYOUT(cfp::SecondStageWorkspace<float>, posterior)                \
-  CFP_LAYOUT(cfp::SecondStageWorkspace<double>, posterior)               \
-  CFP_LAYOUT(cfp::PoseEstimate, valid)                                   \
-  CFP_LAYOUT_OPAQUE(cfp::NoObserver)                                     \
-  CFP_LAYOUT(cfp::FrameInput<float>, image_motion)                       \
-  CFP_LAYOUT(cfp::FrameInput<double>, image_motion)                      \
-  CFP_LAYOUT(cfp::FrameResult<float>, frames_without_detections)         \
-  CFP_LAYOUT(cfp::FrameResult<double>, frames_without_detections)        \
-  CFP_LAYOUT_OPAQUE(cfp::StaticProbabilityPipeline<float>)               \
-  CFP_LAYOUT_OPAQUE(cfp::StaticProbabilityPipeline<double>)
+  CFP_LAYOUT(cfp::FlowPairs<float>, current) \
+  CFP_LAYOUT(cfp::FlowPairs<double>, current) \
+  CFP_LAYOUT(cfp::Frame<float>, image_motion) \
+  CFP_LAYOUT(cfp::Frame<double>, image_motion) \
+  CFP_LAYOUT(cfp::PoseEstimate, inliers) \
+  CFP_LAYOUT(cfp::LabelImage, row_bytes) \
+  CFP_LAYOUT(cfp::DescriptorSpan, row_bytes) \
+  CFP_LAYOUT(cfp::DescriptorMatchOptions, max_ratio) \
+  CFP_LAYOUT(cfp::DescriptorMatchWorkspace<float>, holders) \
+  CFP_LAYOUT(cfp::DescriptorMatchWorkspace<double>, holders) \
+  CFP_LAYOUT(cfp::CoarseOptions, foreground) \
+  CFP_LAYOUT(cfp::FineOptions, matching) \
+  CFP_LAYOUT(cfp::FrameOptions, min_inlier_weight) \
+  CFP_LAYOUT(cfp::ConstraintReport, confidence) \
+  CFP_LAYOUT(cfp::FrameReport, health) \
+  CFP_LAYOUT(cfp::FrameMemory<float>, descriptor_bytes) \
+  CFP_LAYOUT(cfp::FrameMemory<double>, descriptor_bytes) \
+  CFP_LAYOUT(cfp::FrameScratch<float>, mask) \
+  CFP_LAYOUT(cfp::FrameScratch<double>, mask) \
+  CFP_LAYOUT(cfp::FrameState<float>, scratch) \
+  CFP_LAYOUT(cfp::FrameState<double>, scratch) \
+  CFP_LAYOUT(cfp::StageResult<float>, report) \
+  CFP_LAYOUT(cfp::StageResult<double>, report) \
+  CFP_LAYOUT_OPAQUE(cfp::StaticProbability<cfp::PinholeCamera<float>>) \
+  CFP_LAYOUT_OPAQUE(cfp::StaticProbability<cfp::PinholeCamera<double>>)
 // clang-format on

@@ -12,7 +12,8 @@ int main() {
   const std::vector<cv::Point3d> points;
   const bool all = emitted(&cfp::sample_depth) && emitted(&cfp::to_se3<float>) && emitted(&cfp::to_se3<double>) &&
                    emitted(&cfp::write_pose<float>) && emitted(&cfp::write_pose<double>) &&
-                   emitted(&cfp::to_box<float, int>) && cfp::view(keypoints).empty() && cfp::view(pixels).empty() &&
-                   cfp::view(points).empty();
+                   emitted(&cfp::to_box<float, int>) && emitted(&cfp::to_camera<float>) &&
+                   emitted(&cfp::descriptor_view) && emitted(&cfp::label_view) && cfp::view(keypoints).empty() &&
+                   cfp::view(pixels).empty() && cfp::view(points).empty();
   return all ? 0 : 1;
 }

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "cfp/frame/options.hpp"
+#include "cfp/frame/frame_options.hpp"
 #include "support/catch.hpp"
 
 namespace example {
@@ -38,8 +38,8 @@ TEST_CASE("A nested field has its owners in front", "[core]") {
   static_assert(nested("a", cfp::OptionPath("b")));
 }
 
-TEST_CASE("Every option of the pipeline is refused by its full, unique name", "[core]") {
-  using Change = std::function<void(cfp::PipelineOptions&)>;
+TEST_CASE("Every option of a frame is refused by its full, unique name", "[core]") {
+  using Change = std::function<void(cfp::FrameOptions&)>;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::pair<const char*, Change> fields[] = {
       {"classes", [](auto& o) { o.classes.clear(); }},
@@ -58,62 +58,61 @@ TEST_CASE("Every option of the pipeline is refused by its full, unique name", "[
       {"tracker.max_gap_s", [&](auto& o) { o.tracker.max_gap_s = nan; }},
       {"tracker.image_width", [&](auto& o) { o.tracker.image_width = nan; }},
       {"tracker.image_height", [&](auto& o) { o.tracker.image_height = nan; }},
-      {"first.object_threshold", [&](auto& o) { o.first.object_threshold = nan; }},
-      {"first.flow.min_outside_pairs", [](auto& o) { o.first.flow.min_outside_pairs = 7; }},
-      {"first.flow.ransac.threshold_px", [&](auto& o) { o.first.flow.ransac.threshold_px = nan; }},
-      {"first.flow.ransac.confidence", [&](auto& o) { o.first.flow.ransac.confidence = nan; }},
-      {"first.flow.ransac.min_iterations", [](auto& o) { o.first.flow.ransac.min_iterations = 100000; }},
-      {"first.flow.ransac.max_iterations", [](auto& o) { o.first.flow.ransac.max_iterations = 0; }},
-      {"first.flow.ransac.min_inliers", [](auto& o) { o.first.flow.ransac.min_inliers = 0; }},
-      {"first.object.degrees_of_freedom", [&](auto& o) { o.first.object.degrees_of_freedom = nan; }},
-      {"first.object.sigma_px", [&](auto& o) { o.first.object.sigma_px = nan; }},
-      {"first.object.positions", [&](auto& o) { o.first.object.positions[1] = nan; }},
-      {"first.object.min_pairs", [](auto& o) { o.first.object.min_pairs = 0; }},
-      {"first.object.unknown_object_probability", [&](auto& o) { o.first.object.unknown_object_probability = nan; }},
-      {"first.foreground.adaptive.fixed.eps", [&](auto& o) { o.first.foreground.adaptive.fixed.eps = nan; }},
-      {"first.foreground.adaptive.fixed.min_pts", [](auto& o) { o.first.foreground.adaptive.fixed.min_pts = 0; }},
-      {"first.foreground.adaptive.noise.constant_m",
-       [&](auto& o) { o.first.foreground.adaptive.noise.constant_m = nan; }},
-      {"first.foreground.adaptive.noise.quadratic",
-       [&](auto& o) { o.first.foreground.adaptive.noise.quadratic = nan; }},
-      {"first.foreground.adaptive.noise.nearest_m",
-       [&](auto& o) { o.first.foreground.adaptive.noise.nearest_m = nan; }},
-      {"first.foreground.adaptive.noise_factor", [&](auto& o) { o.first.foreground.adaptive.noise_factor = nan; }},
-      {"first.foreground.adaptive.min_eps_m", [&](auto& o) { o.first.foreground.adaptive.min_eps_m = nan; }},
-      {"first.foreground.adaptive.max_eps_m", [&](auto& o) { o.first.foreground.adaptive.max_eps_m = nan; }},
-      {"first.foreground.adaptive.spacing_factor", [&](auto& o) { o.first.foreground.adaptive.spacing_factor = nan; }},
-      {"first.foreground.adaptive.min_share", [&](auto& o) { o.first.foreground.adaptive.min_share = nan; }},
-      {"first.foreground.adaptive.density", [&](auto& o) { o.first.foreground.adaptive.density = nan; }},
-      {"first.foreground.near_share", [&](auto& o) { o.first.foreground.near_share = nan; }},
-      {"first.foreground.upper_share", [&](auto& o) { o.first.foreground.upper_share = nan; }},
-      {"first.foreground.obstacle_m", [&](auto& o) { o.first.foreground.obstacle_m = nan; }},
-      {"first.foreground.before_m", [&](auto& o) { o.first.foreground.before_m = nan; }},
-      {"first.foreground.behind_m", [&](auto& o) { o.first.foreground.behind_m = nan; }},
-      {"first.foreground.first_gap_m", [&](auto& o) { o.first.foreground.first_gap_m = nan; }},
-      {"first.foreground.last_gap_m", [&](auto& o) { o.first.foreground.last_gap_m = nan; }},
-      {"first.foreground.min_gap_m", [&](auto& o) { o.first.foreground.min_gap_m = nan; }},
-      {"first.foreground.half_body_m", [&](auto& o) { o.first.foreground.half_body_m = nan; }},
-      {"first.foreground.min_points", [](auto& o) { o.first.foreground.min_points = 0; }},
-      {"second.object_threshold", [&](auto& o) { o.second.object_threshold = nan; }},
-      {"second.min_pose_inliers", [&](auto& o) { o.second.min_pose_inliers = nan; }},
-      {"second.min_translation_m", [&](auto& o) { o.second.min_translation_m = nan; }},
-      {"second.min_parallax", [&](auto& o) { o.second.min_parallax = nan; }},
-      {"second.projection.quantile", [&](auto& o) { o.second.projection.quantile = nan; }},
-      {"second.projection.steepness", [&](auto& o) { o.second.projection.steepness = nan; }},
-      {"second.projection.min_samples", [](auto& o) { o.second.projection.min_samples = 0; }},
-      {"second.epipolar.quantile", [&](auto& o) { o.second.epipolar.quantile = nan; }},
-      {"second.epipolar.steepness", [&](auto& o) { o.second.epipolar.steepness = nan; }},
-      {"second.epipolar.min_samples", [](auto& o) { o.second.epipolar.min_samples = 0; }},
-      {"second.map_point.rate", [&](auto& o) { o.second.map_point.rate = nan; }},
-      {"second.map_point.evidence_limit", [&](auto& o) { o.second.map_point.evidence_limit = nan; }},
-      {"second.map_point.deletion_threshold", [&](auto& o) { o.second.map_point.deletion_threshold = nan; }},
-      {"second.map_point.mismatch_threshold", [&](auto& o) { o.second.map_point.mismatch_threshold = nan; }},
+      {"object_threshold", [&](auto& o) { o.object_threshold = nan; }},
+      {"coarse.flow.min_outside_pairs", [](auto& o) { o.coarse.flow.min_outside_pairs = 7; }},
+      {"coarse.flow.ransac.threshold_px", [&](auto& o) { o.coarse.flow.ransac.threshold_px = nan; }},
+      {"coarse.flow.ransac.confidence", [&](auto& o) { o.coarse.flow.ransac.confidence = nan; }},
+      {"coarse.flow.ransac.min_iterations", [](auto& o) { o.coarse.flow.ransac.min_iterations = 100000; }},
+      {"coarse.flow.ransac.max_iterations", [](auto& o) { o.coarse.flow.ransac.max_iterations = 0; }},
+      {"coarse.flow.ransac.min_inliers", [](auto& o) { o.coarse.flow.ransac.min_inliers = 0; }},
+      {"coarse.object.degrees_of_freedom", [&](auto& o) { o.coarse.object.degrees_of_freedom = nan; }},
+      {"coarse.object.sigma_px", [&](auto& o) { o.coarse.object.sigma_px = nan; }},
+      {"coarse.object.positions", [&](auto& o) { o.coarse.object.positions[1] = nan; }},
+      {"coarse.object.min_pairs", [](auto& o) { o.coarse.object.min_pairs = 0; }},
+      {"coarse.object.unknown_object_probability", [&](auto& o) { o.coarse.object.unknown_object_probability = nan; }},
+      {"coarse.foreground.adaptive.fixed.eps", [&](auto& o) { o.coarse.foreground.adaptive.fixed.eps = nan; }},
+      {"coarse.foreground.adaptive.fixed.min_pts", [](auto& o) { o.coarse.foreground.adaptive.fixed.min_pts = 0; }},
+      {"coarse.foreground.adaptive.noise.constant_m",
+       [&](auto& o) { o.coarse.foreground.adaptive.noise.constant_m = nan; }},
+      {"coarse.foreground.adaptive.noise.quadratic",
+       [&](auto& o) { o.coarse.foreground.adaptive.noise.quadratic = nan; }},
+      {"coarse.foreground.adaptive.noise.nearest_m",
+       [&](auto& o) { o.coarse.foreground.adaptive.noise.nearest_m = nan; }},
+      {"coarse.foreground.adaptive.noise_factor", [&](auto& o) { o.coarse.foreground.adaptive.noise_factor = nan; }},
+      {"coarse.foreground.adaptive.min_eps_m", [&](auto& o) { o.coarse.foreground.adaptive.min_eps_m = nan; }},
+      {"coarse.foreground.adaptive.max_eps_m", [&](auto& o) { o.coarse.foreground.adaptive.max_eps_m = nan; }},
+      {"coarse.foreground.adaptive.spacing_factor", [&](auto& o) { o.coarse.foreground.adaptive.spacing_factor = nan; }},
+      {"coarse.foreground.adaptive.min_share", [&](auto& o) { o.coarse.foreground.adaptive.min_share = nan; }},
+      {"coarse.foreground.adaptive.density", [&](auto& o) { o.coarse.foreground.adaptive.density = nan; }},
+      {"coarse.foreground.near_share", [&](auto& o) { o.coarse.foreground.near_share = nan; }},
+      {"coarse.foreground.upper_share", [&](auto& o) { o.coarse.foreground.upper_share = nan; }},
+      {"coarse.foreground.obstacle_m", [&](auto& o) { o.coarse.foreground.obstacle_m = nan; }},
+      {"coarse.foreground.before_m", [&](auto& o) { o.coarse.foreground.before_m = nan; }},
+      {"coarse.foreground.behind_m", [&](auto& o) { o.coarse.foreground.behind_m = nan; }},
+      {"coarse.foreground.first_gap_m", [&](auto& o) { o.coarse.foreground.first_gap_m = nan; }},
+      {"coarse.foreground.last_gap_m", [&](auto& o) { o.coarse.foreground.last_gap_m = nan; }},
+      {"coarse.foreground.min_gap_m", [&](auto& o) { o.coarse.foreground.min_gap_m = nan; }},
+      {"coarse.foreground.half_body_m", [&](auto& o) { o.coarse.foreground.half_body_m = nan; }},
+      {"coarse.foreground.min_points", [](auto& o) { o.coarse.foreground.min_points = 0; }},
+      {"fine.min_pose_inliers", [&](auto& o) { o.fine.min_pose_inliers = nan; }},
+      {"fine.min_translation_m", [&](auto& o) { o.fine.min_translation_m = nan; }},
+      {"fine.min_parallax", [&](auto& o) { o.fine.min_parallax = nan; }},
+      {"fine.projection.quantile", [&](auto& o) { o.fine.projection.quantile = nan; }},
+      {"fine.projection.steepness", [&](auto& o) { o.fine.projection.steepness = nan; }},
+      {"fine.projection.min_samples", [](auto& o) { o.fine.projection.min_samples = 0; }},
+      {"fine.epipolar.quantile", [&](auto& o) { o.fine.epipolar.quantile = nan; }},
+      {"fine.epipolar.steepness", [&](auto& o) { o.fine.epipolar.steepness = nan; }},
+      {"fine.epipolar.min_samples", [](auto& o) { o.fine.epipolar.min_samples = 0; }},
+      {"map_point.rate", [&](auto& o) { o.map_point.rate = nan; }},
+      {"map_point.evidence_limit", [&](auto& o) { o.map_point.evidence_limit = nan; }},
+      {"map_point.deletion_threshold", [&](auto& o) { o.map_point.deletion_threshold = nan; }},
+      {"map_point.mismatch_threshold", [&](auto& o) { o.map_point.mismatch_threshold = nan; }},
       {"health.min_effective_points", [&](auto& o) { o.health.min_effective_points = nan; }},
   };
-  CHECK(!invalid_field(cfp::PipelineOptions{}));
+  CHECK(!invalid_field(cfp::FrameOptions{}));
   std::set<std::string> names;
   for (const auto& [name, change] : fields) {
-    cfp::PipelineOptions options;
+    cfp::FrameOptions options;
     change(options);
     CHECK(invalid_field(options).string() == name);
     CHECK(names.insert(name).second);
@@ -121,12 +120,8 @@ TEST_CASE("Every option of the pipeline is refused by its full, unique name", "[
   }
 }
 
-TEST_CASE("The two stages share one object threshold, and boxes need a class", "[core]") {
-  cfp::PipelineOptions options;
-  options.second.object_threshold = 0.8;
-  CHECK(invalid_field(options).string() == "second.object_threshold");
-  options.first.object_threshold = 0.8;
-  CHECK(!invalid_field(options));
+TEST_CASE("Boxes need a class", "[core]") {
+  cfp::FrameOptions options;
   options.classes.clear();
   CHECK(invalid_field(options).string() == "classes");
   options.use_boxes = false;

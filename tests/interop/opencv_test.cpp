@@ -171,3 +171,52 @@ TEST_CASE("to_se3 normalises drift and refuses what is no pose", "[interop]") {
   cfp::SE3<float> narrow;
   CHECK(cfp::to_se3(beyond_float, narrow) == cfp::Status::invalid_input);
 }
+
+TEMPLATE_TEST_CASE("A camera from OpenCV's matrices projects as they say", "[interop]", float, double) {
+  using Scalar = TestType;
+  const cv::Mat K = (cv::Mat_<double>(3, 3) << 535.4, 0, 320.1, 0, 539.2, 247.6, 0, 0, 1);
+  cv::Mat K_float;
+  K.convertTo(K_float, CV_32F);
+  cfp::RadialTangentialCamera<Scalar> camera;
+  for (const cv::Mat& distortion : {cv::Mat(), cv::Mat((cv::Mat_<double>(1, 4) << 0.1, -0.2, 0.001, 0.002)),
+                                    cv::Mat((cv::Mat_<float>(5, 1) << 0.1F, -0.2F, 0.001F, 0.002F, 0.05F))}) {
+    REQUIRE(cfp::to_camera(K_float, distortion, camera) == cfp::Status::ok);
+    REQUIRE(cfp::to_camera(K, distortion, camera) == cfp::Status::ok);
+    CHECK(camera.fx == Scalar(535.4));
+    CHECK(camera.cy == Scalar(247.6));
+    CHECK_THAT(static_cast<double>(camera.k1), WithinAbs(distortion.empty() ? 0 : 0.1, 1e-8));
+    CHECK_THAT(static_cast<double>(camera.p2), WithinAbs(distortion.empty() ? 0 : 0.002, 1e-8));
+    CHECK_THAT(static_cast<double>(camera.k3), WithinAbs(distortion.total() == 5 ? 0.05 : 0, 1e-8));
+  }
+  const cfp::RadialTangentialCamera<Scalar> before = camera;
+  const auto refused = [&](const cv::Mat& matrix, const cv::Mat& distortion) {
+    return cfp::to_camera(matrix, distortion, camera) == cfp::Status::invalid_input && camera.fx == before.fx &&
+           camera.k1 == before.k1;
+  };
+  cv::Mat skewed = K.clone(), infinite = K.clone(), flat = K.clone();
+  skewed.at<double>(0, 1) = 0.5;
+  infinite.at<double>(1, 2) = std::numeric_limits<double>::infinity();
+  flat.at<double>(1, 1) = 0;
+  CHECK(refused(skewed, {}));
+  CHECK(refused(infinite, {}));
+  CHECK(refused(flat, {}));
+  CHECK(refused({}, {}));
+  CHECK(refused(cv::Mat(3, 3, CV_8U), {}));
+  CHECK(refused(K, cv::Mat::zeros(1, 8, CV_64F)));
+  CHECK(refused(K, cv::Mat::zeros(1, 5, CV_8U)));
+  CHECK(refused(K, cv::Mat::ones(1, 5, CV_64F) * std::numeric_limits<double>::quiet_NaN()));
+}
+
+TEST_CASE("Descriptors and labels are viewed in place", "[interop]") {
+  cv::Mat all(4, 40, CV_8U);
+  cv::randu(all, 0, 255);
+  const cv::Mat descriptors = all.colRange(4, 36);
+  const cfp::DescriptorSpan view = cfp::descriptor_view(descriptors);
+  CHECK(view.size == 4);
+  CHECK(view.bytes == 32);
+  CHECK(view.row(3)[31] == descriptors.at<unsigned char>(3, 31));
+  CHECK(cfp::label_at(cfp::label_view(descriptors), 7.0, 2.0) == descriptors.at<unsigned char>(2, 7));
+  CHECK(cfp::descriptor_view(cv::Mat()).size == 0);
+  CHECK(cfp::descriptor_view(cv::Mat(3, 3, CV_32F)).size == 0);
+  CHECK(cfp::label_view(cv::Mat(3, 3, CV_16U)).empty());
+}

@@ -4,7 +4,7 @@
 
 #include "cfp/core/random.hpp"
 #include "cfp/core/span.hpp"
-#include "cfp/frame/static_probability_pipeline.hpp"
+#include "cfp/frame/static_probability.hpp"
 #include "cfp/geometry/box.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/math/se3.hpp"
@@ -34,28 +34,24 @@ TEST_CASE("Threads that share camera, pose and points get one thread's bits", "[
   });
 }
 
-TEST_CASE("Threads with a pipeline each share the frame's arrays and get one thread's bits", "[threads]") {
+TEST_CASE("Threads with a StaticProbability each share the frame's arrays and get one thread's bits", "[threads]") {
   const cfp_test::DynamicScene<float> scene = cfp_test::make_dynamic_scene<float>({}, 3);
   std::vector<cfp::Detection<float>> detections;
   for (const auto& box : scene.boxes) detections.push_back({box, 0, 0.9F});
-  const cfp::PipelineOptions options;
+  const cfp::FrameOptions options;
 
   cfp_test::check_same_in_all_threads([&] {
-    cfp::StaticProbabilityPipeline<float> pipeline(options);
+    cfp::StaticProbability probability(scene.camera, options);
     double sum = 0;
     for (int k = 0; k < 3; ++k) {
-      cfp::FrameInput<float> frame;
+      cfp::Frame<float> frame;
       frame.timestamp_s = k / 30.0;
       frame.keypoints = scene.keypoints;
-      frame.depths_m = scene.depths;
+      frame.depths = scene.depths;
       frame.detections = detections;
-      frame.flow_previous = scene.previous_keypoints;
-      frame.flow_current = scene.keypoints;
-      frame.match = scene.match;
-      const auto result = pipeline.process(frame, scene.camera, [&](cfp::Stage, cfp::span<const float>) {
-        return cfp::PoseEstimate{scene.T_cur_prev, 300, true};
-      });
-      for (const float w : result.weight) sum += static_cast<double>(w);
+      frame.flow = {scene.previous_keypoints, scene.keypoints};
+      probability.coarse(frame);
+      for (const float w : probability.fine({scene.T_cur_prev, 300}, scene.match).weight) sum += static_cast<double>(w);
     }
     return sum;
   });

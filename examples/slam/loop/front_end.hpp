@@ -14,7 +14,7 @@
 #include "../../support/sequence.hpp"
 #include "cfp/geometry/undistort.hpp"
 #include "cfp/interop/opencv.hpp"
-#include "flow.hpp"
+#include "cfp/interop/opencv_flow.hpp"
 #include "observer.hpp"
 #include "options.hpp"
 
@@ -93,7 +93,7 @@ class FrontEnd {
   Camera camera_;
   double metres_per_unit_;
   cfp_examples::FeatureExtractor extract_;
-  FlowTracker flow_;
+  cfp::OpticalFlowTracker flow_;
   Observer& observer_;
   std::vector<cv::KeyPoint> last_keypoints_;
   std::vector<cfp::Box<float>> last_boxes_;

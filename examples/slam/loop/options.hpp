@@ -6,8 +6,8 @@
 
 #include "../../support/orb_features.hpp"
 #include "cfp/frame/frame_options.hpp"
+#include "cfp/interop/opencv_flow.hpp"
 #include "cfp/optimization/pose/pose_problem.hpp"
-#include "flow.hpp"
 
 namespace cfp_slam {
 
@@ -34,7 +34,7 @@ struct Options {
   std::size_t max_frames = 0;     // 0: all
   cfp::FrameOptions probability;  // before the variant switches parts of it off
   cfp_examples::FeatureOptions features;
-  FlowOptions flow;
+  cfp::OpticalFlowOptions flow;
   cfp::PoseOptions pose;
   MappingOptions mapping;
   LocalBundleOptions bundle;

@@ -62,7 +62,6 @@ struct Frame {
 struct PoseEstimate {
   SE3<double> T_cur_prev;   ///< maps points of camera k-1 into camera k
   std::size_t inliers = 0;  ///< N_BA: observations that the pose rests on
-  bool valid = false;
 };
 
 }  // namespace cfp

@@ -19,7 +19,7 @@
 
 namespace cfp {
 
-enum class Stage : std::uint8_t { coarse, fine, first = coarse, second = fine };
+enum class Stage : std::uint8_t { coarse, fine };
 
 /// What a constraint was fitted to in this frame.
 struct ConstraintReport {

@@ -1,12 +1,14 @@
 /// @file homography.hpp
-/// Transfer distance of correspondences under a homography: what is left of two-view geometry when the camera only
-/// turns or stands still, where no fundamental matrix exists.
+/// What is left of two-view geometry when the camera only turns or stands still, where no fundamental matrix exists:
+/// the homography of a rotation, and the transfer distance of correspondences.
 #pragma once
 
 #include <cmath>
 
 #include "cfp/core/span.hpp"
+#include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/distance.hpp"
+#include "cfp/math/matrix3.hpp"
 
 namespace cfp {
 inline namespace CFP_ISA {
@@ -22,6 +24,14 @@ template <typename Scalar>
   if (!(mapped.z() > Scalar(0))) return Scalar(no_distance<double>);
   const Scalar distance = sqrt((mapped.template head<2>() / mapped.z() - x_cur).squaredNorm());
   return has_distance(distance) ? distance : Scalar(no_distance<double>);
+}
+
+/// The motion of the whole image when the camera turns by R (of T_cur_prev): K R K^-1 with the camera matrix K, pixels
+/// of the undistorted image. For the box tracker, which knows nothing of the camera.
+template <typename Scalar>
+[[nodiscard]] Matrix3<Scalar> rotation_homography(const PinholeCamera<Scalar>& camera,
+                                                  const Matrix3<non_deduced<Scalar>>& R) noexcept {
+  return camera.matrix() * R * inverse(camera.matrix());
 }
 
 /// transfer_distance of every correspondence. Allocates nothing.

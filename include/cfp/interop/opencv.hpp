@@ -14,15 +14,19 @@
 #include <opencv2/core/types.hpp>
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/status.hpp"
+#include "cfp/frame/descriptor_matching.hpp"
+#include "cfp/frame/label_image.hpp"
 #include "cfp/geometry/box.hpp"
+#include "cfp/geometry/radial_tangential_camera.hpp"
+#include "cfp/math/matrix3.hpp"
 #include "cfp/math/se3.hpp"
 
 namespace cfp {
+inline namespace CFP_ISA {
 
 /// Views of OpenCV's point vectors; valid while the vector is neither destroyed nor resized. Nothing is copied.
 template <typename Scalar>
@@ -43,6 +47,19 @@ template <typename Scalar>
 template <typename Element>
 void view(const std::vector<Element>&& temporary) = delete;
 
+/// The rows of a CV_8U matrix of binary descriptors, for Frame::descriptors; empty for any other matrix.
+[[nodiscard]] inline DescriptorSpan descriptor_view(const cv::Mat& descriptors) noexcept {
+  if (descriptors.data == nullptr || descriptors.dims != 2 || descriptors.type() != CV_8UC1) return {};
+  return {descriptors.data, static_cast<std::size_t>(descriptors.rows), static_cast<std::size_t>(descriptors.cols),
+          descriptors.step.p[0]};
+}
+
+/// A CV_8U label image, for Frame::labels; empty for any other image.
+[[nodiscard]] inline LabelImage label_view(const cv::Mat& labels) noexcept {
+  if (labels.data == nullptr || labels.dims != 2 || labels.type() != CV_8UC1) return {};
+  return {labels.data, labels.cols, labels.rows, labels.step.p[0]};
+}
+
 /// The box of a rectangle: [x, x + width] x [y, y + height], the borders OpenCV draws between pixels. Improper, as the
 /// rectangle is empty, when width or height is not positive. Box<float> or Box<double>: to_box<float>(rectangle).
 template <typename Scalar, typename Coordinate>
@@ -51,7 +68,10 @@ template <typename Scalar, typename Coordinate>
   return {x, y, x + static_cast<Scalar>(rectangle.width), y + static_cast<Scalar>(rectangle.height)};
 }
 
+}  // namespace CFP_ISA
+
 namespace detail {
+inline namespace CFP_ISA {
 
 // cv::Mat::at checks in debug builds by calling the library; the address arithmetic does not.
 template <typename T>
@@ -66,6 +86,16 @@ template <typename T>
 
 [[nodiscard]] inline bool is_matrix(const cv::Mat& matrix) noexcept {
   return matrix.dims == 2 && matrix.data != nullptr && matrix.rows > 0 && matrix.cols > 0;
+}
+
+// An element of a CV_32F or CV_64F matrix.
+[[nodiscard]] inline double real_element(const cv::Mat& matrix, int row, int column) noexcept {
+  return matrix.type() == CV_32FC1 ? static_cast<double>(matrix_element<float>(matrix, row, column))
+                                   : matrix_element<double>(matrix, row, column);
+}
+
+[[nodiscard]] inline bool is_real_matrix(const cv::Mat& matrix) noexcept {
+  return is_matrix(matrix) && (matrix.type() == CV_32FC1 || matrix.type() == CV_64FC1);
 }
 
 template <typename T>
@@ -86,7 +116,10 @@ bool sample_depth_of(const cv::Mat& depth, const PointSpan<float, 2>& pixels, do
   return any;
 }
 
+}  // namespace CFP_ISA
 }  // namespace detail
+
+inline namespace CFP_ISA {
 
 /// Depth in metres at each pixel, from a single-channel CV_16U, CV_32F or CV_64F image whose values times
 /// `metres_per_unit` are metres (TUM RGB-D: 1.0 / 5000; millimetres: 0.001; metres: 1). The nearest pixel is read,
@@ -121,23 +154,54 @@ inline Status sample_depth(const cv::Mat& depth, const PointSpan<float, 2>& pixe
 /// type, an element that is not finite, a reflection, or a rotation part R with an element of R R^T - I beyond 0.01.
 template <typename Scalar>
 Status to_se3(const cv::Mat& matrix, SE3<Scalar>& pose) noexcept {
-  if (!detail::is_matrix(matrix) || matrix.cols != 4 || (matrix.rows != 4 && matrix.rows != 3))
+  if (!detail::is_real_matrix(matrix) || matrix.cols != 4 || (matrix.rows != 4 && matrix.rows != 3))
     return Status::invalid_input;
-  if (matrix.type() != CV_32FC1 && matrix.type() != CV_64FC1) return Status::invalid_input;
   SE3<double> read;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 4; ++column) {
-      const double value = matrix.type() == CV_32FC1
-                               ? static_cast<double>(detail::matrix_element<float>(matrix, row, column))
-                               : detail::matrix_element<double>(matrix, row, column);
+      const double value = detail::real_element(matrix, row, column);
       if (!is_finite(static_cast<Scalar>(value))) return Status::invalid_input;
       (column < 3 ? read.rotation(row, column) : read.translation[row]) = value;
     }
   }
   const Matrix3<double> excess = read.rotation * read.rotation.transpose() - Matrix3<double>::Identity();
-  if (!(excess.cwiseAbs().maxCoeff() <= 0.01) || !(read.rotation.determinant() > 0)) return Status::invalid_input;
+  if (!(excess.cwiseAbs().maxCoeff() <= 0.01) || !(determinant(read.rotation) > 0)) return Status::invalid_input;
   read.rotation = normalized_rotation(read.rotation);
   pose = read.template cast<Scalar>();
+  return Status::ok;
+}
+
+/// A camera from OpenCV's matrices, CV_32F or CV_64F: the 3x3 camera matrix, and k1, k2, p1, p2 or k1, k2, p1, p2, k3
+/// as a row or a column (empty: no distortion). invalid_input, and camera untouched: another size or type, a skew, a
+/// focal length that is not positive, an element that is not finite. For images without distortion: camera.pinhole().
+template <typename Scalar>
+[[nodiscard]] Status to_camera(const cv::Mat& camera_matrix, const cv::Mat& distortion,
+                               RadialTangentialCamera<Scalar>& camera) noexcept {
+  if (!detail::is_real_matrix(camera_matrix) || camera_matrix.rows != 3 || camera_matrix.cols != 3)
+    return Status::invalid_input;
+  double values[9] = {detail::real_element(camera_matrix, 0, 0), detail::real_element(camera_matrix, 1, 1),
+                      detail::real_element(camera_matrix, 0, 2), detail::real_element(camera_matrix, 1, 2)};
+  if (!distortion.empty()) {
+    const int count = distortion.rows * distortion.cols;
+    if (!detail::is_real_matrix(distortion) || (distortion.rows != 1 && distortion.cols != 1))
+      return Status::invalid_input;
+    if (count != 4 && count != 5) return Status::invalid_input;
+    for (int i = 0; i < count; ++i)
+      values[4 + i] = detail::real_element(distortion, distortion.rows == 1 ? 0 : i, distortion.rows == 1 ? i : 0);
+  }
+  for (const double value : values) {
+    if (!is_finite(static_cast<Scalar>(value))) return Status::invalid_input;
+  }
+  if (!(values[0] > 0 && values[1] > 0) || detail::real_element(camera_matrix, 0, 1) != 0) return Status::invalid_input;
+  camera.fx = static_cast<Scalar>(values[0]);
+  camera.fy = static_cast<Scalar>(values[1]);
+  camera.cx = static_cast<Scalar>(values[2]);
+  camera.cy = static_cast<Scalar>(values[3]);
+  camera.k1 = static_cast<Scalar>(values[4]);
+  camera.k2 = static_cast<Scalar>(values[5]);
+  camera.p1 = static_cast<Scalar>(values[6]);
+  camera.p2 = static_cast<Scalar>(values[7]);
+  camera.k3 = static_cast<Scalar>(values[8]);
   return Status::ok;
 }
 
@@ -167,4 +231,5 @@ Status write_pose(const SE3<Scalar>& pose, cv::Mat& matrix) noexcept {
   return Status::ok;
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

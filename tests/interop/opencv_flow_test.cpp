@@ -1,4 +1,4 @@
-#include "../../examples/slam/loop/flow.hpp"
+#include "cfp/interop/opencv_flow.hpp"
 
 #include <limits>
 
@@ -7,7 +7,6 @@
 
 #include "support/catch.hpp"
 
-using namespace cfp_slam;
 
 namespace {
 
@@ -41,9 +40,9 @@ bool near(const cv::Point2f& a, const cv::Point2f& b, float distance) {
 TEST_CASE("Pairs follow the image, over several frames and with either check", "[flow]") {
   const cv::Mat image = texture();
   for (const bool backward : {false, true}) {
-    FlowOptions options;
+    cfp::OpticalFlowOptions options;
     options.backward = backward;
-    FlowTracker tracker(options);
+    cfp::OpticalFlowTracker tracker(options);
     const cfp::Box<float> box{100, 80, 220, 240};
     tracker.track(image, {}, cfp::span<const cfp::Box<float>>());
     CHECK(tracker.previous().empty());
@@ -70,11 +69,11 @@ TEST_CASE("No region gets more points than it may have", "[flow]") {
   const std::vector<cv::KeyPoint> keypoints = keypoints_of(image);
   const std::vector<cfp::Box<float>> boxes = {{10, 10, 150, 290}, {140, 100, 390, 200}, {-50, -50, 20, 20}};
   for (const int points : {0, 1, 7, 40}) {
-    FlowOptions options;
+    cfp::OpticalFlowOptions options;
     options.corners = 0;
     options.keypoints_per_box = points;
     options.keypoints_outside = 3 * points;
-    FlowTracker tracker(options);
+    cfp::OpticalFlowTracker tracker(options);
     tracker.track(image, {}, {});
     tracker.track(image, keypoints, cfp::span<const cfp::Box<float>>(boxes.data(), boxes.size()));
     std::vector<int> count(boxes.size() + 1, 0);
@@ -87,7 +86,7 @@ TEST_CASE("No region gets more points than it may have", "[flow]") {
     CHECK(count.back() <= 3 * points);
     options.keypoints_per_box = options.keypoints_outside = 0;
     options.corners = points;
-    FlowTracker corners(options);
+    cfp::OpticalFlowTracker corners(options);
     corners.track(image, {}, {});
     corners.track(image, keypoints, {});
     CHECK(corners.previous().size() == static_cast<std::size_t>(points));
@@ -101,7 +100,7 @@ TEST_CASE("Nothing to track, broken boxes and changed sizes make no pairs and no
   const cfp::span<const cfp::Box<float>> view(boxes.data(), boxes.size());
   std::vector<cv::KeyPoint> odd = {{nan, 3, 1}, {inf, 3, 1}, {-5, 3, 1}, {3, 1e30F, 1}, {50, 50, 1}};
   const cv::Mat image = texture();
-  FlowTracker tracker;
+  cfp::OpticalFlowTracker tracker;
   tracker.track(cv::Mat(), odd, view);
   tracker.track(image, odd, view);
   CHECK(tracker.previous().empty());
@@ -131,7 +130,7 @@ TEST_CASE("The caller's image may be overwritten between the calls", "[flow]") {
     return inner;
   };
   cv::Mat first = cv::Mat::zeros(400, 500, CV_8UC1), second = first.clone(), reused = first.clone();
-  FlowTracker own, shared;
+  cfp::OpticalFlowTracker own, shared;
   own.track(part(first, image), {}, {});
   own.track(part(second, next), {}, {});
   shared.track(part(reused, image), {}, {});

@@ -1,6 +1,8 @@
-// Optical-flow pairs for the object stage by pyramidal Lucas-Kanade: corners, found at half resolution, and the front
-// end's own keypoints inside boxes. Pyramids are built once per image and kept for the next one. What the defaults cost
-// and buy against the usual way: benchmarks/studies/object_flow_study.cpp.
+/// @file opencv_flow.hpp
+/// Optical-flow pairs for the object stage by OpenCV's pyramidal Lucas-Kanade: corners, found at half resolution, carry
+/// the camera's motion, and the host's own keypoints inside boxes the objects'. Pyramids are built once per image and
+/// kept for the next one. Needs OpenCV's libraries imgproc and video. What the defaults cost and buy against the usual
+/// way: benchmarks/studies/object_flow_study.cpp.
 #pragma once
 
 #include <algorithm>
@@ -10,38 +12,44 @@
 #include <vector>
 
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
 #include "cfp/core/span.hpp"
+#include "cfp/frame/frame.hpp"
 #include "cfp/geometry/box.hpp"
+#include "cfp/interop/opencv.hpp"
 
-namespace cfp_slam {
+namespace cfp {
 
-struct FlowOptions {
-  int corners = 500;  // at most, over the whole image, found at half resolution: they carry the camera's motion
-  double corner_distance = 6;    // between two of them, px
-  double corner_quality = 0.01;  // least strength of a corner, as a share of the strongest one's
-  int keypoints_per_box = 100;   // at most, besides, in each box, one per cell of a grid
-  int keypoints_outside = 0;     // at most, outside all boxes, likewise
-  int window = 15;               // side of the patch that is tracked, px
-  int levels = 4;                // of the pyramid, >= 1
-  int iterations = 20;           // per level
-  double precision = 0.02;       // an update below this ends the iterations, px
-  // Track back as well, and drop pairs that return further than max_backward_px from where they came. Off: it doubles
-  // the time, tells moving from still people no better, and O of one who moves an arm rises, as the pairs on the arm
-  // are those it drops.
+struct OpticalFlowOptions {
+  int corners = 500;  ///< at most, over the whole image, found at half resolution: they carry the camera's motion
+  double corner_distance = 6;    ///< between two of them, px
+  double corner_quality = 0.01;  ///< least strength of a corner, as a share of the strongest one's
+  int keypoints_per_box = 100;   ///< at most, besides, in each box, one per cell of a grid
+  int keypoints_outside = 0;     ///< at most, outside all boxes, likewise
+  int window = 15;               ///< side of the patch that is tracked, px
+  int levels = 4;                ///< of the pyramid, >= 1
+  int iterations = 20;           ///< per level
+  double precision = 0.02;       ///< an update below this ends the iterations, px
+  /// Track back as well, and drop pairs that return further than max_backward_px from where they came. Off: it doubles
+  /// the time, tells moving from still people no better, and O of one who moves an arm rises, as the pairs on the arm
+  /// are those it drops.
   bool backward = false;
   float max_backward_px = 0.5F;
 };
 
-class FlowTracker {
- public:
-  explicit FlowTracker(const FlowOptions& options = {}) : options_(options) {}
+inline namespace CFP_ISA {
 
-  // Makes the pairs between the image of the last call and this one (8-bit grey; none after the first call, or when the
-  // size has changed). keypoints and boxes are those of the previous image, which is where tracking starts; improper
-  // boxes hold nothing.
-  void track(const cv::Mat& gray, const std::vector<cv::KeyPoint>& keypoints, cfp::span<const cfp::Box<float>> boxes) {
+/// One per camera. Not thread-safe.
+class OpticalFlowTracker {
+ public:
+  explicit OpticalFlowTracker(const OpticalFlowOptions& options = {}) : options_(options) {}
+
+  /// Makes the pairs between the image of the last call and this one (8-bit grey; none after the first call, or when
+  /// the size has changed). keypoints and boxes are those of the previous image, which is where tracking starts;
+  /// improper boxes hold nothing.
+  void track(const cv::Mat& gray, const std::vector<cv::KeyPoint>& keypoints, span<const Box<float>> boxes) {
     std::swap(previous_pyramid_, pyramid_);
     const bool first = gray.empty() || previous_pyramid_.empty() || previous_pyramid_[0].size() != gray.size();
     from_.clear();
@@ -69,23 +77,26 @@ class FlowTracker {
     });
   }
 
-  // Pixels of the pairs in the previous and in the current image; valid until the next call.
+  /// Pixels of the pairs in the previous and in the current image; valid until the next call.
   [[nodiscard]] const std::vector<cv::Point2f>& previous() const { return from_; }
   [[nodiscard]] const std::vector<cv::Point2f>& current() const { return to_; }
 
-  // Forgets the last image: the next call makes no pairs.
+  /// The same as views, for Frame::flow.
+  [[nodiscard]] FlowPairs<float> pairs() const { return {view(from_), view(to_)}; }
+
+  /// Forgets the last image: the next call makes no pairs.
   void reset() { pyramid_.clear(); }
 
  private:
   // The strongest keypoint of every cell; the cells of each box are at most as many as it may have points, and so for
   // the rest.
-  void choose(const std::vector<cv::KeyPoint>& keypoints, cfp::span<const cfp::Box<float>> boxes, cv::Size size) {
+  void choose(const std::vector<cv::KeyPoint>& keypoints, span<const Box<float>> boxes, cv::Size size) {
     const auto width = static_cast<float>(size.width), height = static_cast<float>(size.height);
     regions_.clear();
     std::size_t cells = 0;
-    const auto add = [&](const cfp::Box<float>& box, int points) {
+    const auto add = [&](const Box<float>& box, int points) {
       Region region{box, 0, 0, cells};
-      if (cfp::is_proper(box) && points > 0) {
+      if (is_proper(box) && points > 0) {
         const float side = std::sqrt(box.width() * box.height() / static_cast<float>(points));
         region.across = std::clamp(static_cast<int>(box.width() / side), 1, points);
         region.down = std::clamp(static_cast<int>(box.height() / side), 1, points / region.across);
@@ -93,13 +104,13 @@ class FlowTracker {
       cells += static_cast<std::size_t>(region.across * region.down);
       regions_.push_back(region);
     };
-    for (const cfp::Box<float>& box : boxes) add(cfp::clip(box, width, height), options_.keypoints_per_box);
+    for (const Box<float>& box : boxes) add(clip(box, width, height), options_.keypoints_per_box);
     add({0, 0, width, height}, options_.keypoints_outside);
 
     strongest_.assign(cells, nullptr);
     for (const cv::KeyPoint& k : keypoints) {
       const auto region = std::find_if(regions_.begin(), regions_.end(),
-                                       [&](const Region& r) { return cfp::contains(r.box, k.pt.x, k.pt.y); });
+                                       [&](const Region& r) { return contains(r.box, k.pt.x, k.pt.y); });
       if (region == regions_.end() || region->across == 0) continue;
       const auto cell = [](float x, float length, int n) {
         return static_cast<std::size_t>(std::clamp(static_cast<int>(x / length * static_cast<float>(n)), 0, n - 1));
@@ -137,12 +148,12 @@ class FlowTracker {
   }
 
   struct Region {
-    cfp::Box<float> box;
+    Box<float> box;
     int across, down;   // cells
     std::size_t first;  // cell
   };
 
-  FlowOptions options_;
+  OpticalFlowOptions options_;
   std::vector<cv::Mat> previous_pyramid_, pyramid_;
   std::vector<Region> regions_;
   std::vector<const cv::KeyPoint*> strongest_;
@@ -151,4 +162,5 @@ class FlowTracker {
   std::vector<float> error_;
 };
 
-}  // namespace cfp_slam
+}  // namespace CFP_ISA
+}  // namespace cfp
