@@ -80,10 +80,8 @@ TEST_CASE("Every K, M and weight equals the scalar formulas applied one keypoint
     outside_f.push_back(df[i]);
   }
   std::vector<double> scratch(n);
-  const auto projection =
-      cfp::fit_constraint(cfp::span<const double>(outside_t), cfp::span<double>(scratch), options.fine.projection);
-  const auto epipolar =
-      cfp::fit_constraint(cfp::span<const double>(outside_f), cfp::span<double>(scratch), options.fine.epipolar);
+  const auto projection = cfp::fit_constraint(outside_t, options.fine.projection, scratch);
+  const auto epipolar = cfp::fit_constraint(outside_f, options.fine.epipolar, scratch);
   const double cs = cfp::statistical_confidence<double>(run.pose.inliers, 10);
   CHECK_THAT(result.projection.threshold_px, WithinAbs(projection.threshold_px, 1e-9));
   CHECK_THAT(result.epipolar.confidence, WithinAbs(cs * epipolar.calculation_confidence, 1e-9));
@@ -103,7 +101,7 @@ TEST_CASE("Every K, M and weight equals the scalar formulas applied one keypoint
     }
     INFO("keypoint " << i);
     CHECK_THAT(run.state.static_probability[i], WithinAbs(k, 1e-9));
-    const double m = first_m[i] >= 0 ? cfp::updated_map_point(first_m[i], k, options.map_point) : first_m[i];
+    const double m = first_m[i] >= 0 ? cfp::updated_map_point(k, first_m[i], options.map_point) : first_m[i];
     CHECK_THAT(run.m[i], WithinAbs(m, 1e-9));
     const double weight = m < 0 ? k : (cfp::is_mismatch(k, m, options.map_point) ? 0 : k * m);
     CHECK_THAT(run.state.weight[i], WithinAbs(weight, 1e-9));
@@ -146,7 +144,7 @@ TEST_CASE("Disabled, the second stage keeps K and still updates M and the weight
   run.fine(options);
   CHECK(run.state.static_probability == before);
   for (std::size_t i = 0; i < run.state.static_probability.size(); ++i)
-    CHECK(run.m[i] == cfp::updated_map_point(1.0, before[i], options.map_point));
+    CHECK(run.m[i] == cfp::updated_map_point(before[i], 1.0, options.map_point));
 }
 
 TEST_CASE("The posterior is K with M of before as its prior, where a match says anything", "[frame]") {

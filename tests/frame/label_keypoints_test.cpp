@@ -90,8 +90,7 @@ TEST_CASE("Each box's O and labels equal the equation groups called one by one",
       members.push_back(i);
     }
     std::vector<double> scratch(distances.size());
-    const auto o =
-        cfp::object_probability(cfp::span<const double>(distances), cfp::span<double>(scratch), options.coarse.object);
+    const auto o = cfp::object_probability(distances, options.coarse.object, scratch);
     CHECK_THAT(run.state.objects[b].static_probability, WithinAbs(o.static_probability, 1e-9));
     CHECK(run.state.objects[b].pairs == o.pairs);
     std::vector<char> is_foreground(depths.size());

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -104,9 +105,8 @@ class Tracking {
     cfp::StageResult<float> stage = coarse(frame, features);
     observer_.weighted(stage, probability_.state(), frame);
     note_boxes(record);
-    const cfp::PoseEstimate pose = first_pose(frame, stage.weight);
-    if (pose.valid) {
-      stage = fine(frame, pose);
+    if (const std::optional<cfp::PoseEstimate> pose = first_pose(frame, stage.weight)) {
+      stage = fine(frame, *pose);
       observer_.weighted(stage, probability_.state(), frame);
     }
     record.health = stage.report.health;
@@ -142,9 +142,10 @@ class Tracking {
     }
   }
 
-  // From the last frame's points or, when those do not give it, from the map.
-  cfp::PoseEstimate first_pose(Frame& frame, cfp::span<const float> weight) {
-    if (map_.keyframes.empty()) return {};
+  // From the last frame's points or, when those do not give it, from the map. The motion since the last frame, if both
+  // frames have a pose.
+  std::optional<cfp::PoseEstimate> first_pose(Frame& frame, cfp::span<const float> weight) {
+    if (map_.keyframes.empty()) return std::nullopt;
     const Part part(observer_, Module::pose);
     frame.T_cam_world = predicted_.T_cam_world;
     std::size_t inliers = last_.has_pose ? refine(frame, weight, false) : 0;
@@ -153,7 +154,8 @@ class Tracking {
       inliers = relocalised_ ? refine(frame, weight, false) : 0;
     }
     frame.has_pose = inliers >= options_.min_first_inliers;
-    return {motion_of(frame), inliers, frame.has_pose && last_.has_pose};
+    if (!frame.has_pose || !last_.has_pose) return std::nullopt;
+    return cfp::PoseEstimate{motion_of(frame), inliers};
   }
 
   // With the local map.
