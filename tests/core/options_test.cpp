@@ -107,6 +107,11 @@ TEST_CASE("Every option of a frame is refused by its full, unique name", "[core]
       {"map_point.evidence_limit", [&](auto& o) { o.map_point.evidence_limit = nan; }},
       {"map_point.deletion_threshold", [&](auto& o) { o.map_point.deletion_threshold = nan; }},
       {"map_point.mismatch_threshold", [&](auto& o) { o.map_point.mismatch_threshold = nan; }},
+      {"fine.matching.radius_px", [&](auto& o) { o.fine.matching.radius_px = nan; }},
+      {"fine.matching.max_distance", [](auto& o) { o.fine.matching.max_distance = -1; }},
+      {"fine.matching.max_ratio", [&](auto& o) { o.fine.matching.max_ratio = nan; }},
+      {"min_creation_probability", [&](auto& o) { o.min_creation_probability = nan; }},
+      {"min_inlier_weight", [&](auto& o) { o.min_inlier_weight = nan; }},
       {"health.min_effective_points", [&](auto& o) { o.health.min_effective_points = nan; }},
   };
   CHECK(!invalid_field(cfp::FrameOptions{}));
