@@ -86,11 +86,6 @@ template <typename Scalar>
   return options.min_parallax <= 0 || t > options.min_parallax * median_depth(scratch);
 }
 
-template <typename Scalar>
-[[nodiscard]] ConstraintReport report_of(const ConstraintModel<Scalar>& model, Scalar confidence) noexcept {
-  return {model.status, static_cast<double>(model.threshold_px), static_cast<double>(confidence)};
-}
-
 }  // namespace CFP_ISA
 }  // namespace detail
 
@@ -127,9 +122,9 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
   }
   const Scalar cs = statistical_confidence(pose.inliers, static_cast<Scalar>(options.fine.min_pose_inliers));
   const Scalar ct = cs * projection.calculation_confidence, cf = cs * epipolar.calculation_confidence;
-  state.report.projection = detail::report_of(projection, ct);
-  state.report.epipolar = detail::report_of(epipolar, cf);
-  if (!moved) state.report.epipolar.status = Status::degenerate;
+  state.report.projection = {projection.status, static_cast<double>(projection.threshold_px), static_cast<double>(ct)};
+  state.report.epipolar = {moved ? epipolar.status : Status::degenerate, static_cast<double>(epipolar.threshold_px),
+                           static_cast<double>(cf)};
 
   const bool has_projection = projection.status != Status::not_enough_data,
              has_epipolar = epipolar.status != Status::not_enough_data;

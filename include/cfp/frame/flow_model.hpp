@@ -54,8 +54,7 @@ struct FlowModel {
 /// Scratch memory, reused: after a call, calls of at most the same sizes allocate nothing.
 template <typename Scalar>
 struct FlowModelWorkspace {
-  std::vector<std::array<Scalar, 2>> previous, current;                  ///< undistorted pairs
-  std::vector<std::array<Scalar, 2>> outside_previous, outside_current;  ///< those outside all boxes
+  std::vector<std::array<Scalar, 2>> outside_previous, outside_current;  ///< the pairs outside all boxes
   FundamentalRansacWorkspace ransac;
 };
 
@@ -71,22 +70,22 @@ inline namespace CFP_ISA {
 template <typename Scalar>
 FlowModel<Scalar> estimate_flow_model(const PointSpan<Scalar, 2>& previous, const PointSpan<Scalar, 2>& current,
                                       span<const char> outside, const PinholeCamera<Scalar>& camera,
-                                      const FlowModelOptions& options, FlowModelWorkspace<Scalar>& work) {
+                                      const FlowModelOptions& options, FlowModelWorkspace<Scalar>& workspace) {
   CFP_ASSERT(previous.size() == current.size() && outside.size() == current.size());
-  work.outside_previous.clear();
-  work.outside_current.clear();
-  work.outside_previous.reserve(outside.size());
-  work.outside_current.reserve(outside.size());
+  workspace.outside_previous.clear();
+  workspace.outside_current.clear();
+  workspace.outside_previous.reserve(outside.size());
+  workspace.outside_current.reserve(outside.size());
   for (std::size_t i = 0; i < outside.size(); ++i) {
     if (outside[i] == 0) continue;
-    work.outside_previous.push_back({previous(i, 0), previous(i, 1)});
-    work.outside_current.push_back({current(i, 0), current(i, 1)});
+    workspace.outside_previous.push_back({previous(i, 0), previous(i, 1)});
+    workspace.outside_current.push_back({current(i, 0), current(i, 1)});
   }
-  const bool enough = work.outside_current.size() >= options.min_outside_pairs;
-  const PointSpan<Scalar, 2> support_previous = enough ? PointSpan<Scalar, 2>(work.outside_previous) : previous;
-  const PointSpan<Scalar, 2> support_current = enough ? PointSpan<Scalar, 2>(work.outside_current) : current;
-  const FundamentalResult<Scalar> estimate =
-      fundamental_ransac(PointPairs<Scalar>{support_previous, support_current}, camera, options.ransac, work.ransac);
+  const bool enough = workspace.outside_current.size() >= options.min_outside_pairs;
+  const PointSpan<Scalar, 2> support_previous = enough ? PointSpan<Scalar, 2>(workspace.outside_previous) : previous;
+  const PointSpan<Scalar, 2> support_current = enough ? PointSpan<Scalar, 2>(workspace.outside_current) : current;
+  const FundamentalResult<Scalar> estimate = fundamental_ransac(PointPairs<Scalar>{support_previous, support_current},
+                                                                camera, options.ransac, workspace.ransac);
 
   FlowModel<Scalar> model;
   model.status = estimate.status;

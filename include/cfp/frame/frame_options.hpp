@@ -108,23 +108,8 @@ inline namespace CFP_ISA {
 
 /// The enumerator's name as the example programs spell it.
 [[nodiscard]] constexpr const char* to_string(Variant variant) noexcept {
-  switch (variant) {
-    case Variant::cfp:
-      return "cfp";
-    case Variant::cfp_minus:
-      return "cfp-minus";
-    case Variant::no_mdc:
-      return "no-mdc";
-    case Variant::no_dbscan:
-      return "no-dbscan";
-    case Variant::no_ksp:
-      return "no-ksp";
-    case Variant::only_boxes:
-      return "only-boxes";
-    case Variant::plain:
-      return "plain";
-  }
-  return "unknown";
+  constexpr const char* names[] = {"cfp", "cfp-minus", "no-mdc", "no-dbscan", "no-ksp", "only-boxes", "plain"};
+  return variant <= Variant::plain ? names[static_cast<int>(variant)] : "unknown";
 }
 
 /// The options of a variant: `base` with that variant's parts switched off, nothing else changed. A variant without the
