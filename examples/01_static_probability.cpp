@@ -26,7 +26,7 @@ struct Image {
 
 std::array<Image, 2> simulate() {
   std::array<Image, 2> images;
-  auto& [previous, current] = images;
+  Image &previous = images[0], &current = images[1];
   cfp::Random random(1, "example");
   cfp::Vector6<double> motion;
   motion << 0.03, 0.01, 0.02, 0.002, -0.004, 0.001;
