@@ -1,6 +1,7 @@
 #include "cfp/frame/label_keypoints.hpp"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <numeric>
 #include <vector>
@@ -80,6 +81,7 @@ TEST_CASE("Each box's O and labels equal the equation groups called one by one",
   CHECK(result.flow_support == cfp::FlowSupport::caller);
   for (std::size_t b = 0; b < scene.boxes.size(); ++b) {
     std::vector<double> distances, depths;
+    std::vector<std::array<double, 2>> points;
     std::vector<std::size_t> members;
     for (std::size_t i = 0; i < scene.keypoints.size(); ++i) {
       const cfp::Vector2<double> prev(scene.previous_keypoints[i][0], scene.previous_keypoints[i][1]),
@@ -87,6 +89,7 @@ TEST_CASE("Each box's O and labels equal the equation groups called one by one",
       if (!cfp::contains(scene.boxes[b], cur.x(), cur.y())) continue;
       distances.push_back(cfp::epipolar_distance<double>(F, prev, cur));
       depths.push_back(scene.depths[i]);
+      points.push_back(scene.keypoints[i]);
       members.push_back(i);
     }
     std::vector<double> scratch(distances.size());
@@ -95,8 +98,7 @@ TEST_CASE("Each box's O and labels equal the equation groups called one by one",
     CHECK(run.state.objects[b].pairs == o.pairs);
     std::vector<char> is_foreground(depths.size());
     cfp::ForegroundWorkspace<double> work;
-    cfp::depth_foreground(cfp::span<const double>(depths), options.coarse.foreground, work,
-                          cfp::span<char>(is_foreground));
+    cfp::depth_foreground({depths, points, scene.boxes[b], 0}, options.coarse.foreground, work, is_foreground);
     for (std::size_t j = 0; j < members.size(); ++j) {
       const std::size_t i = members[j];
       if (run.state.box[i] != static_cast<std::int32_t>(b)) continue;
