@@ -39,6 +39,8 @@ struct AucResult {
 
 namespace detail {
 
+inline namespace CFP_ISA {
+
 /// Fills all of result but skipped from ranked, which it sorts. Works with weights relative to the largest, so that
 /// neither the sums nor their product can overflow.
 inline void rank(std::vector<RankedLabel>& ranked, double largest_weight, AucResult& result) noexcept {
@@ -62,7 +64,11 @@ inline void rank(std::vector<RankedLabel>& ranked, double largest_weight, AucRes
   if (both) result.auc = clamp_probability(wins / static_sum / moving_below);
 }
 
+}  // namespace CFP_ISA
+
 }  // namespace detail
+
+inline namespace CFP_ISA {
 
 /// weights may be empty (all 1); equal lengths otherwise. Any finite scores, not only probabilities. O(n log n);
 /// allocates in the workspace on first use only.
@@ -85,6 +91,8 @@ template <typename Scalar>
   detail::rank(workspace.ranked, largest_weight, result);
   return result;
 }
+
+}  // namespace CFP_ISA
 
 /// One row of the reliability table. Bin b holds probabilities in [b / n, (b + 1) / n), the last one 1 as well.
 struct ReliabilityBin {
@@ -110,6 +118,8 @@ struct CalibrationResult {
   std::size_t skipped = 0;                  ///< probability not in [0, 1] or NaN; weight negative or not finite
   Status status = Status::not_enough_data;  ///< degenerate: only one of the classes, auc is 0.5 and the rest valid
 };
+
+inline namespace CFP_ISA {
 
 /// All of the above for probabilities in [0, 1]; weights may be empty. No usable sample → zeros, auc 0.5,
 /// not_enough_data. O(n log n); allocates in the workspace on first use only. Sources: Brier, "Verification of
@@ -171,5 +181,7 @@ template <std::size_t Bins = 10, typename Scalar>
   result.status = ranking.status;
   return result;
 }
+
+}  // namespace CFP_ISA
 
 }  // namespace cfp

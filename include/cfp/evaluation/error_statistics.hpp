@@ -22,6 +22,8 @@ struct ErrorStatistics {
   std::size_t count = 0;
 };
 
+inline namespace CFP_ISA {
+
 /// Statistics of finite errors ≥ 0. Reorders errors. O(n), allocates nothing; does not overflow below 1e308.
 [[nodiscard]] inline ErrorStatistics error_statistics(span<double> errors) noexcept {
   ErrorStatistics s;
@@ -45,5 +47,7 @@ struct ErrorStatistics {
   s.median = errors.size() % 2 == 1 ? *middle : 0.5 * *middle + 0.5 * *std::max_element(errors.begin(), middle);
   return s;
 }
+
+}  // namespace CFP_ISA
 
 }  // namespace cfp

@@ -23,6 +23,8 @@ struct StampedPose {
   SE3<Scalar> T_world_cam;  ///< camera to world, as in TUM trajectory files
 };
 
+inline namespace CFP_ISA {
+
 /// Finite stamp, finite translation, and a rotation matrix whose determinant is about one (0.5 to 2: printed
 /// quaternions are rounded, and an all-zero one, the TUM files' "no pose", must fail).
 template <typename Scalar>
@@ -30,8 +32,8 @@ template <typename Scalar>
   const Matrix3<Scalar>& R = pose.T_world_cam.rotation;
   const Scalar volume = determinant(R);
   const Vector3<Scalar>& t = pose.T_world_cam.translation;
-  return is_finite(pose.time_s) && is_finite(t.x()) && is_finite(t.y()) && is_finite(t.z()) &&
-         volume > Scalar(0.5) && volume < Scalar(2) && R.squaredNorm() < Scalar(12);
+  return is_finite(pose.time_s) && is_finite(t.x()) && is_finite(t.y()) && is_finite(t.z()) && volume > Scalar(0.5) &&
+         volume < Scalar(2) && R.squaredNorm() < Scalar(12);
 }
 
 /// Indices of the usable poses in order of time; of several with one stamp the last in the array stays, as in the
@@ -50,17 +52,23 @@ void time_order(span<const StampedPose<Scalar>> poses, std::vector<std::size_t>&
               order.end());
 }
 
+}  // namespace CFP_ISA
+
 struct AssociationOptions {
   double max_difference_s =
       0.02;             ///< two stamps match when they differ by less than this, > 0 (the TUM scripts' default)
   double offset_s = 0;  ///< added to the stamps of the second trajectory, finite
 };
 
+inline namespace CFP_ISA {
+
 [[nodiscard]] inline OptionPath invalid_field(const AssociationOptions& options) noexcept {
   if (!(options.max_difference_s > 0)) return "max_difference_s";
   if (!is_finite(options.offset_s)) return "offset_s";
   return {};
 }
+
+}  // namespace CFP_ISA
 
 /// Indices into the two trajectories.
 struct TimeMatch {
@@ -83,6 +91,8 @@ struct AssociationWorkspace {
   std::vector<Event> events;
   std::vector<Candidate> heap;
 };
+
+inline namespace CFP_ISA {
 
 /// One-to-one association as in the TUM script associate.py: the pair of free stamps with the smallest |first − (second
 /// + offset)| is matched first, ties go to the earlier first stamp and then to the earlier second one, until no pair
@@ -143,5 +153,7 @@ void associate(span<const StampedPose<Scalar>> first, span<const StampedPose<Sca
   std::sort(matches.begin(), matches.end(),
             [&](const TimeMatch& a, const TimeMatch& b) { return first[a.first].time_s < first[b.first].time_s; });
 }
+
+}  // namespace CFP_ISA
 
 }  // namespace cfp

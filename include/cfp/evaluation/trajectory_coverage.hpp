@@ -21,6 +21,8 @@ struct TrajectoryCoverage {
   double largest_stamp_difference_s = 0;  ///< between a matched pose and its truth
 };
 
+inline namespace CFP_ISA {
+
 /// Coverage of the matches (first = truth, second = estimate), which are in order of time; the orders are those of
 /// time_order. expected_poses 0 stands for all usable estimated poses. Without a match all fractions and times are 0;
 /// times saturate at the largest double. O(matches), allocates nothing.
@@ -52,5 +54,7 @@ template <typename Scalar>
   }
   return coverage;
 }
+
+}  // namespace CFP_ISA
 
 }  // namespace cfp

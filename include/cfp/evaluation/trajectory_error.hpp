@@ -28,9 +28,13 @@ struct AbsoluteErrorOptions {
   std::size_t expected_poses = 0;  ///< frames the estimate should have; 0: as many as it has usable poses
 };
 
+inline namespace CFP_ISA {
+
 [[nodiscard]] inline OptionPath invalid_field(const AbsoluteErrorOptions& options) noexcept {
   return nested("association", invalid_field(options.association));
 }
+
+}  // namespace CFP_ISA
 
 struct AbsoluteErrorResult {
   ErrorStatistics translation_m;  ///< |t_truth − S t_estimate| after alignment; the field's "ATE" is its rmse
@@ -47,9 +51,13 @@ enum class DeltaUnit : std::uint8_t {
   frames    ///< poses of the estimate
 };
 
+inline namespace CFP_ISA {
+
 [[nodiscard]] constexpr const char* to_string(DeltaUnit unit) noexcept {
   return unit == DeltaUnit::seconds ? "s" : "frames";
 }
+
+}  // namespace CFP_ISA
 
 struct RelativeErrorOptions {
   double delta = 1;                     ///< length of the interval, > 0
@@ -59,12 +67,16 @@ struct RelativeErrorOptions {
   std::size_t expected_poses = 0;       ///< as in AbsoluteErrorOptions
 };
 
+inline namespace CFP_ISA {
+
 [[nodiscard]] inline OptionPath invalid_field(const RelativeErrorOptions& options) noexcept {
   if (!detail::positive(options.delta)) return "delta";
   if (!is_finite(options.offset_s)) return "offset_s";
   if (!detail::positive(options.scale)) return "scale";
   return {};
 }
+
+}  // namespace CFP_ISA
 
 struct RelativeErrorResult {
   ErrorStatistics translation_m;  ///< per interval, not divided by its length
@@ -89,6 +101,8 @@ struct TrajectoryErrorWorkspace {
 
 namespace detail {
 
+inline namespace CFP_ISA {
+
 inline void clear_errors(TrajectoryErrorWorkspace& workspace) noexcept {
   workspace.pose.clear();
   workspace.translation_m.clear();
@@ -102,7 +116,11 @@ inline void summarise(TrajectoryErrorWorkspace& workspace, ErrorStatistics& tran
   rotation = error_statistics(workspace.scratch);
 }
 
+}  // namespace CFP_ISA
+
 }  // namespace detail
+
+inline namespace CFP_ISA {
 
 /// ATE: associates by time (see associate), aligns the matched estimated positions to the true ones, and takes the
 /// distances. status is not_enough_data without a match (errors 0), invalid_input for options that invalid_field
@@ -226,5 +244,7 @@ template <typename Scalar>
   detail::summarise(workspace, result.translation_m, result.rotation_deg);
   return result;
 }
+
+}  // namespace CFP_ISA
 
 }  // namespace cfp

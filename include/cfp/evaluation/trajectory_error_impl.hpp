@@ -12,6 +12,7 @@
 #include "cfp/evaluation/trajectory.hpp"
 
 namespace cfp::detail {
+inline namespace CFP_ISA {
 
 /// find_closest_index of evaluate_rpe.py over the ascending values value(0), …, value(n − 1), n > 0: a bisection that
 /// remembers the nearest value it met. Of two equally near it returns the one it met first, which no simpler search
@@ -62,4 +63,5 @@ inline double finite_norm(const Vector3<double>& v) noexcept {
   return is_finite(length) ? length : (std::numeric_limits<double>::max)();
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp::detail
