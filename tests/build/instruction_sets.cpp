@@ -140,7 +140,7 @@ void bundles(const std::vector<cfp_test::BaScene>& scenes, Results& results) {
 
 /// Errors of the refined path, and a lens that bends.
 void judgement(const std::vector<cfp_test::BaScene>& scenes, Results& results) {
-  const cfp::RadialTangentialCamera<double> lens{{535.4, 539.2, 320.1, 247.6}, 0.23, -0.78, -0.003, 0.001, 0.9};
+  const cfp::RadialTangentialCamera<double> lens{535.4, 539.2, 320.1, 247.6, 0.23, -0.78, -0.003, 0.001, 0.9};
   cfp::TrajectoryErrorWorkspace workspace;
   for (const cfp_test::BaScene& scene : scenes) {
     std::vector<cfp::StampedPose<double>> truth, estimate;
