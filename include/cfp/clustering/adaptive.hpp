@@ -14,21 +14,9 @@
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
+#include "cfp/geometry/depth_noise.hpp"
 
 namespace cfp {
-
-/// One standard deviation of a depth measurement, in metres: constant + quadratic (z - nearest)^2.
-struct DepthNoise {
-  double constant_m = 0.0012;  ///< >= 0
-  double quadratic = 0.0019;   ///< 1/m, >= 0; for stereo: constant_m 0, nearest_m 0, quadratic = sigma_disparity_px /
-                               ///< (fx_px baseline_m)
-  double nearest_m = 0.4;      ///< defaults: structured light, Nguyen, Izadi and Lovell, 3DIMPVT 2012
-
-  /// Example: 0.0140 m at z = 3 m with the defaults.
-  [[nodiscard]] constexpr CFP_INLINE double sigma_m(double depth_m) const noexcept {
-    return constant_m + quadratic * (depth_m - nearest_m) * (depth_m - nearest_m);
-  }
-};
 
 enum class AdaptiveRule : std::uint8_t {
   foreground_density,  ///< see `adaptive_options`
@@ -47,13 +35,6 @@ struct AdaptiveOptions {
                                 ///< hand or flying pixels at a silhouette; [0, 1)
   double density = 0.3;         ///< share of the foreground's density that a core point must have; (0, 1]
 };
-
-[[nodiscard]] constexpr OptionPath invalid_field(const DepthNoise& noise) noexcept {
-  if (!detail::non_negative(noise.constant_m)) return "constant_m";
-  if (!detail::non_negative(noise.quadratic)) return "quadratic";
-  if (!is_finite(noise.nearest_m)) return "nearest_m";
-  return {};
-}
 
 [[nodiscard]] constexpr OptionPath invalid_field(const AdaptiveOptions& o) noexcept {
   if (const OptionPath field = nested("fixed", invalid_field(o.fixed))) return field;

@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 
 #include "cfp/frame/flow_model.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
 #include "cfp/geometry/undistort.hpp"
+#include "cfp/probability/object_memory.hpp"
 
 namespace cfp {
 
@@ -22,12 +24,9 @@ template <typename Scalar>
   return labels.empty() || box.compensated() ? contains(box.box, x, y) : label_at(labels, x, y) == box.detection + 1;
 }
 
-/// What the flow pairs are judged by: the host's F, or the model of the pairs outside all boxes.
+/// Marks in scratch.mask the flow pairs that lie on no object.
 template <typename Scalar>
-[[nodiscard]] FlowModel<Scalar> flow_model(const Frame<Scalar>& frame, const FlowPairs<Scalar>& undistorted_flow,
-                                           const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
-                                           FrameState<Scalar>& state) {
-  if (frame.fundamental) return {FlowModelKind::fundamental, FlowSupport::caller, RansacStatus::ok, *frame.fundamental};
+void mark_outside(const Frame<Scalar>& frame, FrameState<Scalar>& state) {
   const PointSpan<Scalar, 2>& pixels = frame.flow.current;
   state.scratch.mask.resize(pixels.size());
   for (std::size_t i = 0; i < pixels.size(); ++i) {
@@ -36,8 +35,50 @@ template <typename Scalar>
     });
     state.scratch.mask[i] = inside ? char(0) : char(1);
   }
-  return estimate_flow_model(undistorted_flow.previous, undistorted_flow.current, span<const char>(state.scratch.mask),
-                             camera, options, state.scratch.flow);
+}
+
+/// What the flow pairs are judged by: the host's motion or F, or the model of the pairs outside all boxes.
+template <typename Scalar>
+[[nodiscard]] FlowModel<Scalar> flow_model(const Frame<Scalar>& frame, const FlowPairs<Scalar>& undistorted_flow,
+                                           const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
+                                           FrameState<Scalar>& state) {
+  const span<const char> outside(state.scratch.mask);
+  if (!frame.T_cur_prev && !frame.fundamental)
+    return estimate_flow_model(undistorted_flow, outside, camera, options, state.scratch.flow);
+  FlowModel<Scalar> model;
+  model.support = FlowSupport::caller;
+  model.status = RansacStatus::ok;
+  model.kind = frame.T_cur_prev ? FlowModelKind::motion : FlowModelKind::fundamental;
+  if (frame.T_cur_prev) model.T_cur_prev = frame.T_cur_prev->template cast<Scalar>();
+  if (frame.fundamental) model.matrix = *frame.fundamental;
+  measure_sigma(undistorted_flow, outside, camera, options, model, state.scratch.flow.distances);
+  return model;
+}
+
+/// Collects in scratch.samples the distances of the pairs on one object. Where it is told from its background by depth,
+/// so are the pairs: what lies behind it says nothing of it, and a pair on its silhouette may have either depth.
+template <typename Scalar>
+void collect_object_distances(const Frame<Scalar>& frame, const TrackedBox<Scalar>& box, bool by_depth,
+                              const CoarseOptions& options, FrameState<Scalar>& state) {
+  FrameScratch<Scalar>& scratch = state.scratch;
+  const FlowPairs<Scalar>& flow = frame.flow;
+  scratch.samples.clear();
+  scratch.depths.clear();
+  for (std::size_t i = 0; i < flow.current.size(); ++i) {
+    if (!lies_on(box, frame.labels, flow.current(i, 0), flow.current(i, 1))) continue;
+    scratch.samples.push_back(scratch.epipolar[i]);
+    scratch.depths.push_back(flow.previous_depths.empty() ? Scalar(0) : flow.previous_depths[i]);
+  }
+  if (!by_depth || flow.previous_depths.empty()) return;
+  scratch.mask.assign(scratch.samples.size(), char(1));
+  const ForegroundResult separated = depth_foreground(span<const Scalar>(scratch.depths), options.foreground,
+                                                      scratch.foreground, span<char>(scratch.mask));
+  if (separated.status != ForegroundStatus::ok) return;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < scratch.samples.size(); ++i) {
+    if (scratch.mask[i] != 0) scratch.samples[kept++] = scratch.samples[i];
+  }
+  scratch.samples.resize(kept);
 }
 
 }  // namespace CFP_ISA
@@ -60,27 +101,51 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
 
   FrameScratch<Scalar>& scratch = state.scratch;
   const FlowPairs<Scalar> flow{undistorted(camera, frame.flow.previous, scratch.undistorted_previous),
-                               undistorted(camera, frame.flow.current, scratch.undistorted_current)};
-  const FlowModel<Scalar> model =
-      detail::flow_model(frame, flow, undistorted_camera(camera), options.coarse.flow, state);
+                               undistorted(camera, frame.flow.current, scratch.undistorted_current),
+                               frame.flow.previous_depths};
+  const PinholeCamera<Scalar> pinhole = undistorted_camera(camera);
+  const CoarseOptions& coarse = options.coarse;
+  detail::mark_outside(frame, state);
+  const FlowModel<Scalar> model = detail::flow_model(frame, flow, pinhole, coarse.flow, state);
   report.flow_model = model.kind;
   report.flow_support = model.support;
   report.flow_status = model.status;
+  report.flow_sigma_px = static_cast<double>(model.sigma_px);
   if (model.kind == FlowModelKind::none) return;
 
   scratch.epipolar.resize(n);
   scratch.scratch.resize(n);
   scratch.samples.reserve(n);
-  flow_distances(model, flow.previous, flow.current, span<Scalar>(scratch.epipolar));
+  scratch.depths.reserve(n);
+  flow_distances(model, flow, pinhole, coarse.flow, span<Scalar>(scratch.epipolar));
+  const ObjectProbabilityOptions scored = scaled_to_noise(coarse.object, static_cast<double>(model.sigma_px),
+                                                          model.kind == FlowModelKind::fundamental ? 1 : 2);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
-    scratch.samples.clear();
-    for (std::size_t i = 0; i < n; ++i) {
-      if (detail::lies_on(state.boxes[b], frame.labels, frame.flow.current(i, 0), frame.flow.current(i, 1)))
-        scratch.samples.push_back(scratch.epipolar[i]);
-    }
-    state.objects[b] = object_probability(scratch.samples, object_options, scratch.scratch);
+    const bool by_depth = coarse.use_depth_foreground && is_non_rigid(state.boxes[b].class_id, options);
+    detail::collect_object_distances(frame, state.boxes[b], by_depth, coarse, state);
+    state.objects[b] = object_probability(scratch.samples, scored, scratch.scratch);
     if (state.objects[b].status == Status::ok) --report.unknown_objects;
   }
+}
+
+/// Adds what is remembered of every object from the frames before, by the id of its box, and remembers this frame.
+template <typename Scalar>
+void remember_objects(const FrameOptions& options, FrameState<Scalar>& state) {
+  if (!options.coarse.use_object_probability) return;
+  auto& known = state.memories;
+  auto& next = state.scratch.memories;
+  next.clear();
+  const double dt = state.previous.known ? state.current.timestamp_s - state.previous.timestamp_s : 0;
+  for (std::size_t b = 0; b < state.boxes.size(); ++b) {
+    const auto of_box =
+        std::find_if(known.begin(), known.end(), [&](const auto& m) { return m.first == state.boxes[b].id; });
+    ObjectMemory memory = of_box != known.end() && state.previous.known ? of_box->second : ObjectMemory{};
+    const bool unknown = state.objects[b].status != Status::ok;
+    state.objects[b] = remembered(state.objects[b], dt, options.object_threshold, options.coarse.memory, memory);
+    if (unknown && state.objects[b].status == Status::ok) --state.report.unknown_objects;
+    next.push_back({state.boxes[b].id, memory});
+  }
+  std::swap(known, next);
 }
 
 }  // namespace CFP_ISA

@@ -1,6 +1,6 @@
 /// @file flow_model.hpp
-/// The two-view model that optical-flow pairs are judged by: a fundamental matrix where the camera has moved, a
-/// homography where it has only turned or stood still (paper section IV-B, object stage).
+/// What optical-flow pairs are judged by (paper section IV-B, object stage): the camera's motion where depths are
+/// known, else a fundamental matrix, or a homography for a camera that has only turned or stood still.
 #pragma once
 
 #include <algorithm>
@@ -11,6 +11,7 @@
 
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
+#include "cfp/frame/camera_motion.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/homography.hpp"
@@ -27,18 +28,23 @@ struct FlowModelOptions {
   /// homography; true: objects are judged by the distance from that (both coordinates count, not only the one across a
   /// line). false: they are unknown. Not in the paper, whose F is then arbitrary.
   bool use_rotation_homography = true;
+  /// true: where enough pairs have a depth, they are judged by the camera's motion and their depths. false: as the
+  /// paper.
+  bool use_depth = true;
+  CameraMotionOptions motion;
   FundamentalRansacOptions ransac;
 };
 
 enum class FlowModelKind : std::uint8_t {
-  none,         ///< neither could be had: every object is unknown
+  none,         ///< nothing could be had: every object is unknown
+  motion,       ///< distances under the camera's motion, with what is known of the depths
   fundamental,  ///< distances from epipolar lines
   homography    ///< distances from the homography of a turning or resting camera
 };
 
 enum class FlowSupport : std::uint8_t {
   none,           ///< no model was estimated
-  caller,         ///< the caller's fundamental matrix
+  caller,         ///< the caller's motion or fundamental matrix
   outside_pairs,  ///< the pairs outside all boxes
   all_pairs       ///< too few of those: all pairs
 };
@@ -48,13 +54,17 @@ struct FlowModel {
   FlowModelKind kind = FlowModelKind::none;
   FlowSupport support = FlowSupport::none;
   RansacStatus status = RansacStatus::not_enough_data;  ///< of the estimate; ok with the caller's matrix
-  Matrix3<Scalar> matrix = Matrix3<Scalar>::Zero();     ///< F or H, previous to current
+  Matrix3<Scalar> matrix = Matrix3<Scalar>::Zero();             ///< F or H, previous to current
+  SE3<Scalar> T_cur_prev;                                       ///< of kind motion
+  Scalar sigma_px = Scalar(0);  ///< noise of one coordinate, measured on the pairs outside all boxes; 0: not measured
 };
 
 /// Scratch memory, reused: after a call, calls of at most the same sizes allocate nothing.
 template <typename Scalar>
 struct FlowModelWorkspace {
   std::vector<std::array<Scalar, 2>> outside_previous, outside_current;  ///< the pairs outside all boxes
+  std::vector<Scalar> distances;
+  CameraMotionWorkspace<Scalar> motion;
   FundamentalRansacWorkspace ransac;
 };
 
@@ -62,30 +72,52 @@ inline namespace CFP_ISA {
 
 [[nodiscard]] inline OptionPath invalid_field(const FlowModelOptions& o) noexcept {
   if (o.min_outside_pairs < 8) return "min_outside_pairs";
+  if (const OptionPath field = nested("motion", invalid_field(o.motion))) return field;
   return nested("ransac", invalid_field(o.ransac));
 }
 
-/// The model of undistorted pairs, estimated from those that `outside` marks as outside all boxes when there are
-/// enough, else from all. The camera, that of the undistorted image, tells a rotation from a plane.
+/// The distance of every pair under the model, in pixels; no_distance for all without one.
 template <typename Scalar>
-FlowModel<Scalar> estimate_flow_model(const PointSpan<Scalar, 2>& previous, const PointSpan<Scalar, 2>& current,
-                                      span<const char> outside, const PinholeCamera<Scalar>& camera,
-                                      const FlowModelOptions& options, FlowModelWorkspace<Scalar>& workspace) {
-  CFP_ASSERT(previous.size() == current.size() && outside.size() == current.size());
+void flow_distances(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow, const PinholeCamera<Scalar>& camera,
+                    const FlowModelOptions& options, span<Scalar> out) noexcept {
+  switch (model.kind) {
+    case FlowModelKind::motion:
+      return motion_distances(flow.previous, flow.previous_depths, flow.current, model.T_cur_prev, camera,
+                              model.sigma_px > Scalar(0) ? model.sigma_px : Scalar(options.motion.min_sigma_px),
+                              options.motion.distance, out);
+    case FlowModelKind::fundamental:
+      return epipolar_distances(model.matrix, flow.previous, flow.current, out);
+    case FlowModelKind::homography:
+      return transfer_distances(model.matrix, flow.previous, flow.current, out);
+    case FlowModelKind::none:
+      std::fill(out.begin(), out.end(), Scalar(no_distance<double>));
+  }
+}
+
+}  // namespace CFP_ISA
+
+namespace detail {
+inline namespace CFP_ISA {
+
+/// The fundamental matrix, or homography, of the pairs marked in `outside` when there are enough, else of all.
+template <typename Scalar>
+FlowModel<Scalar> estimate_two_view_model(const FlowPairs<Scalar>& flow, span<const char> outside,
+                                          const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
+                                          FlowModelWorkspace<Scalar>& workspace) {
   workspace.outside_previous.clear();
   workspace.outside_current.clear();
   workspace.outside_previous.reserve(outside.size());
   workspace.outside_current.reserve(outside.size());
   for (std::size_t i = 0; i < outside.size(); ++i) {
     if (outside[i] == 0) continue;
-    workspace.outside_previous.push_back({previous(i, 0), previous(i, 1)});
-    workspace.outside_current.push_back({current(i, 0), current(i, 1)});
+    workspace.outside_previous.push_back({flow.previous(i, 0), flow.previous(i, 1)});
+    workspace.outside_current.push_back({flow.current(i, 0), flow.current(i, 1)});
   }
   const bool enough = workspace.outside_current.size() >= options.min_outside_pairs;
-  const PointSpan<Scalar, 2> support_previous = enough ? PointSpan<Scalar, 2>(workspace.outside_previous) : previous;
-  const PointSpan<Scalar, 2> support_current = enough ? PointSpan<Scalar, 2>(workspace.outside_current) : current;
-  const FundamentalResult<Scalar> estimate = fundamental_ransac(PointPairs<Scalar>{support_previous, support_current},
-                                                                camera, options.ransac, workspace.ransac);
+  const PointSpan<Scalar, 2> previous = enough ? PointSpan<Scalar, 2>(workspace.outside_previous) : flow.previous;
+  const PointSpan<Scalar, 2> current = enough ? PointSpan<Scalar, 2>(workspace.outside_current) : flow.current;
+  const FundamentalResult<Scalar> estimate =
+      fundamental_ransac(PointPairs<Scalar>{previous, current}, camera, options.ransac, workspace.ransac);
 
   FlowModel<Scalar> model;
   model.status = estimate.status;
@@ -101,18 +133,54 @@ FlowModel<Scalar> estimate_flow_model(const PointSpan<Scalar, 2>& previous, cons
   return model;
 }
 
-/// The distance of every pair under the model, in pixels; no_distance for all without one.
+/// Measures the noise of the pairs marked in `outside` under the model.
 template <typename Scalar>
-void flow_distances(const FlowModel<Scalar>& model, const PointSpan<Scalar, 2>& previous,
-                    const PointSpan<Scalar, 2>& current, span<Scalar> out) noexcept {
-  switch (model.kind) {
-    case FlowModelKind::fundamental:
-      return epipolar_distances(model.matrix, previous, current, out);
-    case FlowModelKind::homography:
-      return transfer_distances(model.matrix, previous, current, out);
-    case FlowModelKind::none:
-      std::fill(out.begin(), out.end(), Scalar(no_distance<double>));
+void measure_sigma(const FlowPairs<Scalar>& flow, span<const char> outside, const PinholeCamera<Scalar>& camera,
+                   const FlowModelOptions& options, FlowModel<Scalar>& model, std::vector<Scalar>& distances) {
+  distances.resize(outside.size());
+  flow_distances(model, flow, camera, options, span<Scalar>(distances));
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < outside.size(); ++i) {
+    if (outside[i] != 0) distances[kept++] = distances[i];
   }
+  if (kept < options.min_outside_pairs) return;
+  const Scalar sigma =
+      robust_sigma(span<Scalar>(distances.data(), kept), model.kind == FlowModelKind::fundamental ? 1 : 2);
+  model.sigma_px =
+      (std::min)((std::max)(sigma, Scalar(options.motion.min_sigma_px)), Scalar(options.motion.max_sigma_px));
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
+
+inline namespace CFP_ISA {
+
+/// What the pairs of the undistorted image are judged by, from those that `outside` marks as outside all boxes: the
+/// camera's motion if enough of them have a depth and agree, else the two-view model, for which all pairs serve where
+/// too few lie outside. The camera is that of the undistorted image. sigma_px is measured where enough pairs lie
+/// outside.
+template <typename Scalar>
+FlowModel<Scalar> estimate_flow_model(const FlowPairs<Scalar>& flow, span<const char> outside,
+                                      const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
+                                      FlowModelWorkspace<Scalar>& workspace) {
+  CFP_ASSERT(flow.previous.size() == flow.current.size() && outside.size() == flow.current.size());
+  CFP_ASSERT(flow.previous_depths.empty() || flow.previous_depths.size() == flow.current.size());
+  FlowModel<Scalar> model;
+  if (options.use_depth) {
+    const CameraMotion<Scalar> motion =
+        estimate_camera_motion(flow, outside, SE3<double>(), camera, options.motion, workspace.motion);
+    if (motion.known) {
+      model.kind = FlowModelKind::motion;
+      model.support = FlowSupport::outside_pairs;
+      model.status = RansacStatus::ok;
+      model.T_cur_prev = motion.T_cur_prev;
+      model.sigma_px = motion.sigma_px;
+      return model;
+    }
+  }
+  model = detail::estimate_two_view_model(flow, outside, camera, options, workspace);
+  detail::measure_sigma(flow, outside, camera, options, model, workspace.distances);
+  return model;
 }
 
 }  // namespace CFP_ISA

@@ -36,6 +36,8 @@ template <typename Scalar>
 struct FlowPairs {
   PointSpan<Scalar, 2> previous;  ///< in frame k-1
   PointSpan<Scalar, 2> current;   ///< in frame k
+  span<const Scalar>
+      previous_depths;  ///< metres along z in frame k-1; not positive or not finite: none there. Empty: none
 };
 
 /// Frame k. All pixels are those of the image in which the objects were detected; the camera knows its distortion.
@@ -54,6 +56,7 @@ struct Frame {
   LabelImage labels;           ///< the same as an image: label v belongs to detection v - 1
   DescriptorSpan descriptors;  ///< binary, one per keypoint: `fine` then matches what lies in boxes by itself
   span<const Scalar> map_point_probability;     ///< M per keypoint if matches are known by now, negative: no map point
+  std::optional<SE3<double>> T_cur_prev;        ///< the camera's motion since frame k-1, if the host knows it by now
   std::optional<Matrix3<Scalar>> fundamental;   ///< F of the undistorted flow pairs, if the host has one
   std::optional<Matrix3<Scalar>> image_motion;  ///< homography from the previous image, moves the predicted boxes
 };

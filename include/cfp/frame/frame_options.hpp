@@ -15,6 +15,7 @@
 #include "cfp/probability/distance_sigmoid.hpp"
 #include "cfp/probability/map_point.hpp"
 #include "cfp/probability/object.hpp"
+#include "cfp/probability/object_memory.hpp"
 
 namespace cfp {
 
@@ -31,6 +32,7 @@ struct CoarseOptions {
   bool soft_background = true;  ///< false: background keypoints keep K = 1, as do all outside (W/O-KSP, Only-YOLO)
   FlowModelOptions flow;
   ObjectProbabilityOptions object;
+  ObjectMemoryOptions memory;
   ForegroundOptions foreground;
 };
 
@@ -82,6 +84,7 @@ inline namespace CFP_ISA {
 [[nodiscard]] inline OptionPath invalid_field(const CoarseOptions& o) noexcept {
   if (const OptionPath field = nested("flow", invalid_field(o.flow))) return field;
   if (const OptionPath field = nested("object", invalid_field(o.object))) return field;
+  if (const OptionPath field = nested("memory", invalid_field(o.memory))) return field;
   return nested("foreground", invalid_field(o.foreground));
 }
 
@@ -104,6 +107,12 @@ inline namespace CFP_ISA {
   if (const OptionPath field = nested("fine", invalid_field(o.fine))) return field;
   if (const OptionPath field = nested("map_point", invalid_field(o.map_point))) return field;
   return nested("health", invalid_field(o.health));
+}
+
+/// Whether objects of this class are told from their background by depth.
+[[nodiscard]] inline bool is_non_rigid(int class_id, const FrameOptions& options) noexcept {
+  return std::any_of(options.classes.begin(), options.classes.end(),
+                     [class_id](const ObjectClass& c) { return c.class_id == class_id && c.non_rigid; });
 }
 
 /// The enumerator's name as the example programs spell it.

@@ -16,6 +16,7 @@
 #include "cfp/frame/frame.hpp"
 #include "cfp/frame/health.hpp"
 #include "cfp/probability/object.hpp"
+#include "cfp/probability/object_memory.hpp"
 
 namespace cfp {
 
@@ -40,6 +41,7 @@ struct FrameReport {
   FlowModelKind flow_model = FlowModelKind::none;            ///< what the flow pairs were judged by,
   FlowSupport flow_support = FlowSupport::none;              ///< what that rests on,
   RansacStatus flow_status = RansacStatus::not_enough_data;  ///< and how its estimation ended
+  double flow_sigma_px = 0;                                  ///< noise of the flow as measured; 0: not
   std::size_t unknown_objects = 0;                           ///< boxes whose O is not known
   // keypoints
   std::size_t outside = 0, foreground = 0, background = 0, invalid = 0;  ///< by label
@@ -88,16 +90,18 @@ struct FrameScratch {
   std::vector<Scalar> depths, projection, epipolar, samples, scratch;
   std::vector<std::int32_t> members;
   std::vector<char> mask;
+  std::vector<std::pair<std::int64_t, ObjectMemory>> memories;
 };
 
 /// Reused from frame to frame: after the largest frame has been seen, the steps allocate nothing.
 template <typename Scalar>
 struct FrameState {
   FrameMemory<Scalar> previous, current;
-  std::vector<TrackedBox<Scalar>> boxes;   ///< of objects that can move: detected and compensated
-  std::vector<ObjectProbability> objects;  ///< O, one per box
-  std::vector<KeypointLabel> label;        ///< per keypoint
-  std::vector<std::int32_t> box;           ///< per keypoint: the box that decides its K, or no_box
+  std::vector<TrackedBox<Scalar>> boxes;                        ///< of objects that can move: detected and compensated
+  std::vector<ObjectProbability> objects;                       ///< O, one per box
+  std::vector<std::pair<std::int64_t, ObjectMemory>> memories;  ///< of the objects, by the id of their boxes
+  std::vector<KeypointLabel> label;                             ///< per keypoint
+  std::vector<std::int32_t> box;                                ///< per keypoint: the box that decides its K, or no_box
   std::vector<std::int32_t> match;         ///< per keypoint: index in the frame before, or no_match
   std::vector<Scalar> static_probability;  ///< per keypoint: K
   std::vector<Scalar> posterior;           ///< per keypoint: K with M of before as its prior, from the fine stage

@@ -76,10 +76,7 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     const bool segmented = detail::collect_members(frame, state.boxes[b], state);
     scratch.mask.assign(scratch.members.size(), char(1));
-    const bool non_rigid = std::any_of(options.classes.begin(), options.classes.end(), [&](const ObjectClass& c) {
-      return c.class_id == state.boxes[b].class_id && c.non_rigid;
-    });
-    if (!segmented && non_rigid && options.coarse.use_depth_foreground &&
+    if (!segmented && is_non_rigid(state.boxes[b].class_id, options) && options.coarse.use_depth_foreground &&
         !detail::separate_foreground(state.boxes[b], options.coarse, state))
       ++report.undecided_foregrounds;
 

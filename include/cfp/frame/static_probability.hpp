@@ -57,6 +57,7 @@ class StaticProbability {
     begin_frame(frame, state_);
     track_boxes(frame, options_, tracker_, state_);
     estimate_objects(frame, camera_, options_, state_);
+    remember_objects(options_, state_);
     label_keypoints(frame, options_, state_);
     weigh_keypoints(or_sure(frame.map_point_probability), options_, state_);
     return result(state_.static_probability);

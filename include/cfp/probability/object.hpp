@@ -32,11 +32,17 @@ struct ObjectProbabilityOptions {
   ObjectScore score = ObjectScore::survival;
   /// k, > 0. The paper's 2; a distance from a line has statistically one degree of freedom.
   double degrees_of_freedom = 2;
-  /// Noise of an epipolar distance in pixels, > 0. With 1 (the paper) the score reaches 0.9 at 0.46 px and a static
-  /// object with unit noise scores 0.43: O is a score on a pixel scale, and sigma sets the scale.
+  /// Scale of the distances in pixels, > 0. With 1 (the paper) the score reaches 0.9 at 0.46 px and a static object
+  /// with unit noise scores 0.43: O is a score on a pixel scale, and sigma sets the scale.
   double sigma_px = 1;
+  /// Where the noise of the flow has been measured, sigma_px is this many times its standard deviation, so that a
+  /// static object scores the same at any noise (0.94 to 0.97) and O_Th means the same; 0: sigma_px as it stands, as
+  /// printed. >= 0.
+  double noise_factor = 5.8;
   /// Positions of the ascending order statistics whose mean is O: shares of the number of pairs in (0, 1], ascending.
-  std::array<double, 3> positions = {0.1, 0.2, 0.3};
+  /// The paper's are 0.1, 0.2, 0.3; a seventh of wrong depths or mismatches is then taken for motion
+  /// (benchmarks/studies/object_motion_study).
+  std::array<double, 3> positions = {0.2, 0.3, 0.4};
   /// Fewer usable pairs than this, and O is unknown (>= 1; benchmarks/studies/object_score_study).
   std::size_t min_pairs = 10;
   /// What an unknown object counts as, in [0, 1]. Below O_Th: an object is dynamic until it is shown to be static.
@@ -49,6 +55,7 @@ inline namespace CFP_ISA {
   if (!detail::positive(o.degrees_of_freedom)) return "degrees_of_freedom";
   if (o.score == ObjectScore::normalized_density && o.degrees_of_freedom < 2) return "degrees_of_freedom";
   if (!detail::positive(o.sigma_px)) return "sigma_px";
+  if (!detail::non_negative(o.noise_factor)) return "noise_factor";
   if (!(o.positions[0] > 0 && o.positions[0] <= o.positions[1] && o.positions[1] <= o.positions[2] &&
         o.positions[2] <= 1))
     return "positions";
@@ -67,6 +74,16 @@ struct ObjectProbability {
 };
 
 inline namespace CFP_ISA {
+
+/// The options on the scale of a measured noise, one standard deviation in pixels of one coordinate; as they are where
+/// there is no measure (sigma 0) or noise_factor is 0. A distance from a line sees one of two coordinates and counts as
+/// if it saw both.
+[[nodiscard]] inline ObjectProbabilityOptions scaled_to_noise(ObjectProbabilityOptions options, double noise_sigma_px,
+                                                              int coordinates) noexcept {
+  const double scale = options.noise_factor * noise_sigma_px / std::sqrt(2.0 / coordinates);
+  if (detail::positive(scale)) options.sigma_px = scale;
+  return options;
+}
 
 /// Score of one pair: f((d / sigma)^2; k) with f as `options.score` says (paper eqs. chsq and (O)_m). Non-increasing in
 /// |d|, except for densities with k > 2. In [0, 1]; NaN or an infinite distance scores 0. Allocates nothing.

@@ -1,0 +1,120 @@
+/// @file camera_motion.hpp
+/// The camera's motion between two frames from optical-flow pairs whose depth is known, and the noise of the flow. Not
+/// in the paper, which judges objects by a fundamental matrix: that has nothing to say of planes, rotations and cameras
+/// at rest, and is blind along its lines.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "cfp/core/options.hpp"
+#include "cfp/core/span.hpp"
+#include "cfp/frame/frame.hpp"
+#include "cfp/geometry/motion_distance.hpp"
+#include "cfp/math/order_statistic.hpp"
+#include "cfp/optimization/pose/pose_refinement.hpp"
+
+namespace cfp {
+
+struct CameraMotionOptions {
+  std::size_t min_pairs = 30;  ///< with depth, outside all boxes: with fewer there is no motion, >= 3
+  double min_inlier_share =
+      0.5;  ///< of these, within the outlier threshold of `pose`: a motion that fewer agree to is none, in [0, 1]
+  double min_sigma_px = 0.05;  ///< the noise of the flow is measured and kept in these bounds, > 0
+  double max_sigma_px = 1;     ///< >= min_sigma_px
+  MotionDistanceOptions distance;
+  PoseOptions pose;
+};
+
+template <typename Scalar>
+struct CameraMotion {
+  bool known = false;
+  SE3<Scalar> T_cur_prev;
+  Scalar sigma_px = Scalar(1);  ///< standard deviation of one coordinate of a static flow pair, robust
+};
+
+/// Scratch memory, reused: after a call, calls of at most the same sizes allocate nothing.
+template <typename Scalar>
+struct CameraMotionWorkspace {
+  std::vector<std::array<Scalar, 3>> points;  // of the pairs that take part, in the previous camera
+  std::vector<std::array<Scalar, 2>> previous, current;
+  std::vector<Scalar> depths, sigmas, distances;
+  PoseWorkspace<Scalar> pose;
+};
+
+inline namespace CFP_ISA {
+
+[[nodiscard]] inline OptionPath invalid_field(const CameraMotionOptions& o) noexcept {
+  if (o.min_pairs < 3) return "min_pairs";
+  if (!(o.min_inlier_share >= 0 && o.min_inlier_share <= 1)) return "min_inlier_share";
+  if (!detail::positive(o.min_sigma_px)) return "min_sigma_px";
+  if (!(o.max_sigma_px >= o.min_sigma_px) || !is_finite(o.max_sigma_px)) return "max_sigma_px";
+  if (const OptionPath field = nested("distance", invalid_field(o.distance))) return field;
+  return nested("pose", invalid_field(o.pose));
+}
+
+/// The standard deviation of one coordinate, from distances of static points of which at least half are right: their
+/// median over that of the chi distribution. degrees_of_freedom: 1 for distances from a line, 2 for distances from a
+/// point. Distances that are none are left out; none at all gives 0. `distances` is overwritten. O(n).
+template <typename Scalar>
+[[nodiscard]] Scalar robust_sigma(span<Scalar> distances, int degrees_of_freedom) noexcept {
+  const std::size_t n = copy_distances(span<const Scalar>(distances), distances);
+  if (n == 0) return Scalar(0);
+  const Scalar median = order_statistic(distances.subspan(0, n), quantile_rank(0.5, n) - 1);
+  return median / Scalar(degrees_of_freedom == 1 ? 0.674489750196082 : 1.177410022515475);
+}
+
+/// The motion of the camera from the pairs of the undistorted image that `outside` marks as on no object and whose
+/// depth is known: weighted robust pose refinement (refine_pose) from `start`, once with the largest noise and once
+/// with the noise that the pairs then show. Unknown where too few pairs have a depth or agree. O(pairs).
+template <typename Scalar>
+[[nodiscard]] CameraMotion<Scalar> estimate_camera_motion(const FlowPairs<Scalar>& flow, span<const char> outside,
+                                                          const SE3<double>& start, const PinholeCamera<Scalar>& camera,
+                                                          const CameraMotionOptions& options,
+                                                          CameraMotionWorkspace<Scalar>& workspace) {
+  CFP_ASSERT(outside.size() == flow.current.size());
+  CameraMotion<Scalar> motion;
+  workspace.points.clear();
+  workspace.previous.clear();
+  workspace.current.clear();
+  workspace.depths.clear();
+  for (std::size_t i = 0; i < flow.previous_depths.size(); ++i) {
+    const Scalar z = flow.previous_depths[i];
+    Vector3<Scalar> ray;
+    if (outside[i] == 0 || !is_valid_depth(z) || !camera.unproject(flow.previous[i], ray)) continue;
+    workspace.points.push_back({ray.x() * z, ray.y() * z, z});
+    workspace.previous.push_back({flow.previous(i, 0), flow.previous(i, 1)});
+    workspace.current.push_back({flow.current(i, 0), flow.current(i, 1)});
+    workspace.depths.push_back(z);
+  }
+  const std::size_t n = workspace.points.size();
+  if (n < options.min_pairs) return motion;
+
+  workspace.distances.resize(n);
+  SE3<double> T = start;
+  motion.sigma_px = Scalar(options.max_sigma_px);
+  for (int pass = 0; pass < 2; ++pass) {
+    workspace.sigmas.assign(n, motion.sigma_px);
+    PoseObservations<Scalar> observations;
+    observations.points = workspace.points;
+    observations.pixels = workspace.current;
+    observations.sigmas = workspace.sigmas;
+    const PoseResult refined = refine_pose(observations, camera, T, options.pose, workspace.pose);
+    if (!is_refined(refined.reason) ||
+        static_cast<double>(refined.inliers) < options.min_inlier_share * static_cast<double>(n))
+      return motion;
+    T = refined.T_cam_world;
+    motion.T_cur_prev = T.template cast<Scalar>();
+    motion_distances(workspace.previous, workspace.depths, workspace.current, motion.T_cur_prev, camera,
+                     motion.sigma_px, options.distance, workspace.distances);
+    const Scalar sigma = robust_sigma(span<Scalar>(workspace.distances), 2);
+    motion.sigma_px = (std::min)((std::max)(sigma, Scalar(options.min_sigma_px)), Scalar(options.max_sigma_px));
+  }
+  motion.known = true;
+  return motion;
+}
+
+}  // namespace CFP_ISA
+}  // namespace cfp

@@ -1,0 +1,79 @@
+/// @file motion_distance.hpp
+/// How far a point of the image has gone from where a static point would have gone: a flow pair against the camera's
+/// motion, with what is known of the depth. It lies between two distances of the paper: with an exact depth it is d^T
+/// of eq. 6, with none at all d^F of eq. 13, the distance from the epipolar line.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+
+#include "cfp/core/numeric.hpp"
+#include "cfp/core/span.hpp"
+#include "cfp/core/types.hpp"
+#include "cfp/geometry/camera.hpp"
+#include "cfp/geometry/depth_noise.hpp"
+#include "cfp/geometry/distance.hpp"
+#include "cfp/math/se3.hpp"
+
+namespace cfp {
+
+struct MotionDistanceOptions {
+  DepthNoise depth_noise;      ///< of a measured depth
+  UnknownDepth unknown_depth;  ///< of all others
+};
+
+inline namespace CFP_ISA {
+
+[[nodiscard]] constexpr OptionPath invalid_field(const MotionDistanceOptions& o) noexcept {
+  if (const OptionPath field = nested("depth_noise", invalid_field(o.depth_noise))) return field;
+  return nested("unknown_depth", invalid_field(o.unknown_depth));
+}
+
+/// d = sigma sqrt(r^T (sigma^2 I + sigma_z^2 J J^T)^-1 r), in pixels, with r = pixel_cur - project(T_cur_prev X), X the
+/// previous pixel at its depth z, and J = d project / d z: the Mahalanobis distance of the pair, times sigma_px, so
+/// that (d / sigma)^2 has two degrees of freedom. The part of r along the epipolar line counts as far as the depth
+/// explains none of it. A plane, a rotation or a resting camera is no special case. A depth that is not positive or not
+/// finite: see UnknownDepth. no_distance for a pixel without a ray, a point behind the current camera, or anything not
+/// finite. sigma_px > 0. Not in the paper.
+template <typename Camera, typename Scalar>
+[[nodiscard]] Scalar motion_distance(const Vector2<Scalar>& pixel_prev, const non_deduced<Scalar>& depth_prev,
+                                     const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
+                                     const Camera& camera, const non_deduced<Scalar>& sigma_px,
+                                     const MotionDistanceOptions& options) noexcept {
+  using std::sqrt;
+  const Scalar none = Scalar(no_distance<double>);
+  Vector3<Scalar> ray;
+  if (!camera.unproject(pixel_prev, ray)) return none;
+  const bool measured = is_valid_depth(depth_prev);
+  const Scalar z = measured ? depth_prev : Scalar(1 / options.unknown_depth.inverse_mean);
+  const Scalar sigma_z = measured ? Scalar(options.depth_noise.sigma_m(static_cast<double>(z)))
+                                  : z * z * Scalar(options.unknown_depth.inverse_sigma);
+  const Vector3<Scalar> turned = T_cur_prev.rotation * ray;
+  Vector2<Scalar> projected;
+  Matrix23<Scalar> jacobian;
+  if (!camera.project(turned * z + T_cur_prev.translation, projected, &jacobian)) return none;
+  const Vector2<Scalar> r = pixel_cur - projected, along = jacobian * turned;
+  // Sherman and Morrison: the inverse of I + kappa J J^T takes r its part along J but for 1 / (1 + kappa |J|^2).
+  const Scalar spread = sigma_z / sigma_px, kappa = spread * spread;
+  const Scalar explained = r.dot(along), length_sq = along.squaredNorm();
+  const Scalar distance_sq = r.squaredNorm() - explained * explained * (kappa / (Scalar(1) + kappa * length_sq));
+  const Scalar distance = sqrt(distance_sq > Scalar(0) ? distance_sq : Scalar(0));
+  return has_distance(distance) && is_finite(distance_sq) ? distance : none;
+}
+
+/// motion_distance of every pair. `depths_prev` may be empty: none is known. Sizes must agree. Allocates nothing.
+template <typename Camera, typename Scalar = typename Camera::ScalarType>
+void motion_distances(const PointSpan<non_deduced<Scalar>, 2>& prev, span<const non_deduced<Scalar>> depths_prev,
+                      const PointSpan<non_deduced<Scalar>, 2>& cur, const SE3<non_deduced<Scalar>>& T_cur_prev,
+                      const Camera& camera, non_deduced<Scalar> sigma_px, const MotionDistanceOptions& options,
+                      span<non_deduced<Scalar>> out) noexcept {
+  CFP_ASSERT(prev.size() == out.size() && cur.size() == out.size());
+  CFP_ASSERT(depths_prev.empty() || depths_prev.size() == out.size());
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const Scalar depth = depths_prev.empty() ? Scalar(0) : depths_prev[i];
+    out[i] = motion_distance(prev[i], depth, cur[i], T_cur_prev, camera, sigma_px, options);
+  }
+}
+
+}  // namespace CFP_ISA
+}  // namespace cfp
