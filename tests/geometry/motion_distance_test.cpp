@@ -44,7 +44,7 @@ TEST_CASE("With an exact depth the motion distance is the reprojection distance"
   for (int i = 0; i < 500; ++i) {
     const cfp::SE3<double> T = motion(random);
     const Pair p = pair(random);
-    const double expected = cfp::reprojection_distance(p.previous, p.depth, p.current, T, camera);
+    const double expected = cfp::reprojection_distance(camera, T, p.previous, p.depth, p.current);
     CHECK_THAT(cfp::motion_distance(p.previous, p.depth, p.current, T, camera, 0.2, exact_depth()),
                WithinAbs(expected, 1e-9 * (1 + expected)));
   }
@@ -89,7 +89,7 @@ TEST_CASE("The motion distance is the Mahalanobis distance under pixel and depth
                  d = sigma * sigma + sigma_z * sigma_z * J.y() * J.y();
     const double s = (d * r.x() * r.x() - 2 * b * r.x() * r.y() + a * r.y() * r.y()) / (a * d - b * b);
     CHECK_THAT(cfp::motion_distance(p.previous, p.depth, p.current, T, lens, sigma, cfp::MotionDistanceOptions{}),
-               WithinRel(sigma * std::sqrt(s), 1e-6));
+               Catch::Matchers::WithinRel(sigma * std::sqrt(s), 1e-6));
   }
 }
 

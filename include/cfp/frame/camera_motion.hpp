@@ -102,7 +102,7 @@ template <typename Scalar>
     observations.pixels = workspace.current;
     observations.sigmas = workspace.sigmas;
     const PoseResult refined = refine_pose(observations, camera, T, options.pose, workspace.pose);
-    if (!is_refined(refined.reason) ||
+    if (!is_solved(refined.status) ||
         static_cast<double>(refined.inliers) < options.min_inlier_share * static_cast<double>(n))
       return motion;
     T = refined.T_cam_world;

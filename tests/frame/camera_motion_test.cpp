@@ -1,0 +1,123 @@
+#include "cfp/frame/camera_motion.hpp"
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "cfp/core/random.hpp"
+#include "support/allocation_counter.hpp"
+#include "support/catch.hpp"
+
+namespace {
+
+const cfp::PinholeCamera<double> camera{535.4, 539.2, 320.1, 247.6};
+
+struct Flow {
+  std::vector<std::array<double, 2>> previous, current;
+  std::vector<double> depths;
+  std::vector<char> outside;
+
+  [[nodiscard]] cfp::FlowPairs<double> pairs() const { return {previous, current, depths}; }
+};
+
+cfp::SE3<double> motion(double translation_m, double rotation_rad, cfp::Random& random) {
+  cfp::Vector6<double> xi;
+  for (int i = 0; i < 6; ++i) xi[i] = (i < 3 ? translation_m : rotation_rad) * random.normal();
+  return cfp::se3_exp(xi);
+}
+
+/// n pairs of a static room under T; every `mover`-th one (0: none) moves 8 px on its own.
+Flow flow(int n, const cfp::SE3<double>& T, double noise_px, int mover, cfp::Random& random) {
+  Flow result;
+  const cfp::DepthNoise depth_noise;
+  for (int i = 0; i < n; ++i) {
+    const cfp::Vector2<double> p(random.uniform(20, 620), random.uniform(20, 460));
+    const double z = random.uniform(1, 5);
+    cfp::Vector3<double> ray;
+    cfp::Vector2<double> q;
+    REQUIRE(camera.unproject(p, ray));
+    if (!camera.project(T * cfp::Vector3<double>(z * ray), q)) continue;
+    q += noise_px * cfp::Vector2<double>(random.normal(), random.normal());
+    if (mover > 0 && i % mover == 0) q.x() += 8;
+    result.previous.push_back({p.x(), p.y()});
+    result.current.push_back({q.x(), q.y()});
+    result.depths.push_back(z + depth_noise.sigma_m(z) * random.normal());
+    result.outside.push_back(1);
+  }
+  return result;
+}
+
+}  // namespace
+
+TEST_CASE("The camera's motion and the flow's noise are found at rest, in rotation and in translation",
+          "[frame][camera_motion]") {
+  cfp::Random random(1, "camera motion");
+  cfp::CameraMotionWorkspace<double> workspace;
+  for (const double noise : {0.1, 0.2, 0.4}) {
+    for (const auto& [t, r] : {std::array<double, 2>{0, 0}, {0, 0.02}, {0.03, 0}, {0.03, 0.02}}) {
+      for (int i = 0; i < 10; ++i) {
+        const cfp::SE3<double> T = motion(t, r, random);
+        const Flow f = flow(300, T, noise, i % 2 == 0 ? 0 : 4, random);
+        const cfp::CameraMotion<double> found =
+            cfp::estimate_camera_motion<double>(f.pairs(), f.outside, cfp::SE3<double>(), camera, {}, workspace);
+        REQUIRE(found.known);
+        const cfp::SE3<double> error = T.inverse() * found.T_cur_prev;
+        CHECK(error.translation.norm() < 0.02 * noise);
+        CHECK(cfp::so3_log(error.rotation).norm() < 0.005 * noise);
+        CHECK_THAT(found.sigma_px, WithinAbs(noise, i % 2 == 0 ? 0.2 * noise : 0.7 * noise));
+      }
+    }
+  }
+}
+
+TEST_CASE("Too few pairs with depth, or pairs that do not agree, give no motion", "[frame][camera_motion]") {
+  cfp::Random random(2, "no motion");
+  cfp::CameraMotionWorkspace<double> workspace;
+  const auto estimate = [&](const Flow& f) {
+    return cfp::estimate_camera_motion<double>(f.pairs(), f.outside, cfp::SE3<double>(), camera, {}, workspace).known;
+  };
+  Flow few = flow(29, cfp::SE3<double>(), 0.1, 0, random);
+  CHECK_FALSE(estimate(few));
+  Flow inside = flow(300, cfp::SE3<double>(), 0.1, 0, random);
+  for (std::size_t i = 20; i < inside.outside.size(); ++i) inside.outside[i] = 0;
+  CHECK_FALSE(estimate(inside));
+  Flow blind = flow(300, cfp::SE3<double>(), 0.1, 0, random);
+  for (double& z : blind.depths) z = std::numeric_limits<double>::quiet_NaN();
+  CHECK_FALSE(estimate(blind));
+  blind.depths.clear();
+  CHECK_FALSE(estimate(blind));
+  Flow chaos = flow(300, cfp::SE3<double>(), 0.1, 0, random);
+  for (auto& q : chaos.current) q = {random.uniform(0, 640), random.uniform(0, 480)};
+  CHECK_FALSE(estimate(chaos));
+}
+
+TEST_CASE("After warm-up the camera's motion allocates nothing, and equal input gives equal bits",
+          "[frame][camera_motion]") {
+  cfp::Random random(3, "allocation");
+  const Flow f = flow(300, motion(0.02, 0.01, random), 0.2, 5, random);
+  cfp::CameraMotionWorkspace<double> workspace;
+  const cfp::CameraMotionOptions options;
+  const cfp::FlowPairs<double> pairs = f.pairs();
+  const cfp::span<const char> outside(f.outside);
+  const auto first = cfp::estimate_camera_motion(pairs, outside, cfp::SE3<double>(), camera, options, workspace);
+  auto second = first;
+  CHECK(cfp_test::allocations_in([&] {
+          second = cfp::estimate_camera_motion(pairs, outside, cfp::SE3<double>(), camera, options, workspace);
+        }) == 0);
+  CHECK(first.T_cur_prev.translation == second.T_cur_prev.translation);
+  CHECK(first.sigma_px == second.sigma_px);
+}
+
+TEST_CASE("The robust scale is that of normal distances and ignores what is no distance", "[frame][camera_motion]") {
+  cfp::Random random(4, "scale");
+  std::vector<double> line, point;
+  for (int i = 0; i < 20000; ++i) {
+    line.push_back(i % 10 == 0 ? 1e3 : 0.3 * std::abs(random.normal()));
+    point.push_back(i % 10 == 0 ? -1.0 : 0.3 * std::hypot(random.normal(), random.normal()));
+  }
+  CHECK_THAT(cfp::robust_sigma(cfp::span(line), 1), WithinAbs(0.3, 0.05));
+  CHECK_THAT(cfp::robust_sigma(cfp::span(point), 2), WithinAbs(0.3, 0.01));
+  std::vector<double> none = {-1, std::numeric_limits<double>::quiet_NaN()};
+  CHECK(cfp::robust_sigma(cfp::span(none), 2) == 0);
+}
