@@ -141,7 +141,7 @@ void remember_objects(const FrameOptions& options, FrameState<Scalar>& state) {
         std::find_if(known.begin(), known.end(), [&](const auto& m) { return m.first == state.boxes[b].id; });
     ObjectMemory memory = of_box != known.end() && state.previous.known ? of_box->second : ObjectMemory{};
     const bool unknown = state.objects[b].status != Status::ok;
-    state.objects[b] = remembered(state.objects[b], dt, options.object_threshold, options.coarse.memory, memory);
+    state.objects[b] = remember_object(state.objects[b], dt, options.object_threshold, options.coarse.memory, memory);
     if (unknown && state.objects[b].status == Status::ok) --state.report.unknown_objects;
     next.push_back({state.boxes[b].id, memory});
   }

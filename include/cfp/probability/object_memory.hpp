@@ -44,8 +44,8 @@ inline namespace CFP_ISA {
 /// +-evidence_limit, and O so that O_Th is where nothing is remembered and the frame says nothing. A frame in which O
 /// is unknown only lets memory fade; O stays known while something is remembered. dt_s that is not positive counts as
 /// 0.
-[[nodiscard]] inline ObjectProbability remembered(const ObjectProbability& object, double dt_s, double object_threshold,
-                                                  const ObjectMemoryOptions& options, ObjectMemory& memory) noexcept {
+inline ObjectProbability remember_object(const ObjectProbability& object, double dt_s, double object_threshold,
+                                         const ObjectMemoryOptions& options, ObjectMemory& memory) noexcept {
   if (!(options.time_constant_s > 0)) return object;
   memory.evidence *= std::exp(-(dt_s > 0 ? dt_s : 0.0) / options.time_constant_s);
   if (object.status == Status::ok) {
