@@ -43,8 +43,8 @@ TEST_CASE("Evidence adds up, fades with time and is bounded", "[probability][obj
   }
   CHECK(memory.evidence > once);
   cfp::ObjectMemory fading = memory;
-  remember_object(unseen(), 3 * options.time_constant_s, threshold, options, fading);
-  CHECK_THAT(fading.evidence, WithinAbs(memory.evidence * std::exp(-3.0), 1e-12));
+  remember_object(unseen(), 2 * options.time_constant_s, threshold, options, fading);
+  CHECK_THAT(fading.evidence, WithinAbs(memory.evidence * std::exp(-2.0), 1e-12));
 }
 
 TEST_CASE("An object that starts is seen at once, whatever is remembered", "[probability][object_memory]") {
