@@ -36,8 +36,8 @@ template <typename Scalar>
 struct FlowPairs {
   PointSpan<Scalar, 2> previous;  ///< in frame k-1
   PointSpan<Scalar, 2> current;   ///< in frame k
-  span<const Scalar>
-      previous_depths;  ///< metres along z in frame k-1; not positive or not finite: none there. Empty: none
+  /// Metres along z in frame k-1; not positive or not finite: none there. Empty: none.
+  span<const Scalar> previous_depths = {};
 };
 
 /// Frame k. All pixels are those of the image in which the objects were detected; the camera knows its distortion.
