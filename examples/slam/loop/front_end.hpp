@@ -27,6 +27,7 @@ struct FrameFeatures {
   std::vector<std::array<float, 2>> pixels;  // without distortion; NaN where the lens model has no ray
   std::vector<float> depths_m;               // -1: none
   std::vector<cv::Point2f> flow_from, flow_to;
+  std::vector<float> flow_depths_m;                    // of flow_from
   std::optional<cfp_examples::Detections> detections;  // none: the detector did not run
 };
 
@@ -66,9 +67,13 @@ class FrontEnd {
       flow.get();
       features.flow_from = flow_.previous();
       features.flow_to = flow_.current();
+      features.flow_depths_m.resize(features.flow_from.size());
+      cfp::sample_depth(last_depth_, cfp::view(features.flow_from), metres_per_unit_,
+                        cfp::span<float>(features.flow_depths_m));
     }
     if (detection.valid()) detection.get();
     last_keypoints_ = features.keypoints;
+    last_depth_ = images.depth;
     return features;
   }
 
@@ -96,6 +101,7 @@ class FrontEnd {
   cfp::OpticalFlowTracker flow_;
   Observer& observer_;
   std::vector<cv::KeyPoint> last_keypoints_;
+  cv::Mat last_depth_;
   std::vector<cfp::Box<float>> last_boxes_;
 };
 

@@ -120,7 +120,7 @@ class Tracking {
     input.keypoints = cfp::view(frame.keypoints);
     input.depths = frame.depths_m;
     if (features.detections) input.detections = *features.detections;
-    input.flow = {cfp::view(features.flow_from), cfp::view(features.flow_to)};
+    input.flow = {cfp::view(features.flow_from), cfp::view(features.flow_to), features.flow_depths_m};
     input.map_point_probability = frame.map_point_probability;
     input.image_motion = predicted_.image_motion;
     const Part part(observer_, Module::coarse);
