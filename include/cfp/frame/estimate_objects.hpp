@@ -55,6 +55,14 @@ template <typename Scalar>
   return model;
 }
 
+/// The depth of the box's object in the frame before, 0 where it is not known.
+template <typename Scalar>
+[[nodiscard]] Scalar remembered_depth(const TrackedBox<Scalar>& box, const FrameState<Scalar>& state) noexcept {
+  const auto& objects = state.previous.object_depths;
+  const auto found = std::find_if(objects.begin(), objects.end(), [&](const auto& o) { return o.id == box.id; });
+  return state.previous.known && found != objects.end() ? found->depth_m : Scalar(0);
+}
+
 /// Collects in scratch.samples the distances of the pairs on one object. Where it is told from its background by depth,
 /// so are the pairs: what lies behind it says nothing of it, and a pair on its silhouette may have either depth.
 template <typename Scalar>
@@ -62,18 +70,21 @@ void collect_object_distances(const Frame<Scalar>& frame, const TrackedBox<Scala
                               const CoarseOptions& options, FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
   const FlowPairs<Scalar>& flow = frame.flow;
+  const bool has_depths = by_depth && !flow.previous_depths.empty();
   scratch.samples.clear();
   scratch.depths.clear();
+  scratch.points.clear();
   for (std::size_t i = 0; i < flow.current.size(); ++i) {
-    if (!lies_on(box, frame.labels, flow.current(i, 0), flow.current(i, 1))) continue;
+    const Scalar x = flow.current(i, 0), y = flow.current(i, 1);
+    if (!lies_on(box, frame.labels, x, y)) continue;
     scratch.samples.push_back(scratch.epipolar[i]);
-    scratch.depths.push_back(flow.previous_depths.empty() ? Scalar(0) : flow.previous_depths[i]);
+    scratch.points.push_back({x, y});
+    scratch.depths.push_back(has_depths ? flow.previous_depths[i] : Scalar(0));
   }
-  if (!by_depth || flow.previous_depths.empty()) return;
+  if (!has_depths) return;
   scratch.mask.assign(scratch.samples.size(), char(1));
-  const ForegroundResult separated = depth_foreground(span<const Scalar>(scratch.depths), options.foreground,
-                                                      scratch.foreground, span<char>(scratch.mask));
-  if (separated.status != ForegroundStatus::ok) return;
+  const ForegroundInput<Scalar> in{scratch.depths, scratch.points, box.box, remembered_depth(box, state)};
+  if (depth_foreground(in, options.foreground, scratch.foreground, scratch.mask).status != ForegroundStatus::ok) return;
   std::size_t kept = 0;
   for (std::size_t i = 0; i < scratch.samples.size(); ++i) {
     if (scratch.mask[i] != 0) scratch.samples[kept++] = scratch.samples[i];

@@ -54,8 +54,8 @@ struct FlowModel {
   FlowModelKind kind = FlowModelKind::none;
   FlowSupport support = FlowSupport::none;
   RansacStatus status = RansacStatus::not_enough_data;  ///< of the estimate; ok with the caller's matrix
-  Matrix3<Scalar> matrix = Matrix3<Scalar>::Zero();             ///< F or H, previous to current
-  SE3<Scalar> T_cur_prev;                                       ///< of kind motion
+  Matrix3<Scalar> matrix = Matrix3<Scalar>::Zero();     ///< F or H, previous to current
+  SE3<Scalar> T_cur_prev;                               ///< of kind motion
   Scalar sigma_px = Scalar(0);  ///< noise of one coordinate, measured on the pairs outside all boxes; 0: not measured
 };
 

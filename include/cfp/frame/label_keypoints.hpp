@@ -44,10 +44,7 @@ bool separate_foreground(const TrackedBox<Scalar>& box, const CoarseOptions& opt
     scratch.depths.push_back(state.current.depths[static_cast<std::size_t>(i)]);
     scratch.points.push_back(state.current.keypoints[static_cast<std::size_t>(i)]);
   }
-  ForegroundInput<Scalar> in{scratch.depths, scratch.points, box.box, Scalar(0)};
-  for (const ObjectDepth<Scalar>& object : state.previous.object_depths) {
-    if (state.previous.known && object.id == box.id) in.previous_depth_m = object.depth_m;
-  }
+  const ForegroundInput<Scalar> in{scratch.depths, scratch.points, box.box, remembered_depth(box, state)};
   const ForegroundResult result = depth_foreground(in, options.foreground, scratch.foreground, scratch.mask);
   if (result.status != ForegroundStatus::ok) return false;
   state.current.object_depths.push_back({box.id, static_cast<Scalar>(result.depth_m)});
