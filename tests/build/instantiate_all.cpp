@@ -207,6 +207,9 @@ static void instantiate_frame() noexcept {
   use(&cfp::match_descriptors<Scalar>);
   use(&cfp::estimate_flow_model<Scalar>);
   use(&cfp::flow_distances<Scalar>);
+  use(&cfp::estimate_camera_motion<Scalar>);
+  use(&cfp::robust_sigma<Scalar>);
+  use(&cfp::remember_objects<Scalar>);
   use(&cfp::frame_health<Scalar>);
   use(&cfp::apply_fallback<Scalar>);
   use(&cfp::may_create_map_point<Scalar>);

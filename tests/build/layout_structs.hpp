@@ -144,8 +144,17 @@
   CFP_LAYOUT_OPAQUE(cfp::PnpRansacResult<double>)                        \
   CFP_LAYOUT(cfp::BundleWorkspace, schur)                            \
   CFP_LAYOUT(cfp::FlowModelOptions, ransac)                              \
-  CFP_LAYOUT(cfp::FlowModel<float>, matrix)                              \
-  CFP_LAYOUT(cfp::FlowModel<double>, matrix)                             \
+  CFP_LAYOUT(cfp::FlowModel<float>, sigma_px)                            \
+  CFP_LAYOUT(cfp::FlowModel<double>, sigma_px)                           \
+  CFP_LAYOUT(cfp::CameraMotionOptions, pose)                             \
+  CFP_LAYOUT(cfp::CameraMotion<float>, sigma_px)                         \
+  CFP_LAYOUT(cfp::CameraMotion<double>, sigma_px)                        \
+  CFP_LAYOUT(cfp::CameraMotionWorkspace<float>, pose)                    \
+  CFP_LAYOUT(cfp::CameraMotionWorkspace<double>, pose)                   \
+  CFP_LAYOUT(cfp::UnknownDepth, inverse_sigma)                           \
+  CFP_LAYOUT(cfp::MotionDistanceOptions, unknown_depth)                  \
+  CFP_LAYOUT(cfp::ObjectMemoryOptions, evidence_limit)                   \
+  CFP_LAYOUT(cfp::ObjectMemory, known)                                   \
   CFP_LAYOUT(cfp::FlowModelWorkspace<float>, ransac)                     \
   CFP_LAYOUT(cfp::FlowModelWorkspace<double>, ransac)                    \
   CFP_LAYOUT(cfp::HealthOptions, min_effective_points)                   \
