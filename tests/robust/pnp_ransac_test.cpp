@@ -58,6 +58,39 @@ TEMPLATE_TEST_CASE("The pose survives mismatches", "[robust]", float, double) {
   }
 }
 
+TEST_CASE("Nine mismatches in ten are survived without weights", "[robust]") {
+  cfp::Random random(59, "pnp");
+  PnpRansacWorkspace workspace;
+  constexpr int problems = 40;
+  int solved = 0, wrong = 0;
+  for (int trial = 0; trial < problems; ++trial) {
+    const auto scene = make_absolute_pose_scene<double>(random, camera<double>, scene_options(300, 0.9));
+    const auto result = pnp_ransac(scene.world, scene.pixels, {}, camera<double>, PnpRansacOptions{}, workspace);
+    const auto error = cfp_test::pose_distance(result.T_cam_world, scene.T_cam_world);
+    const bool right = error[0] < 0.1 && error[1] < 0.03;
+    solved += result.found() && right ? 1 : 0;
+    wrong += result.found() && !right ? 1 : 0;
+  }
+  CHECK(solved >= 38);
+  CHECK(wrong <= 1);
+}
+
+TEST_CASE("A small object through a long lens has a pose", "[robust]") {
+  cfp::Random random(60, "pnp");
+  PnpRansacWorkspace workspace;
+  const PinholeCamera<double> lens{8000, 8000, 320, 240};
+  for (const double outliers : {0.0, 0.3, 0.6}) {
+    for (int trial = 0; trial < 20; ++trial) {
+      const auto scene = cfp_test::make_long_lens_scene<double>(random, lens, scene_options(300, outliers));
+      const auto result = pnp_ransac(scene.world, scene.pixels, {}, lens, PnpRansacOptions{}, workspace);
+      REQUIRE(result.found());
+      const auto error = cfp_test::pose_distance(result.T_cam_world, scene.T_cam_world);
+      CHECK(error[1] < 0.1);
+      CHECK(std::abs((result.T_cam_world.translation - scene.T_cam_world.translation).z()) < 1);
+    }
+  }
+}
+
 TEMPLATE_TEST_CASE("Without noise the pose is exact", "[robust]", float, double) {
   cfp::Random random(52, "pnp");
   PnpRansacWorkspace workspace;
@@ -207,7 +240,7 @@ TEST_CASE("RANSAC options outside their range are named; a second call allocates
   options.threshold_px = std::numeric_limits<double>::quiet_NaN();
   CHECK(invalid_field(options).string() == "threshold_px");
   options = {};
-  options.min_iterations = 2000;
+  options.min_iterations = options.max_iterations + 1;
   CHECK(invalid_field(options).string() == "min_iterations");
 
   cfp::Random random(59, "pnp");

@@ -55,6 +55,31 @@ AbsolutePoseScene<Scalar> make_absolute_pose_scene(cfp::Random& random, const Ca
   return scene;
 }
 
+/// An object of 20 cm, 20 m away and filling the picture of a long lens; mismatches as above.
+template <typename Scalar, typename Camera>
+AbsolutePoseScene<Scalar> make_long_lens_scene(cfp::Random& random, const Camera& camera,
+                                               const AbsolutePoseOptions& options) {
+  AbsolutePoseScene<Scalar> scene;
+  const cfp::Vector3<double> axis =
+      cfp::Vector3<double>(random.normal(), random.normal(), random.normal()).normalized();
+  scene.T_cam_world.rotation = cfp::so3_exp<double>(random.uniform(0, 3) * axis);
+  scene.T_cam_world.translation = cfp::Vector3<double>(random.uniform(-0.2, 0.2), random.uniform(-0.2, 0.2), 20);
+  while (scene.world.size() < options.points) {
+    const cfp::Vector3<double> x(random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1));
+    cfp::Vector2<double> u(0, 0);
+    if (!camera.project(scene.T_cam_world * x, u)) continue;
+    const bool inlier = random.uniform() >= options.outlier_share;
+    cfp::Vector2<double> measured = u + options.noise_px * cfp::Vector2<double>(random.normal(), random.normal());
+    if (!inlier) measured = cfp::Vector2<double>(random.uniform(0, 640), random.uniform(0, 480));
+    if (!inlier && (measured - u).norm() < options.outlier_min_px) continue;
+    scene.world.push_back({static_cast<Scalar>(x.x()), static_cast<Scalar>(x.y()), static_cast<Scalar>(x.z())});
+    scene.pixels.push_back({static_cast<Scalar>(measured.x()), static_cast<Scalar>(measured.y())});
+    scene.weights.push_back(static_cast<Scalar>(inlier ? random.uniform(0.5, 1) : random.uniform(0, 0.5)));
+    scene.is_inlier.push_back(inlier ? 1 : 0);
+  }
+  return scene;
+}
+
 /// Distance of the camera centres, m, and angle between the rotations, rad.
 template <typename Scalar>
 std::array<double, 2> pose_distance(const cfp::SE3<Scalar>& T, const cfp::SE3<double>& truth) {

@@ -58,6 +58,7 @@ class Relocalization {
     }
     inlier_.resize(matches_.size());
     options_.min_inliers = min_inliers;
+    options_.max_iterations = 1000;  // most candidates are hopeless: give up soon
     const auto found = cfp::pnp_ransac(world_, pixels_, weights_, camera, options_, workspace_, inlier_);
     if (!found.found()) return false;
     frame.T_cam_world = found.T_cam_world.cast<double>();
