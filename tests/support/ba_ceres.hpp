@@ -109,6 +109,8 @@ CeresResult solve_with_ceres(const cfp::BundleProblem<Camera, Scalar>& p, const 
   problem_options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   ceres::Problem problem(problem_options);
   const auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  // The larger group is eliminated first, as anybody would choose.
+  const int pose_group = p.poses.size() > p.points.size() ? 0 : 1;
   const auto& o = p.observations;
   for (std::size_t i = 0; i < o.pose.size(); ++i) {
     const auto k = static_cast<std::size_t>(o.pose[i]), j = static_cast<std::size_t>(o.point[i]);
@@ -131,11 +133,11 @@ CeresResult solve_with_ceres(const cfp::BundleProblem<Camera, Scalar>& p, const 
   for (std::size_t k = 0; k < p.poses.size(); ++k) {
     if (!problem.HasParameterBlock(&poses[12 * k])) continue;
     problem.SetManifold(&poses[12 * k], &manifold);
-    ordering->AddElementToGroup(&poses[12 * k], 1);
+    ordering->AddElementToGroup(&poses[12 * k], pose_group);
     if (!p.fixed_poses.empty() && p.fixed_poses[k] != 0) problem.SetParameterBlockConstant(&poses[12 * k]);
   }
   for (std::size_t j = 0; j < p.points.size(); ++j) {
-    if (problem.HasParameterBlock(p.points[j].data())) ordering->AddElementToGroup(p.points[j].data(), 0);
+    if (problem.HasParameterBlock(p.points[j].data())) ordering->AddElementToGroup(p.points[j].data(), 1 - pose_group);
   }
   solver.linear_solver_ordering = ordering;
   solver.max_num_iterations = options.levenberg_marquardt.max_iterations;

@@ -30,7 +30,7 @@ struct LevenbergMarquardtOptions {
   int max_iterations = 10;              ///< steps tried, accepted or not, >= 0
   double initial_damping = 1e-4;        ///< relative to the scale of the Hessian's diagonal, >= 0; 0: Gauss-Newton
   double min_damping = 1e-8;            ///< >= 0: below it rounding would make an undetermined system singular
-  double rejected_damping = 1e-6;       ///< a refused step raises the damping at least to this; > 0
+  double rejected_damping = 1e-8;       ///< a refused step raises the damping at least to this; > 0
   double max_damping = 1e10;            ///< >= min_damping, > 0; beyond it no step helps
   double min_relative_decrease = 1e-6;  ///< stop when a step promises or brings less than this share of the cost, >= 0
   double min_absolute_decrease = 1e-9;  ///< stop when a step promises less than this, >= 0

@@ -118,33 +118,35 @@ inline void prepare_pairs(const double* N, const double (&d)[3], const double* V
 
 /// Takes W_b V'^-1 W_a^T from the blocks (b, a) of all pairs a <= b < count of the links of one point. Half of each
 /// block follows from the other: with T = W_b V'^-1 N_a it is [T, T hat(d_a)^T].
-inline void subtract_pairs(const double* links, int count, const int* pair, double* blocks) noexcept {
+template <int Rows = 6>
+void subtract_pairs(const double* links, int count, const int* pair, double* blocks) noexcept {
+  using Vector = Eigen::Matrix<double, Rows, 1>;
+  using Column = Eigen::Map<Vector>;
+  using ConstColumn = Eigen::Map<const Vector>;
   for (int a = 0; a < count; ++a) {
     const double* const p = links + BundleSchur::pair_doubles * to_index(a) + 18;
     const double x = p[9], y = p[10], z = p[11];
     for (int b = a; b < count; ++b, ++pair) {
       const double* const w = links + BundleSchur::pair_doubles * to_index(b);
+      const ConstColumn w0(w), w1(w + 6), w2(w + 12);
+      const Vector t0 = w0 * p[0] + w1 * p[1] + w2 * p[2];
+      const Vector t1 = w0 * p[3] + w1 * p[4] + w2 * p[5];
+      const Vector t2 = w0 * p[6] + w1 * p[7] + w2 * p[8];
       double* const block = blocks + 36 * to_index(*pair);
-      for (int r = 0; r < 6; ++r) {
-        const double t0 = w[r] * p[0] + w[6 + r] * p[1] + w[12 + r] * p[2];
-        const double t1 = w[r] * p[3] + w[6 + r] * p[4] + w[12 + r] * p[5];
-        const double t2 = w[r] * p[6] + w[6 + r] * p[7] + w[12 + r] * p[8];
-        block[r] -= t0;
-        block[6 + r] -= t1;
-        block[12 + r] -= t2;
-        block[18 + r] -= t2 * y - t1 * z;
-        block[24 + r] -= t0 * z - t2 * x;
-        block[30 + r] -= t1 * x - t0 * y;
-      }
+      Column(block) -= t0, Column(block + 6) -= t1, Column(block + 12) -= t2;
+      Column(block + 18) -= t2 * y - t1 * z;
+      Column(block + 24) -= t0 * z - t2 * x;
+      Column(block + 30) -= t1 * x - t0 * y;
     }
   }
 }
 
 /// The share of one part of the points in the reduced system; part 0 starts from the poses' own blocks. False as
 /// damp_point.
-[[nodiscard]] inline bool eliminate_points(const BundleIndex& index, const BundleState& state,
-                                           const BundleLinearization& linear, double lambda, std::size_t part,
-                                           BundleSchur& schur) noexcept {
+template <int Rows = 6>
+[[nodiscard]] bool eliminate_points(const BundleIndex& index, const BundleState& state,
+                                    const BundleLinearization& linear, double lambda, std::size_t part,
+                                    BundleSchur& schur) noexcept {
   double* const blocks = schur.blocks[part].data();
   double* const right_side = schur.right_side[part].data();
   double* const pairs = schur.pairs[part].data();
@@ -175,7 +177,7 @@ inline void subtract_pairs(const double* links, int count, const int* pair, doub
       g[0] += n[0], g[1] += n[1], g[2] += n[2];
       add_cross(d, n, g + 3);
     }
-    subtract_pairs(pairs, index.free_links[j], index.pair_block.data() + index.pair_begin[j], blocks);
+    subtract_pairs<Rows>(pairs, index.free_links[j], index.pair_block.data() + index.pair_begin[j], blocks);
   }
   return true;
 }
