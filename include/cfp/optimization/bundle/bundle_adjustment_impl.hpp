@@ -18,6 +18,7 @@ namespace cfp {
 
 /// Scratch memory of adjust_bundle; keeps what it has grown to. One per thread that calls.
 struct BundleWorkspace {
+  CFP_INLINE BundleWorkspace() = default;  // sets members by vector instructions
   // Internal: the stages of adjust_bundle work on these.
   detail::BundleIndex index;
   detail::BundleState state, next_state;
