@@ -24,9 +24,9 @@ template <typename Scalar>
 struct Trivial {
   Scalar delta = Scalar(1);  ///< not used
 
-  [[nodiscard]] Scalar value(const Scalar& s) const noexcept { return s; }
-  [[nodiscard]] Scalar first(const Scalar&) const noexcept { return Scalar(1); }
-  [[nodiscard]] Scalar second(const Scalar&) const noexcept { return Scalar(0); }
+  [[nodiscard]] CFP_INLINE Scalar value(const Scalar& s) const noexcept { return s; }
+  [[nodiscard]] CFP_INLINE Scalar first(const Scalar&) const noexcept { return Scalar(1); }
+  [[nodiscard]] CFP_INLINE Scalar second(const Scalar&) const noexcept { return Scalar(0); }
 };
 
 /// rho = s up to delta^2, 2 delta sqrt(s) - delta^2 beyond; rho and rho' are continuous, rho'' jumps (at delta^2: 0).
@@ -34,15 +34,15 @@ template <typename Scalar>
 struct Huber {
   Scalar delta = Scalar(1);
 
-  [[nodiscard]] Scalar value(const Scalar& s) const noexcept {
+  [[nodiscard]] CFP_INLINE Scalar value(const Scalar& s) const noexcept {
     // s / sqrt(s): no second root beside that of first(). The smallest number keeps infinity from meeting 0.
     const Scalar root = s * (simd::reciprocal_sqrt(s) + Scalar((std::numeric_limits<simd::scalar_of<Scalar>>::min)()));
     return simd::select(s <= delta * delta, s, Scalar(2) * delta * root - delta * delta);
   }
-  [[nodiscard]] Scalar first(const Scalar& s) const noexcept {
+  [[nodiscard]] CFP_INLINE Scalar first(const Scalar& s) const noexcept {
     return simd::select(s <= delta * delta, Scalar(1), delta * simd::reciprocal_sqrt(s));
   }
-  [[nodiscard]] Scalar second(const Scalar& s) const noexcept {
+  [[nodiscard]] CFP_INLINE Scalar second(const Scalar& s) const noexcept {
     return simd::select(s <= delta * delta, Scalar(0), Scalar(-0.5) * first(s) / s);
   }
 };
@@ -52,12 +52,14 @@ template <typename Scalar>
 struct Cauchy {
   Scalar delta = Scalar(1);
 
-  [[nodiscard]] Scalar value(const Scalar& s) const noexcept {
+  [[nodiscard]] CFP_INLINE Scalar value(const Scalar& s) const noexcept {
     using std::log1p;
     return delta * delta * log1p(s / (delta * delta));
   }
-  [[nodiscard]] Scalar first(const Scalar& s) const noexcept { return delta * delta / (delta * delta + s); }
-  [[nodiscard]] Scalar second(const Scalar& s) const noexcept { return -first(s) * first(s) / (delta * delta); }
+  [[nodiscard]] CFP_INLINE Scalar first(const Scalar& s) const noexcept { return delta * delta / (delta * delta + s); }
+  [[nodiscard]] CFP_INLINE Scalar second(const Scalar& s) const noexcept {
+    return -first(s) * first(s) / (delta * delta);
+  }
 };
 
 /// rho = s / (1 + s / delta^2), bounded by delta^2; rho' = 1 / (1 + s / delta^2)^2, rho''(0) = -2 / delta^2.
@@ -65,17 +67,17 @@ template <typename Scalar>
 struct GemanMcClure {
   Scalar delta = Scalar(1);
 
-  [[nodiscard]] Scalar value(const Scalar& s) const noexcept {
+  [[nodiscard]] CFP_INLINE Scalar value(const Scalar& s) const noexcept {
     // Two forms of one quotient: the first is exact at 0, the second at infinity.
     return simd::select(s <= delta * delta, s * share(s), delta * delta * (Scalar(1) - share(s)));
   }
-  [[nodiscard]] Scalar first(const Scalar& s) const noexcept { return share(s) * share(s); }
-  [[nodiscard]] Scalar second(const Scalar& s) const noexcept {
+  [[nodiscard]] CFP_INLINE Scalar first(const Scalar& s) const noexcept { return share(s) * share(s); }
+  [[nodiscard]] CFP_INLINE Scalar second(const Scalar& s) const noexcept {
     return Scalar(-2) * share(s) * share(s) * share(s) / (delta * delta);
   }
 
  private:
-  [[nodiscard]] Scalar share(const Scalar& s) const noexcept { return delta * delta / (delta * delta + s); }
+  [[nodiscard]] CFP_INLINE Scalar share(const Scalar& s) const noexcept { return delta * delta / (delta * delta + s); }
 };
 
 /// rho = min(s, delta^2); rho' = 1 up to and at delta^2, 0 beyond; rho'' = 0. A hard cut: only for a nearby start.
@@ -83,17 +85,19 @@ template <typename Scalar>
 struct Truncated {
   Scalar delta = Scalar(1);
 
-  [[nodiscard]] Scalar value(const Scalar& s) const noexcept {
+  [[nodiscard]] CFP_INLINE Scalar value(const Scalar& s) const noexcept {
     return simd::select(s <= delta * delta, s, Scalar(delta * delta));
   }
-  [[nodiscard]] Scalar first(const Scalar& s) const noexcept {
+  [[nodiscard]] CFP_INLINE Scalar first(const Scalar& s) const noexcept {
     return simd::select(s <= delta * delta, Scalar(1), Scalar(0));
   }
-  [[nodiscard]] Scalar second(const Scalar&) const noexcept { return Scalar(0); }
+  [[nodiscard]] CFP_INLINE Scalar second(const Scalar&) const noexcept { return Scalar(0); }
 };
 
 /// The losses by name, for options.
 enum class LossType : std::uint8_t { trivial, huber, cauchy, geman_mcclure, truncated };
+
+inline namespace CFP_ISA {
 
 /// Calls `work` with the loss of that name and scale, so that a loop over residuals is compiled once per loss and never
 /// asks inside: `with_loss<double>(type, delta, [&](const auto& loss) { … loss.first(s) … });`. Returns what work
@@ -115,22 +119,26 @@ auto with_loss(LossType type, const Scalar& delta, Work&& work) {
   return work(Trivial<Scalar>{delta});
 }
 
+}  // namespace CFP_ISA
+
 /// A loss chosen at run time, with the members of the others; as fast as a predictable branch.
 template <typename Scalar>
 struct RobustLoss {
   LossType type = LossType::huber;
   Scalar delta = Scalar(1);
 
-  [[nodiscard]] Scalar value(const Scalar& s) const noexcept {
+  [[nodiscard]] CFP_INLINE Scalar value(const Scalar& s) const noexcept {
     return with_loss(type, delta, [&s](const auto& loss) { return loss.value(s); });
   }
-  [[nodiscard]] Scalar first(const Scalar& s) const noexcept {
+  [[nodiscard]] CFP_INLINE Scalar first(const Scalar& s) const noexcept {
     return with_loss(type, delta, [&s](const auto& loss) { return loss.first(s); });
   }
-  [[nodiscard]] Scalar second(const Scalar& s) const noexcept {
+  [[nodiscard]] CFP_INLINE Scalar second(const Scalar& s) const noexcept {
     return with_loss(type, delta, [&s](const auto& loss) { return loss.second(s); });
   }
 };
+
+inline namespace CFP_ISA {
 
 /// The first field of a loss outside its range, or nothing.
 template <typename Scalar>
@@ -140,4 +148,5 @@ template <typename Scalar>
   return {};
 }
 
+}  // namespace CFP_ISA
 }  // namespace cfp

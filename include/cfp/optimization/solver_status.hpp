@@ -26,27 +26,10 @@ enum class SolverStatus : std::uint8_t {
 
 /// The enumerator's name, for reports.
 [[nodiscard]] constexpr const char* to_string(SolverStatus status) noexcept {
-  switch (status) {
-    case SolverStatus::converged:
-      return "converged";
-    case SolverStatus::no_decrease:
-      return "no decrease";
-    case SolverStatus::iteration_limit:
-      return "iteration limit";
-    case SolverStatus::not_enough_data:
-      return "not enough data";
-    case SolverStatus::no_weight:
-      return "no weight";
-    case SolverStatus::not_enough_inliers:
-      return "not enough inliers";
-    case SolverStatus::degenerate:
-      return "degenerate";
-    case SolverStatus::not_finite:
-      return "not finite";
-    case SolverStatus::invalid_input:
-      return "invalid input";
-  }
-  return "unknown";
+  constexpr const char* names[] = {"converged",       "no decrease", "iteration limit",
+                                   "not enough data", "no weight",   "not enough inliers",
+                                   "degenerate",      "not finite",  "invalid input"};
+  return status <= SolverStatus::invalid_input ? names[static_cast<int>(status)] : "unknown";
 }
 
 }  // namespace cfp

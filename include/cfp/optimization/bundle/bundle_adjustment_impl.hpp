@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "cfp/optimization/bundle/bundle_order_impl.hpp"
 #include "cfp/optimization/bundle/bundle_pose_elimination_impl.hpp"
 #include "cfp/optimization/bundle/bundle_problem.hpp"
 #include "cfp/optimization/bundle/bundle_schur_impl.hpp"
