@@ -60,13 +60,16 @@ inline std::string summary_picture(const std::vector<RunRecord>& runs, std::size
     words += "<text class=\"" + std::string(css) + "\" x=\"" + number(x, 0) + "\" y=\"" + number(y + down, 0) + "\">" +
              escape(what) + "</text>\n";
   };
-  text(right, line, "quiet words", "Boxes: yellow detected, orange compensated. Keypoints: red moving, green static.");
   const auto entry = [&](const std::string& css, const std::string& what) {
     y += line;
     words += "<path class=\"" + css + "\" d=\"M" + number(margin, 0) + ' ' + number(y - 5, 0) + "h26\"/>";
     text(margin + 33, 0, "words", what);
   };
-  if (!same.empty()) entry("truth", "truth of " + same.front()->sequence);
+  if (!same.empty()) {
+    y += line;
+    text(margin, 0, "quiet words", same.front()->sequence);
+    if (!same.front()->truth.empty()) entry("truth", "truth");
+  }
   for (const Series& s : all) {
     const double ate = summarize(*s.run).ate_rmse_m;
     entry(s.css("curve"), s.name + (std::isfinite(ate) ? ": ATE " + number(ate, 3) + " m" : ""));
@@ -92,6 +95,9 @@ inline std::string summary_picture(const std::vector<RunRecord>& runs, std::size
     out += "<image x=\"" + number(right, 0) + "\" y=\"" + number(margin + (content - frame_height) / 2, 0) +
            "\" width=\"" + number(column, 0) + "\" height=\"" + number(frame_height, 0) +
            "\" href=\"data:image/jpeg;base64," + base64(picture->jpeg) + "\"/>\n";
+    const double below = margin + content + line - y;
+    text(right, below, "quiet words", "Boxes: yellow detected, orange compensated.");
+    text(right, below + line, "quiet words", "Keypoints inside boxes: from red, moving, to green, static.");
   } else {
     out += placed(views[1].plot, right);
   }

@@ -81,7 +81,7 @@ inline std::string to_markdown(const Table& table) {
 // The parts of a range below each other: a column no wider than it must be.
 inline std::string in_lines(std::string range) {
   for (std::size_t at = range.find("; "); at != std::string::npos; at = range.find("; ", at))
-    range.replace(at, 2, "<br>");
+    range.replace(at, 2, "<br/>");
   return range;
 }
 
@@ -97,7 +97,7 @@ inline std::string to_html(const Table& table) {
       const char* mark = row[c].rank == Rank::best ? "b" : row[c].rank == Rank::second ? "u" : "span";
       out += std::string(c == 0 ? "<th scope=\"row\">" : "<td>") + '<' + mark + '>' + escape(row[c].text) + "</" +
              mark + '>' +
-             (row[c].range.empty() ? "" : "<br><span class=\"range\">" + in_lines(escape(row[c].range)) + "</span>") +
+             (row[c].range.empty() ? "" : "<br/><span class=\"range\">" + in_lines(escape(row[c].range)) + "</span>") +
              (c == 0 ? "</th>" : "</td>");
     }
     out += "</tr>\n";
