@@ -3,9 +3,9 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "../../examples/detection/simple_detectors.hpp"
-#include "../../examples/slam_runs/run_folder.hpp"
 #include "../../examples/slam_report/annotate.hpp"
 #include "../../examples/slam_runs/read_run.hpp"
+#include "../../examples/slam_runs/run_folder.hpp"
 #include "../../examples/synthetic/writer.hpp"
 #include "support/catch.hpp"
 #include "support/data.hpp"
@@ -148,8 +148,11 @@ TEST_CASE("The fine stage after a relocalisation rests on the inliers of the pos
   NoDetector detector;
   Options options;
   options.threads = false;
+  options.min_first_inliers = 50;                   // more than chance gives to a pose from wrong matches
+  options.probability.fine.min_pose_inliers = 100;  // C_s is then a step at 50 inliers
   run_slam(Sequence(folder.path), detector, options, observer);
   REQUIRE(observer.outcomes.size() == frames);
+  CAPTURE(observer.confidence[23], observer.confidence[24]);
   REQUIRE(observer.outcomes[24] == Outcome::relocalised);
   CHECK(observer.confidence[24] > 0.5 * observer.confidence[23]);
 }
