@@ -81,7 +81,6 @@ void run_recording(const fs::path& recording, const Arguments& a) {
       cfp_examples::Progress progress(sequence.name() + ' ' + variant, frames);
       cfp_slam::run_into(out, sequence, *detector, settings, a.threads > 1, progress);
       std::printf("%s\n", (out / "trajectory.txt").c_str());
-      std::fflush(stdout);
     }
   }
 }

@@ -33,7 +33,6 @@ struct FrameFeatures {
 
 class FrontEnd {
  public:
-  // The observer must stay.
   FrontEnd(const Camera& camera, double depth_units_per_metre, const Options& options, Observer& observer)
       : options_(options),
         camera_(camera),
@@ -68,8 +67,7 @@ class FrontEnd {
       features.flow_from = flow_.previous();
       features.flow_to = flow_.current();
       features.flow_depths_m.resize(features.flow_from.size());
-      cfp::sample_depth(last_depth_, cfp::view(features.flow_from), metres_per_unit_,
-                        cfp::span<float>(features.flow_depths_m));
+      cfp::sample_depth(last_depth_, cfp::view(features.flow_from), metres_per_unit_, features.flow_depths_m);
     }
     if (detection.valid()) detection.get();
     last_keypoints_ = features.keypoints;
@@ -88,7 +86,7 @@ class FrontEnd {
     extract_(gray, features.keypoints, features.descriptors);
     const auto pixels = cfp::undistorted(camera_, cfp::view(features.keypoints), features.pixels);
     features.depths_m.resize(features.keypoints.size());
-    cfp::sample_depth(depth, cfp::view(features.keypoints), metres_per_unit_, cfp::span<float>(features.depths_m));
+    cfp::sample_depth(depth, cfp::view(features.keypoints), metres_per_unit_, features.depths_m);
     for (std::size_t i = 0; i < pixels.size(); ++i) {
       if (!cfp::is_finite(pixels(i, 0))) features.depths_m[i] = -1;  // no ray, no point
     }

@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <optional>
 
-#include <Eigen/LU>
-
+#include "cfp/geometry/homography.hpp"
 #include "frame.hpp"
 
 namespace cfp_slam {
@@ -20,8 +19,7 @@ class MotionModel {
   [[nodiscard]] Prediction predict(const Frame& last, double time_s, const View& view) const {
     if (!last.has_pose || !velocity_ || !(time_s > last.time_s)) return {last.T_cam_world, std::nullopt};
     const cfp::SE3<double> motion = cfp::se3_exp<double>(*velocity_ * std::min(time_s - last.time_s, longest_s));
-    const cfp::Matrix3<float> K = view.camera.matrix();
-    return {motion * last.T_cam_world, K * motion.rotation.cast<float>() * K.inverse()};
+    return {motion * last.T_cam_world, cfp::rotation_homography(view.camera, motion.rotation.cast<float>())};
   }
 
   void learn(const Frame& last, const Frame& frame) {

@@ -155,7 +155,7 @@ class Tracking {
     }
     frame.has_pose = inliers >= options_.min_first_inliers;
     if (!frame.has_pose || !last_.has_pose) return std::nullopt;
-    return cfp::PoseEstimate{motion_of(frame), inliers};
+    return cfp::PoseEstimate{frame.T_cam_world * last_.T_cam_world.inverse(), inliers};
   }
 
   // With the local map.
@@ -228,9 +228,6 @@ class Tracking {
 
   [[nodiscard]] const cfp::SE3<double>& reference_pose() const {
     return map_.keyframe(local_map_.reference()).frame.T_cam_world;
-  }
-  [[nodiscard]] cfp::SE3<double> motion_of(const Frame& frame) const {
-    return frame.T_cam_world * last_.T_cam_world.inverse();
   }
 
   Options options_;
