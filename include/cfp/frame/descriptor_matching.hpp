@@ -69,6 +69,66 @@ inline namespace CFP_ISA {
   return static_cast<int>(bits);
 }
 
+}  // namespace CFP_ISA
+
+namespace detail {
+inline namespace CFP_ISA {
+
+/// The previous keypoints that may be matched, by their predicted y; those that `match` names are held already.
+template <typename Scalar>
+void collect_candidates(const PointSpan<Scalar, 2>& predicted, span<const std::int32_t> match,
+                        DescriptorMatchWorkspace<Scalar>& workspace) {
+  using Candidate = typename DescriptorMatchWorkspace<Scalar>::Candidate;
+  workspace.holders.assign(predicted.size(), {-1, 0});
+  for (std::size_t i = 0; i < match.size(); ++i) {
+    if (match[i] >= 0 && static_cast<std::size_t>(match[i]) < predicted.size())
+      workspace.holders[static_cast<std::size_t>(match[i])].keypoint = static_cast<std::int32_t>(i);
+  }
+  workspace.candidates.clear();
+  workspace.candidates.reserve(predicted.size());
+  for (std::size_t j = 0; j < predicted.size(); ++j) {
+    const Candidate candidate{predicted(j, 0), predicted(j, 1), static_cast<std::int32_t>(j)};
+    if (workspace.holders[j].keypoint < 0 && is_finite(candidate.x) && is_finite(candidate.y))
+      workspace.candidates.push_back(candidate);
+  }
+  std::sort(workspace.candidates.begin(), workspace.candidates.end(),
+            [](const Candidate& a, const Candidate& b) { return a.y < b.y || (a.y == b.y && a.index < b.index); });
+}
+
+struct NearestDescriptor {
+  std::int32_t index = -1;  // -1: none within the radius and the distance
+  int distance, second;     // of the nearest and the next
+};
+
+/// The candidate within the radius of (x, y) whose descriptor is nearest.
+template <typename Scalar>
+[[nodiscard]] NearestDescriptor nearest_descriptor(Scalar x, Scalar y, const std::uint8_t* descriptor,
+                                                   const DescriptorSpan& previous,
+                                                   const DescriptorMatchOptions& options,
+                                                   const DescriptorMatchWorkspace<Scalar>& workspace) noexcept {
+  const Scalar radius = static_cast<Scalar>(options.radius_px);
+  NearestDescriptor nearest{-1, options.max_distance + 1, static_cast<int>(8 * previous.bytes)};
+  auto at = std::lower_bound(workspace.candidates.begin(), workspace.candidates.end(), y - radius,
+                             [](const auto& candidate, Scalar limit) { return candidate.y < limit; });
+  for (; at != workspace.candidates.end() && at->y <= y + radius; ++at) {
+    const Scalar dx = at->x - x, dy = at->y - y;
+    if (!(dx * dx + dy * dy <= radius * radius)) continue;
+    const int distance =
+        hamming_distance(previous.row(static_cast<std::size_t>(at->index)), descriptor, previous.bytes);
+    if (distance < nearest.distance) {
+      nearest = {at->index, distance, nearest.index >= 0 ? nearest.distance : nearest.second};
+    } else {
+      nearest.second = (std::min)(nearest.second, distance);
+    }
+  }
+  return nearest;
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
+
+inline namespace CFP_ISA {
+
 /// Matches the keypoints `queries` of the current frame with those of the previous one: match[i] becomes the index of
 /// the previous keypoint, for every i of `queries` that finds one. `predicted` is where each previous keypoint is
 /// expected in the current image; one that is not finite, or that `match` names already, takes no part. A match lies
@@ -80,58 +140,24 @@ std::size_t match_descriptors(const PointSpan<Scalar, 2>& predicted, const Descr
                               const PointSpan<Scalar, 2>& keypoints, const DescriptorSpan& current,
                               span<const std::int32_t> queries, const DescriptorMatchOptions& options,
                               DescriptorMatchWorkspace<Scalar>& workspace, span<std::int32_t> match) {
-  using Candidate = typename DescriptorMatchWorkspace<Scalar>::Candidate;
   CFP_ASSERT(match.size() == keypoints.size());
   if (previous.bytes != current.bytes || current.bytes == 0) return 0;
   if (previous.size != predicted.size() || current.size != keypoints.size()) return 0;
-
-  workspace.holders.assign(predicted.size(), {-1, 0});
-  for (std::size_t i = 0; i < match.size(); ++i) {
-    if (match[i] >= 0 && static_cast<std::size_t>(match[i]) < predicted.size())
-      workspace.holders[static_cast<std::size_t>(match[i])] = {static_cast<std::int32_t>(i), -1};
-  }
-  workspace.candidates.clear();
-  workspace.candidates.reserve(predicted.size());
-  for (std::size_t j = 0; j < predicted.size(); ++j) {
-    const Candidate candidate{predicted(j, 0), predicted(j, 1), static_cast<std::int32_t>(j)};
-    if (workspace.holders[j].keypoint < 0 && is_finite(candidate.x) && is_finite(candidate.y))
-      workspace.candidates.push_back(candidate);
-  }
-  std::sort(workspace.candidates.begin(), workspace.candidates.end(),
-            [](const Candidate& a, const Candidate& b) { return a.y < b.y || (a.y == b.y && a.index < b.index); });
-
-  const Scalar radius = static_cast<Scalar>(options.radius_px);
+  detail::collect_candidates(predicted, span<const std::int32_t>(match), workspace);
   for (const std::int32_t query : queries) {
     const std::size_t i = static_cast<std::size_t>(query);
-    const Scalar x = keypoints(i, 0), y = keypoints(i, 1);
-    int best = options.max_distance + 1, second = static_cast<int>(8 * current.bytes);
-    std::int32_t nearest = -1;
-    auto at = std::lower_bound(workspace.candidates.begin(), workspace.candidates.end(), y - radius,
-                               [](const Candidate& candidate, Scalar limit) { return candidate.y < limit; });
-    for (; at != workspace.candidates.end() && at->y <= y + radius; ++at) {
-      const Scalar dx = at->x - x, dy = at->y - y;
-      if (!(dx * dx + dy * dy <= radius * radius)) continue;
-      const int distance =
-          hamming_distance(previous.row(static_cast<std::size_t>(at->index)), current.row(i), current.bytes);
-      if (distance < best) {
-        second = nearest >= 0 ? best : second;
-        best = distance;
-        nearest = at->index;
-      } else {
-        second = (std::min)(second, distance);
-      }
-    }
-    if (nearest < 0 || !(options.max_ratio >= 1 || best < options.max_ratio * second)) continue;
-    auto& holder = workspace.holders[static_cast<std::size_t>(nearest)];
-    if (holder.keypoint < 0 || best < holder.distance) holder = {query, best};
+    const detail::NearestDescriptor nearest =
+        detail::nearest_descriptor(keypoints(i, 0), keypoints(i, 1), current.row(i), previous, options, workspace);
+    if (nearest.index < 0) continue;
+    if (options.max_ratio < 1 && !(nearest.distance < options.max_ratio * nearest.second)) continue;
+    auto& holder = workspace.holders[static_cast<std::size_t>(nearest.index)];
+    if (holder.keypoint < 0 || nearest.distance < holder.distance) holder = {query, nearest.distance};
   }
-
   std::size_t matched = 0;
   for (std::size_t j = 0; j < workspace.holders.size(); ++j) {
-    const auto& holder = workspace.holders[j];
-    if (holder.keypoint < 0 || match[static_cast<std::size_t>(holder.keypoint)] == static_cast<std::int32_t>(j))
-      continue;
-    match[static_cast<std::size_t>(holder.keypoint)] = static_cast<std::int32_t>(j);
+    const std::int32_t i = workspace.holders[j].keypoint;
+    if (i < 0 || match[static_cast<std::size_t>(i)] == static_cast<std::int32_t>(j)) continue;
+    match[static_cast<std::size_t>(i)] = static_cast<std::int32_t>(j);
     ++matched;
   }
   return matched;
