@@ -79,6 +79,7 @@ TEST_CASE("Each box's O and labels equal the equation groups called one by one",
   frame.fundamental = F;
   const cfp::FrameReport result = run.coarse(options, frame, scene.camera);
   CHECK(result.flow_support == cfp::FlowSupport::caller);
+  REQUIRE(result.flow_sigma_px > 0);
   for (std::size_t b = 0; b < scene.boxes.size(); ++b) {
     std::vector<double> distances, depths;
     std::vector<std::array<double, 2>> points;
@@ -93,7 +94,8 @@ TEST_CASE("Each box's O and labels equal the equation groups called one by one",
       members.push_back(i);
     }
     std::vector<double> scratch(distances.size());
-    const auto o = cfp::object_probability(distances, options.coarse.object, scratch);
+    const auto scored = cfp::scaled_to_noise(options.coarse.object, result.flow_sigma_px, 1);
+    const auto o = cfp::object_probability(distances, scored, scratch);
     CHECK_THAT(run.state.objects[b].static_probability, WithinAbs(o.static_probability, 1e-9));
     CHECK(run.state.objects[b].pairs == o.pairs);
     std::vector<char> is_foreground(depths.size());

@@ -99,9 +99,30 @@ TEMPLATE_TEST_CASE("Selecting three order statistics equals scoring and sorting 
 
 TEST_CASE("A static object's score is the figure that the documentation states", "[probability]") {
   cfp::Random random(11, "static object");
-  CHECK_THAT(run(static_distances<double>(200000, 1.0, random), {}).static_probability, WithinAbs(0.428, 0.005));
-  CHECK_THAT(run(static_distances<double>(200000, 0.343, random), {}).static_probability, WithinAbs(0.9, 0.005));
+  ObjectProbabilityOptions printed;
+  printed.positions = {0.1, 0.2, 0.3};
+  CHECK_THAT(run(static_distances<double>(200000, 1.0, random), printed).static_probability, WithinAbs(0.428, 0.005));
+  CHECK_THAT(run(static_distances<double>(200000, 0.343, random), printed).static_probability, WithinAbs(0.9, 0.005));
   CHECK_THAT(cfp::object_score(0.459, ObjectProbabilityOptions{}), WithinAbs(0.9, 0.001));
+}
+
+TEST_CASE("On the scale of the measured noise a static object scores the same at any noise", "[probability]") {
+  cfp::Random random(12, "measured noise");
+  for (const double sigma : {0.05, 0.2, 0.7}) {
+    std::vector<double> point;
+    for (int i = 0; i < 200000; ++i) point.push_back(sigma * std::hypot(random.normal(), random.normal()));
+    const double o = run(point, cfp::scaled_to_noise(ObjectProbabilityOptions{}, sigma, 2)).static_probability;
+    CHECK_THAT(o, WithinAbs(0.964, 0.002));
+    const double on_line =
+        run(static_distances<double>(200000, sigma, random), cfp::scaled_to_noise(ObjectProbabilityOptions{}, sigma, 1))
+            .static_probability;
+    CHECK_THAT(on_line, WithinAbs(o, 0.005));
+  }
+  ObjectProbabilityOptions as_printed;
+  as_printed.noise_factor = 0;
+  CHECK(cfp::scaled_to_noise(as_printed, 0.2, 2).sigma_px == 1);
+  CHECK(cfp::scaled_to_noise(ObjectProbabilityOptions{}, 0, 2).sigma_px == 1);
+  CHECK(cfp::scaled_to_noise(ObjectProbabilityOptions{}, std::numeric_limits<double>::quiet_NaN(), 2).sigma_px == 1);
 }
 
 TEST_CASE("An object is unknown with too few usable pairs, and says so", "[probability]") {

@@ -171,7 +171,7 @@ class BoxTracker {
       if (shown) {
         track.associated = track.shown;
         output_.push_back(track);
-        result.compensated += track.compensated() ? 1 : 0;
+        result.compensated += track.compensated() ? 1U : 0U;
       }
       track.shown = shown;
       tracks_[kept++] = track;

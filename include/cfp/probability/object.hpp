@@ -33,10 +33,10 @@ struct ObjectProbabilityOptions {
   /// k, > 0. The paper's 2; a distance from a line has statistically one degree of freedom.
   double degrees_of_freedom = 2;
   /// Scale of the distances in pixels, > 0. With 1 (the paper) the score reaches 0.9 at 0.46 px and a static object
-  /// with unit noise scores 0.43: O is a score on a pixel scale, and sigma sets the scale.
+  /// with unit noise scores 0.43 at the paper's positions: O is a score on a pixel scale, and sigma sets the scale.
   double sigma_px = 1;
   /// Where the noise of the flow has been measured, sigma_px is this many times its standard deviation, so that a
-  /// static object scores the same at any noise (0.94 to 0.97) and O_Th means the same; 0: sigma_px as it stands, as
+  /// static object scores the same at any noise (0.96) and O_Th means the same; 0: sigma_px as it stands, as
   /// printed. >= 0.
   double noise_factor = 5.8;
   /// Positions of the ascending order statistics whose mean is O: shares of the number of pairs in (0, 1], ascending.

@@ -20,8 +20,8 @@ inline namespace CFP_ISA {
 template <typename Camera>
 [[nodiscard]] bool is_usable_camera(const Camera& camera) noexcept {
   if constexpr (is_pinhole<Camera>::value) {
-    return camera.fx >= 1e-3 && camera.fx <= 1e6 && camera.fy >= 1e-3 && camera.fy <= 1e6 &&
-           std::abs(camera.cx) <= 1e7 && std::abs(camera.cy) <= 1e7;
+    const PinholeCamera<double> c = camera.template cast<double>();
+    return c.fx >= 1e-3 && c.fx <= 1e6 && c.fy >= 1e-3 && c.fy <= 1e6 && std::abs(c.cx) <= 1e7 && std::abs(c.cy) <= 1e7;
   } else {
     return true;
   }
