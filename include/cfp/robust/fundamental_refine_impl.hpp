@@ -87,8 +87,8 @@ template <typename T>
 double refine_fundamental(const PairColumns<T>& pairs, double scale, int max_steps, double tolerance,
                           FactoredF<double>& F, double bound = std::numeric_limits<double>::infinity()) noexcept {
   using Model = SampsonModel<T>;
-  struct Problem : DenseLeastSquares<7, FactoredF<double>, Model> {
-    using Base = DenseLeastSquares<7, FactoredF<double>, Model>;
+  using Base = DenseLeastSquares<7, FactoredF<double>, Model>;
+  struct Problem : Base {
     double cost = 0, trial_cost = 0, bound;
 
     Problem(Model& model, const FactoredF<double>& start, double most) : Base(model, start), bound(most) {}

@@ -80,10 +80,11 @@ struct TransferModel {
     Eigen::Matrix<double, 9, 4> moments = Eigen::Matrix<double, 9, 4>::Zero();
     double cost = 0;
     for (std::size_t i = 0; i < pairs.size; ++i) {
-      const double x = pairs.row[0][i], y = pairs.row[1][i], u = pairs.row[2][i], v = pairs.row[3][i];
+      const auto of = [&](std::size_t row) { return static_cast<double>(pairs.row[row][i]); };
+      const double x = of(0), y = of(1), u = of(2), v = of(3);
       const Vector3<double> mapped = H * Vector3<double>(x, y, 1);
       const double inverse_z = 1 / mapped.z(), dx = mapped.x() * inverse_z - u, dy = mapped.y() * inverse_z - v;
-      const double distance = (dx * dx + dy * dy) / scale, w = pairs.row[4][i], share = 1 / (1 + distance);
+      const double distance = (dx * dx + dy * dy) / scale, w = of(4), share = 1 / (1 + distance);
       // Beyond 9 the weight is below a hundredth; a point at infinity has NaN there and is left out, too.
       cost += distance < 9 ? w * distance * share : 0.9 * w;
       if (!(distance < 9)) continue;
