@@ -33,6 +33,7 @@ template struct cfp::SE3<float>;
 template struct cfp::SE3<double>;
 template <typename Scalar>
 static void instantiate_math() noexcept {
+  use(&cfp::isolated_cubic_root<Scalar>);
   use(&cfp::real_cubic_roots<Scalar>);
   use(&cfp::order_statistic<Scalar>);
   use(&cfp::se3_exp<Scalar>);
@@ -76,6 +77,7 @@ static void instantiate_geometry() noexcept {
   use(&cfp::epipolar_distances<Scalar>);
   use(&cfp::nearest_fundamental<Scalar>);
   use(&cfp::fundamental_8point<Scalar>);
+  use(&cfp::p3p<Scalar>);
   use(&cfp::fundamental_7point<Scalar>);
   use(static_cast<cfp::FundamentalResult<Scalar> (*)(
           const cfp::PointPairs<Scalar>&, const cfp::FundamentalRansacOptions&, cfp::FundamentalRansacWorkspace&,
