@@ -3,9 +3,8 @@
 #include <cmath>
 #include <vector>
 
-#include "support/pose_ceres.hpp"
-
 #include "support/catch.hpp"
+#include "support/pose_ceres.hpp"
 
 namespace {
 

@@ -5,11 +5,9 @@
 #include <memory>
 #include <vector>
 
-#include <ceres/ceres.h>
-#include <glog/logging.h>
-
 #include "cfp/math/se3.hpp"
 #include "cfp/optimization/bundle/bundle_problem.hpp"
+#include "support/ceres.hpp"
 
 namespace cfp_test {
 

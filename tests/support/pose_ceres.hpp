@@ -1,15 +1,12 @@
 // The same refinement by Ceres: analytic Jacobians written independently of the library's, left update, DENSE_QR.
 #pragma once
 
-// Include before support/catch.hpp: glog, which Ceres includes, has a CHECK of its own.
-#include <ceres/ceres.h>
-#undef CHECK
-
 #include <array>
 #include <cmath>
 #include <memory>
 #include <vector>
 
+#include "support/ceres.hpp"
 #include "support/pose_scene.hpp"
 
 namespace cfp_test {
