@@ -52,11 +52,12 @@ struct AssignmentWorkspace {
   std::vector<double> column_saving;  ///< b_j >= 0, one per column
 
   struct Visit {
-    std::ptrdiff_t row, column;
+    std::size_t row;
+    int column;
     double distance, offset;
   };
-  std::vector<double> costs, price, open_price, distance;
-  std::vector<std::ptrdiff_t> column_of_row, row_of_column, cheapest;
+  std::vector<double> costs, open_saving, distance;
+  std::vector<int> row_of_column;
   std::vector<Visit> visits;
 };
 
@@ -65,7 +66,7 @@ inline namespace CFP_ISA {
 /// Fills column_of_row (size rows) with the optimal column of each row, or `unassigned`. Exact up to the rounding of
 /// double.
 ///
-/// Terminates on any input after at most min^2 * max additions (min and max of rows, cols), whatever the costs hold.
+/// Terminates on any input after at most rows * min(rows, cols + 1) * cols additions, whatever the costs hold.
 /// Ties: equal input gives equal output; among equally cheap partners the free one, then the one of the lower index is
 /// tried first. Allocates only while the workspace grows.
 ///

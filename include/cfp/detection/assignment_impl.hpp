@@ -17,7 +17,6 @@ namespace detail {
 inline namespace CFP_ISA {
 
 inline constexpr double infinity = std::numeric_limits<double>::infinity();
-inline constexpr std::ptrdiff_t no_partner = -1;
 
 // The cost in double, or infinity for a forbidden pair. Sums of what is allowed stay finite over any matrix.
 template <typename Scalar>
@@ -30,135 +29,142 @@ template <typename Scalar>
 // The gate that is really used for n pairs at most. Above the bound below a gate means "as many pairs as possible"
 // anyway, and a needlessly large one would only cost digits. The magnitude of the costs takes part so that the bound
 // exceeds the largest one, also after rounding, when all costs are (nearly) equal.
-template <typename Scalar>
-[[nodiscard]] Scalar effective_gate(Scalar max_cost, Scalar least, Scalar most, std::size_t n) noexcept {
-  const Scalar magnitude = (std::max)(-least, most) / 4;
-  const Scalar width = (std::max)({most - least, magnitude, (std::numeric_limits<Scalar>::min)()});
-  return (std::min)(max_cost, most + static_cast<Scalar>(n) * width);
+template <typename Costs>
+[[nodiscard]] double effective_gate(const Eigen::ArrayBase<Costs>& allowed, double max_cost, std::size_t n) noexcept {
+  const double least = n > 0 ? allowed.minCoeff() : infinity;
+  if (!(least < infinity)) return (std::min)(max_cost, 1.0);  // no pair is allowed: any gate will do
+  double most = allowed.maxCoeff();
+  if (!(most < infinity)) most = (allowed < infinity).select(allowed, least).maxCoeff();
+  const double width = (std::max)({most - least, -least / 4, most / 4, (std::numeric_limits<double>::min)()});
+  return (std::min)(max_cost, most + static_cast<double>(n) * width);
 }
 
-// One search over the workspace's costs (rows <= columns). Notation: price p_j <= 0, reduced cost c_ij - p_j, gate g. A
-// row of a pair always holds its column at its smallest reduced cost, which is at most g; a column without a row has
-// price 0. Both hold when every row takes its cheapest column while that is free, which is the start.
+// One search over the workspace's costs. Notation: saving b_j >= 0 of a column, reduced cost c_ij + b_j, gate g. A row
+// of a pair always holds its column at its smallest reduced cost, which is at most g; a column without a row has saving
+// 0. Both hold at the start, without pairs.
 template <typename Workspace>
 class AssignmentSearch {
  public:
-  AssignmentSearch(Workspace& workspace, std::size_t rows, std::size_t columns, double gate)
-      : w_(workspace), columns_(static_cast<std::ptrdiff_t>(columns)), gate_(gate) {
+  AssignmentSearch(Workspace& workspace, std::size_t columns, double gate, span<int> column_of_row)
+      : w_(workspace), column_of_row_(column_of_row), columns_(columns), gate_(gate) {
     w_.distance.resize(columns);
-    w_.price.assign(columns, 0.0);
-    w_.open_price.resize(columns);
-    w_.row_of_column.assign(columns, no_partner);
-    w_.column_of_row.assign(rows, no_partner);
-    w_.visits.resize(rows + 1);
+    w_.open_saving.resize(columns);
+    w_.row_of_column.assign(columns, unassigned);
+    w_.visits.resize(column_of_row.size() + 1);
   }
+
+  // The smallest reduced cost of a row that was searched, its dummy included.
+  [[nodiscard]] double row_value(std::size_t row) const noexcept {
+    const int j = column_of_row_[row];
+    return j == unassigned ? gate_ : costs(row)[j] + w_.column_saving[std::size_t(j)];
+  }
+
+  // Optimal for all rows. Each takes its cheapest column while that is free; the rest are searched one by one.
   void solve() noexcept {
-    const auto rows = static_cast<std::ptrdiff_t>(w_.column_of_row.size());
-    for (std::ptrdiff_t row = 0; row < rows; ++row) {
-      const std::ptrdiff_t j = at(w_.cheapest, row);
-      if (j != no_partner && at(w_.row_of_column, j) == no_partner) pair(row, j);
+    for (const bool search : {false, true}) {
+      for (std::size_t i = 0; i < column_of_row_.size(); ++i) {
+        if (search && column_of_row_[i] == unassigned) augment(i);
+        if (!search) take_cheapest(i);
+      }
     }
-    for (std::ptrdiff_t row = 0; row < rows; ++row) {
-      if (at(w_.cheapest, row) != no_partner && at(w_.column_of_row, row) == no_partner) augment(row);
-    }
-  }
-  // The smallest reduced cost of a row, its dummy included.
-  [[nodiscard]] double row_value(std::ptrdiff_t row) const noexcept {
-    const std::ptrdiff_t j = at(w_.column_of_row, row);
-    return j == no_partner ? gate_ : costs(row)[j] - at(w_.price, j);
   }
 
  private:
-  using View = Eigen::Map<Eigen::ArrayXd>;
-  using ConstView = Eigen::Map<const Eigen::ArrayXd>;
+  using Visit = typename Workspace::Visit;
+  using View = Eigen::Map<const Eigen::ArrayXd>;
 
-  template <typename T>
-  static T& at(std::vector<T>& v, std::ptrdiff_t i) noexcept {
-    return v[static_cast<std::size_t>(i)];
+  void pair(std::size_t row, std::size_t column) noexcept {
+    column_of_row_[row] = static_cast<int>(column);
+    w_.row_of_column[column] = static_cast<int>(row);
   }
-  void pair(std::ptrdiff_t row, std::ptrdiff_t column) noexcept {
-    at(w_.row_of_column, column) = row;
-    at(w_.column_of_row, row) = column;
-  }
-  [[nodiscard]] const double* costs(std::ptrdiff_t row) const noexcept { return w_.costs.data() + row * columns_; }
-
-  // Distances of all open columns through one more row, whose own distance is `offset` above its value. Returns the
-  // smallest. The open price is -infinity where closed, so that the sum is infinite there.
-  [[nodiscard]] double relax(std::ptrdiff_t row, double offset) noexcept {
-    View distance(w_.distance.data(), columns_);
-    const ConstView cost(costs(row), columns_), price(w_.open_price.data(), columns_);
-    distance = distance.min(cost - price + offset);
-    return distance.minCoeff();
-  }
-
-  // The open column at that distance: the first free one, else the first.
-  [[nodiscard]] std::ptrdiff_t nearest(double distance) const noexcept {
-    std::ptrdiff_t first = no_partner;
-    for (std::ptrdiff_t j = 0; j < columns_; ++j) {
-      if (at(w_.distance, j) != distance) continue;
-      if (at(w_.row_of_column, j) == no_partner) return j;
-      if (first == no_partner) first = j;
-    }
-    return first;
+  void take_cheapest(std::size_t row) noexcept {
+    const double* const cost = costs(row);
+    const double least = View(cost, static_cast<Eigen::Index>(columns_)).minCoeff();
+    const auto j = static_cast<std::size_t>(std::find(cost, cost + columns_, least) - cost);
+    if (least < infinity && w_.row_of_column[j] == unassigned) pair(row, j);
   }
 
   // Dijkstra from a row without a pair to the nearest free column, or to the dummy of any row on the way.
-  void augment(std::ptrdiff_t start) noexcept {
+  void augment(std::size_t start) noexcept {
     std::fill(w_.distance.begin(), w_.distance.end(), infinity);
-    std::copy(w_.price.begin(), w_.price.end(), w_.open_price.begin());
-    w_.visits[0] = {start, no_partner, 0, 0};
+    std::copy(w_.column_saving.begin(), w_.column_saving.end(), w_.open_saving.begin());
+    w_.visits[0] = {start, unassigned, 0, 0};
     std::size_t visits = 1, alone = 0;  // alone: the visit whose dummy is the nearest so far
     double dummy = gate_, length = 0;
-    std::ptrdiff_t sink = no_partner;
+    int sink = unassigned;
     for (;;) {
-      const double least = relax(w_.visits[visits - 1].row, w_.visits[visits - 1].offset);
+      const double least = relax(w_.visits[visits - 1]);
       length = (std::min)(least, dummy);
       if (dummy <= least) break;
-      const std::ptrdiff_t j = nearest(least), row = at(w_.row_of_column, j);
-      if (row == no_partner) {
-        sink = j;
+      const std::size_t j = nearest(least);
+      if (w_.row_of_column[j] == unassigned) {
+        sink = static_cast<int>(j);
         break;
       }
-      at(w_.open_price, j) = -infinity;
-      at(w_.distance, j) = infinity;
+      w_.open_saving[j] = w_.distance[j] = infinity;
+      const auto row = static_cast<std::size_t>(w_.row_of_column[j]);
       const double offset = least - row_value(row);
-      w_.visits[visits] = {row, j, least, offset};
+      w_.visits[visits] = {row, static_cast<int>(j), least, offset};
       if (gate_ + offset < dummy) {
         dummy = gate_ + offset;
         alone = visits;
       }
       ++visits;
     }
-    flip(sink, sink == no_partner ? alone : visits);
+    flip(sink, sink == unassigned ? alone : visits);
     for (std::size_t k = 1; k < visits; ++k)
-      at(w_.price, w_.visits[k].column) += (std::min)(w_.visits[k].distance - length, 0.0);
+      w_.column_saving[std::size_t(w_.visits[k].column)] += (std::max)(length - w_.visits[k].distance, 0.0);
+  }
+
+  [[nodiscard]] const double* costs(std::size_t row) const noexcept { return w_.costs.data() + row * columns_; }
+
+  // Distances of all open columns through one more row, whose own distance is `offset` above its value. Returns the
+  // smallest. The saving is infinite where closed.
+  [[nodiscard]] double relax(const Visit& visit) noexcept {
+    const auto n = static_cast<Eigen::Index>(columns_);
+    const View cost(costs(visit.row), n), saving(w_.open_saving.data(), n);
+    Eigen::Map<Eigen::ArrayXd> distance(w_.distance.data(), n);
+    distance = distance.min(cost + saving + visit.offset);
+    return distance.minCoeff();
+  }
+
+  // The open column at that distance: the first free one, else the first.
+  [[nodiscard]] std::size_t nearest(double distance) const noexcept {
+    std::size_t first = columns_;
+    for (std::size_t j = 0; j < columns_; ++j) {
+      if (w_.distance[j] != distance) continue;
+      if (w_.row_of_column[j] == unassigned) return j;
+      if (first == columns_) first = j;
+    }
+    return first;
   }
 
   // Swaps the pairs along the shortest path that ends in column `sink`, or in the dummy of visit `end` when there is no
   // sink. The row before a column is the one that gave it its distance, visited before the column closed.
-  void flip(std::ptrdiff_t sink, std::size_t end) noexcept {
-    std::ptrdiff_t j = sink;
-    if (sink == no_partner) {
-      at(w_.column_of_row, w_.visits[end].row) = no_partner;
+  void flip(int sink, std::size_t end) noexcept {
+    int j = sink;
+    if (sink == unassigned) {
+      column_of_row_[w_.visits[end].row] = unassigned;
       j = w_.visits[end].column;
     }
-    while (j != no_partner) {
+    while (j != unassigned) {
       std::size_t best = 0;
       double least = infinity;
       for (std::size_t k = 0; k < end; ++k) {
-        const double through = costs(w_.visits[k].row)[j] - at(w_.price, j) + w_.visits[k].offset;
+        const double through = costs(w_.visits[k].row)[j] + w_.column_saving[std::size_t(j)] + w_.visits[k].offset;
         if (!(through < least)) continue;
         least = through;
         best = k;
       }
-      pair(w_.visits[best].row, j);
+      pair(w_.visits[best].row, static_cast<std::size_t>(j));
       j = w_.visits[best].column;
       end = best;
     }
   }
 
   Workspace& w_;
-  std::ptrdiff_t columns_;
+  span<int> column_of_row_;
+  std::size_t columns_;
   double gate_;
 };
 
@@ -168,53 +174,28 @@ class AssignmentSearch {
 inline namespace CFP_ISA {
 
 template <typename Scalar>
-AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_cost, AssignmentWorkspace& w,
+AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_cost, AssignmentWorkspace& workspace,
                                   span<int> column_of_row) {
   CFP_ASSERT(column_of_row.size() == costs.rows);
   std::fill(column_of_row.begin(), column_of_row.end(), unassigned);
-  w.row_saving.assign(costs.rows, 0.0);
-  w.column_saving.assign(costs.cols, 0.0);
+  workspace.row_saving.assign(costs.rows, 0.0);
+  workspace.column_saving.assign(costs.cols, 0.0);
   AssignmentResult result;
   if (!(max_cost == max_cost)) {
     result.status = Status::invalid_input;
     return result;
   }
-  const bool tall = costs.rows > costs.cols;  // the search costs rows^2 * columns: the shorter side goes first
-  const std::size_t n = (std::min)(costs.rows, costs.cols), m = (std::max)(costs.rows, costs.cols);
-  w.costs.resize(n * m);
-  w.cheapest.assign(n, detail::no_partner);
-  double least = detail::infinity, most = -detail::infinity;
-  for (std::size_t i = 0; i < n; ++i) {
-    double* row = w.costs.data() + i * m;
-    const Scalar* from = costs.values.data() + (tall ? i : i * m);
-    if (tall) {
-      for (std::size_t j = 0; j < m; ++j) row[j] = detail::allowed_cost(from[j * n], max_cost);
-    } else {
-      for (std::size_t j = 0; j < m; ++j) row[j] = detail::allowed_cost(from[j], max_cost);
-    }
-    const Eigen::Map<const Eigen::ArrayXd> view(row, static_cast<std::ptrdiff_t>(m));
-    const double least_of_row = view.minCoeff(), most_of_row = view.maxCoeff();
-    if (!(least_of_row < detail::infinity)) continue;
-    w.cheapest[i] = std::find(row, row + m, least_of_row) - row;
-    least = (std::min)(least, least_of_row);
-    const bool forbids = !(most_of_row < detail::infinity);
-    most = (std::max)(most, forbids ? (view < detail::infinity).select(view, least_of_row).maxCoeff() : most_of_row);
-  }
-  if (!(least < detail::infinity)) return result;
-  const double gate = detail::effective_gate(max_cost, least, most, n);
-  detail::AssignmentSearch<AssignmentWorkspace> search(w, n, m, gate);
-  search.solve();
-
-  std::vector<double>& short_side = tall ? w.column_saving : w.row_saving;
-  std::vector<double>& long_side = tall ? w.row_saving : w.column_saving;
-  for (std::size_t j = 0; j < m; ++j) long_side[j] = -w.price[j];
-  for (std::size_t i = 0; i < n; ++i) {
-    short_side[i] = (std::max)(gate - search.row_value(static_cast<std::ptrdiff_t>(i)), 0.0);
-    if (w.column_of_row[i] == detail::no_partner) continue;
-    const std::size_t j = static_cast<std::size_t>(w.column_of_row[i]);
-    const std::size_t r = tall ? j : i, c = tall ? i : j;
-    column_of_row[r] = static_cast<int>(c);
-    result.cost += static_cast<double>(costs(r, c));
+  workspace.costs.resize(costs.rows * costs.cols);
+  for (std::size_t k = 0; k < workspace.costs.size(); ++k)
+    workspace.costs[k] = detail::allowed_cost(costs.values[k], max_cost);
+  const Eigen::Map<const Eigen::ArrayXd> allowed(workspace.costs.data(), Eigen::Index(workspace.costs.size()));
+  const double gate = detail::effective_gate(allowed, max_cost, (std::min)(costs.rows, costs.cols));
+  detail::AssignmentSearch<AssignmentWorkspace> search(workspace, costs.cols, gate, column_of_row);
+  if (costs.cols > 0) search.solve();
+  for (std::size_t i = 0; i < costs.rows; ++i) {
+    workspace.row_saving[i] = (std::max)(gate - search.row_value(i), 0.0);
+    if (column_of_row[i] == unassigned) continue;
+    result.cost += static_cast<double>(costs(i, static_cast<std::size_t>(column_of_row[i])));
     ++result.pairs;
   }
   return result;
@@ -225,15 +206,10 @@ double assignment_gap(const CostMatrix<Scalar>& costs, double max_cost, span<con
                       span<const double> column_saving) noexcept {
   CFP_ASSERT(column_of_row.size() == costs.rows && column_saving.size() == costs.cols);
   if (!(max_cost == max_cost)) return detail::infinity;
-  double least = detail::infinity, most = -detail::infinity;
-  for (const Scalar cost : costs.values.subspan(0, costs.rows * costs.cols)) {
-    const double c = detail::allowed_cost(cost, max_cost);
-    if (!(c < detail::infinity)) continue;
-    least = (std::min)(least, c);
-    most = (std::max)(most, c);
-  }
-  if (!(least < detail::infinity)) least = most = 0;  // no pair is allowed
-  const double gate = detail::effective_gate(max_cost, least, most, (std::min)(costs.rows, costs.cols));
+  const Eigen::Map<const Eigen::Array<Scalar, Eigen::Dynamic, 1>> values(costs.values.data(),
+                                                                         Eigen::Index(costs.rows * costs.cols));
+  const auto allowed = values.unaryExpr([=](Scalar cost) { return detail::allowed_cost(cost, max_cost); });
+  const double gate = detail::effective_gate(allowed, max_cost, (std::min)(costs.rows, costs.cols));
   const auto saving_of = [&](std::size_t i, std::size_t j) {
     return gate - detail::allowed_cost(costs(i, j), max_cost);
   };
