@@ -32,8 +32,8 @@ struct TrackedBox {
   int detection = -1;   ///< index among this frame's detections; -1: compensated, the detector missed it
   int age = 0;          ///< frames since the first detection
   int missed = 0;       ///< frames since the last detection; 0 when detected
-  bool associated =
-      false;  ///< this object had an output box in frame k-1; false: its foreground gets K = 0 (paper IV-D)
+  /// this object had an output box in frame k-1; false: its foreground gets K = 0 (paper IV-D)
+  bool associated = false;
 
   [[nodiscard]] bool compensated() const noexcept { return detection < 0; }
 };
@@ -44,10 +44,10 @@ struct BoxTrackerOptions {
   BoxMotionOptions motion;
   double min_iou = 0.3;       ///< gate of the association: a pair needs more than this IoU, in [0, 1)
   double min_score = -1e300;  ///< detections below are ignored
-  double birth_threshold =
-      -1e300;            ///< detections below extend a track but start none (and are not output when they extend none)
-  int confirm_hits = 2;  ///< detections before a track may be compensated, >= 1
-  int max_coast = 6;     ///< missed frames in a row that are compensated, >= 0 (the paper's figure shows six)
+  /// detections below extend a track but start none (and are not output when they extend none)
+  double birth_threshold = -1e300;
+  int confirm_hits = 2;        ///< detections before a track may be compensated, >= 1
+  int max_coast = 6;           ///< missed frames in a row that are compensated, >= 0 (the paper's figure shows six)
   double coast_per_hit = 1.0;  ///< ... and at most this many per detection so far, > 0 (1: no longer than it was seen)
   double min_visible = 0.25;  ///< a compensated box with a smaller share of its area in the image is dropped, in [0, 1]
   double max_gap_s = 2.0;     ///< after a longer dt the frames are not adjacent: all tracks are dropped, s, > 0

@@ -22,8 +22,8 @@ struct EkfState {
 
 struct EkfUpdate {
   Status status = Status::ok;  ///< invalid_input: something was not finite; degenerate: S was not positive definite
-  double mahalanobis_sq =
-      0;  ///< r' S^-1 r of the innovation r; chi-squared with m degrees of freedom when the model holds
+  /// r' S^-1 r of the innovation r; chi-squared with m degrees of freedom when the model holds
+  double mahalanobis_sq = 0;
 };
 
 namespace detail {

@@ -106,12 +106,12 @@ template <std::size_t Bins>
 struct CalibrationResult {
   double auc = 0.5;  ///< see area_under_curve
   double brier = 0;  ///< sum w (p − y)² / sum w, y = 1 for static, in [0, 1]
-  double log_loss =
-      0;  ///< −sum w (y ln p + (1 − y) ln(1 − p)) / sum w, nats; p kept in [1e-15, 1 − 1e-15], so at most 34.54
-  double expected_calibration_error =
-      0;  ///< sum over bins of (weight / total) |static_fraction − mean_probability|, in [0, 1]
-  double largest_calibration_error =
-      0;                       ///< the largest |static_fraction − mean_probability| of a bin that is not empty
+  /// −sum w (y ln p + (1 − y) ln(1 − p)) / sum w, nats; p kept in [1e-15, 1 − 1e-15], so at most 34.54
+  double log_loss = 0;
+  /// sum over bins of (weight / total) |static_fraction − mean_probability|, in [0, 1]
+  double expected_calibration_error = 0;
+  /// the largest |static_fraction − mean_probability| of a bin that is not empty
+  double largest_calibration_error = 0;
   double static_fraction = 0;  ///< of the total weight
   std::array<ReliabilityBin, Bins> table{};
   std::size_t used = 0;                     ///< samples of positive weight

@@ -55,8 +55,8 @@ void time_order(span<const StampedPose<Scalar>> poses, std::vector<std::size_t>&
 }  // namespace CFP_ISA
 
 struct AssociationOptions {
-  double max_difference_s =
-      0.02;             ///< two stamps match when they differ by less than this, > 0 (the TUM scripts' default)
+  /// two stamps match when they differ by less than this, > 0 (the TUM scripts' default)
+  double max_difference_s = 0.02;
   double offset_s = 0;  ///< added to the stamps of the second trajectory, finite
 };
 

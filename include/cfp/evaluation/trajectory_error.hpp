@@ -42,8 +42,8 @@ struct AbsoluteErrorResult {
   Similarity S_truth_estimate;    ///< the alignment
   AlignmentMode alignment = AlignmentMode::rigid;
   TrajectoryCoverage coverage;
-  Status status =
-      Status::not_enough_data;  ///< degenerate: the matched poses do not fix the alignment's rotation; errors valid
+  /// degenerate: the matched poses do not fix the alignment's rotation; errors valid
+  Status status = Status::not_enough_data;
 };
 
 enum class DeltaUnit : std::uint8_t {

@@ -15,8 +15,8 @@ namespace cfp {
 
 struct HealthOptions {
   bool use_fallback = true;  ///< false: the figures are reported and the weights left alone
-  double min_effective_points =
-      10;  ///< fewer effective observations than this are no base for a pose (ORB-SLAM2's 10), >= 0
+  /// fewer effective observations than this are no base for a pose (ORB-SLAM2's 10), >= 0
+  double min_effective_points = 10;
 };
 
 enum class WeightFallback : std::uint8_t {

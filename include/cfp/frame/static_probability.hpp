@@ -2,9 +2,10 @@
 /// CFP-SLAM for a host that keeps its own features, map, optimiser and order of things: two calls per frame, each of
 /// which gives the weights for the host's next pose optimisation.
 ///
-///   const auto coarse = probability.coarse(frame);                        // boxes, objects, depth: the paper's stage
-///   1 pose = optimise(coarse.weight); const auto fine = probability.fine({T_cur_prev, inliers}, match, m);  //
-///   constraints of that pose: stage 2 pose = optimise(fine.weight);
+///   const auto coarse = probability.coarse(frame);               // stage 1: boxes, objects, depth
+///   pose = optimise(coarse.weight);                              // the host's own
+///   const auto fine = probability.fine({pose, inliers}, match, m);  // stage 2: the constraints of that pose
+///   pose = optimise(fine.weight);
 ///
 /// Who wants another order calls the steps themselves: begin_frame, track_boxes, estimate_objects, label_keypoints,
 /// match_in_boxes, constrain_keypoints, update_map_points, weigh_keypoints.

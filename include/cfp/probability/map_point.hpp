@@ -26,8 +26,8 @@ struct MapPointOptions {
   double rate = 0.2;                ///< weight of the new K against M, in (0, 1]; the same study
   double evidence_limit = 0.02;     ///< log_odds only: K and M are kept in [limit, 1 - limit], in [1e-4, 0.5)
   double deletion_threshold = 0.3;  ///< a map point with M below it is to be deleted (paper), in [0, 1]
-  double mismatch_threshold =
-      0.5;  ///< |K - M| above it: keypoint and map point are mismatched (no value in the paper), in (0, 1]
+  /// |K - M| above it: keypoint and map point are mismatched (no value in the paper), in (0, 1]
+  double mismatch_threshold = 0.5;
   WeightRule weight = WeightRule::product;  ///< how K and M give one weight (paper: "as weights")
 };
 

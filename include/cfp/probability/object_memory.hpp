@@ -15,8 +15,8 @@ namespace cfp {
 
 struct ObjectMemoryOptions {
   double time_constant_s = 0.2;  ///< after it, evidence counts 1/e, >= 0; 0: no memory, as printed
-  double evidence_limit =
-      3;  ///< log-odds that a frame may contribute and memory may hold, > 0: a start is seen at once
+  /// log-odds that a frame may contribute and memory may hold, > 0: a start is seen at once
+  double evidence_limit = 3;
 };
 
 /// What is remembered of one object.
