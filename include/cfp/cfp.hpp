@@ -34,6 +34,7 @@
 #include "cfp/frame/constrain_keypoints.hpp"
 #include "cfp/frame/descriptor_matching.hpp"
 #include "cfp/frame/estimate_objects.hpp"
+#include "cfp/frame/explain.hpp"
 #include "cfp/frame/flow_model.hpp"
 #include "cfp/frame/frame.hpp"
 #include "cfp/frame/frame_options.hpp"

@@ -216,6 +216,7 @@ static void instantiate_frame() noexcept {
   use(&cfp::apply_fallback<Scalar>);
   use(&cfp::may_create_map_point<Scalar>);
   use(&cfp::counts_as_inlier<Scalar>);
+  use(&cfp::explain<Scalar>);
 }
 
 template <typename Scalar>

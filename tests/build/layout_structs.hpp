@@ -175,6 +175,8 @@
   CFP_LAYOUT(cfp::FrameOptions, min_inlier_weight) \
   CFP_LAYOUT(cfp::ConstraintReport, confidence) \
   CFP_LAYOUT(cfp::FrameReport, health) \
+  CFP_LAYOUT(cfp::ConstraintExplanation, confidence) \
+  CFP_LAYOUT(cfp::KeypointExplanation, weight) \
   CFP_LAYOUT(cfp::FrameMemory<float>, descriptor_bytes) \
   CFP_LAYOUT(cfp::FrameMemory<double>, descriptor_bytes) \
   CFP_LAYOUT(cfp::FrameScratch<float>, mask) \

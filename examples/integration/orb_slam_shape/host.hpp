@@ -1,6 +1,6 @@
-// ORB-SLAM2's classes in miniature, by its names: what a host has before it knows of cfp. The one thing added for cfp
-// is MapPoint::mStaticProbability. No OpenCV, so that the example builds everywhere: keypoints and matrices are own
-// types.
+// ORB-SLAM2's classes in miniature, by its names: what a host has before it knows of cfp. Added for cfp are
+// MapPoint::mStaticProbability, Frame::mvStaticProbability and Frame::mvWeight. No OpenCV, so that the example builds
+// everywhere: keypoints and matrices are own types.
 #pragma once
 
 #include <array>
@@ -75,6 +75,7 @@ struct Frame {
   std::vector<bool> mvbOutlier;
   bool mbHasPose = false;
   Eigen::Matrix4f mTcw = Eigen::Matrix4f::Identity();
+  std::vector<float> mvStaticProbability, mvWeight;  // cfp: K, and the weight of the observation
   // of the detector and the optical flow, which a dynamic SLAM has besides
   std::vector<BoundingBox> mvBoxes;
   std::vector<std::array<float, 2>> mvFlowPrevious, mvFlowCurrent;

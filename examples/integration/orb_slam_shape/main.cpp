@@ -1,6 +1,6 @@
 // cfp in the shape of ORB-SLAM's tracking: the same host without and with cfp on the same simulated images of people
-// who walk through a room. The glue is cfp_glue.hpp; host.hpp and tracking.hpp are the host, whose lines for cfp are
-// marked.
+// who walk through a room. The glue is cfp_glue.hpp and ../orb_slam/static_weights.hpp; host.hpp and tracking.hpp are
+// the host, whose lines for cfp are marked.
 #include <cmath>
 #include <cstdio>
 
@@ -16,7 +16,7 @@ struct Outcome {
 
 Outcome Run(bool withCfp) {
   const Calibration K{535.4F, 539.2F, 320.1F, 247.6F, 640, 480};
-  StaticWeights weights(K, 0);
+  StaticWeights weights = MakeStaticWeights(K, 0);
   Tracking tracking(K, withCfp ? &weights : nullptr);
   Simulation simulation(K, 1);
   const Eigen::Matrix4f first = Simulation::TruePose(0);

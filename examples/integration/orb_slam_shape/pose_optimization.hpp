@@ -24,14 +24,15 @@ inline Eigen::Matrix4d Moved(const Eigen::Matrix4d& T, const Eigen::Matrix<doubl
 }
 
 // Returns the number of inliers, sets mTcw and mvbOutlier. weights == nullptr: the host as it was.
-inline int PoseOptimization(Frame& F, const Calibration& K, const StaticWeights* weights) {
+inline int PoseOptimization(Frame& F, const Calibration& K, StaticWeights* weights) {
   constexpr double chi2 = 5.991;
   int nInliers = 0;
   Eigen::Matrix4d Tcw = F.mTcw.cast<double>();
   F.mvbOutlier.assign(F.mvKeysUn.size(), false);
   std::vector<double> w(F.mvKeysUn.size(), 0.0);
+  if (weights) weights->Weigh(F);  // cfp
   for (std::size_t i = 0; i < w.size(); ++i) {
-    if (F.mvpMapPoints[i]) w[i] = weights ? static_cast<double>(weights->Weight(F, i)) : 1.0;  // cfp
+    if (F.mvpMapPoints[i]) w[i] = weights ? static_cast<double>(F.mvWeight[i]) : 1.0;  // cfp
   }
   for (int round = 0; round < 4; ++round) {
     for (int iteration = 0; iteration < 10; ++iteration) {

@@ -25,7 +25,9 @@ class Tracking {
     mCurrentFrame = std::move(frame);
     mCurrentFrame.mvpMapPoints.assign(mCurrentFrame.mvKeysUn.size(), nullptr);
     mCurrentFrame.mvbOutlier.assign(mCurrentFrame.mvKeysUn.size(), false);
-    if (mpWeights) mpWeights->NewFrame(mCurrentFrame);  // cfp: boxes, objects, depth
+    if (mpWeights)  // cfp: boxes, objects, depth
+      mpWeights->NewFrame(mCurrentFrame, Miniature::Detections(mCurrentFrame),
+                          {mCurrentFrame.mvFlowPrevious, mCurrentFrame.mvFlowCurrent});
     if (mState == NOT_INITIALIZED) {
       CreateNewKeyFrame();
       mState = OK;
@@ -39,7 +41,7 @@ class Tracking {
       }
       bool bOK = nInliers >= 10;
       if (bOK && mpWeights && mLastFrame.mbHasPose)
-        mpWeights->FirstPose(mCurrentFrame, mLastFrame, nInliers);  // cfp: constraints of the first pose, M
+        mpWeights->FirstPose(mCurrentFrame, mLastFrame);  // cfp: constraints of the first pose, M
       if (bOK) bOK = TrackLocalMap();
       mState = bOK ? OK : LOST;
       mCurrentFrame.mbHasPose = bOK;
@@ -94,11 +96,12 @@ class Tracking {
       std::vector<Eigen::Vector3f> points;
       std::vector<std::array<float, 2>> pixels;
       std::vector<float> weights;
+      if (mpWeights) mpWeights->Weigh(mCurrentFrame);  // cfp
       for (std::size_t i = 0; i < mCurrentFrame.mvpMapPoints.size(); ++i) {
         if (!mCurrentFrame.mvpMapPoints[i]) continue;
         points.push_back(mCurrentFrame.mvpMapPoints[i]->GetWorldPos());
         pixels.push_back({mCurrentFrame.mvKeysUn[i].pt.x, mCurrentFrame.mvKeysUn[i].pt.y});
-        weights.push_back(mpWeights ? mpWeights->Weight(mCurrentFrame, i) : 1.0F);  // cfp
+        weights.push_back(mpWeights ? mCurrentFrame.mvWeight[i] : 1.0F);  // cfp
       }
       const cfp::PinholeCamera<float> camera{mK.fx, mK.fy, mK.cx, mK.cy};
       const auto pose = cfp::pnp_ransac(points, pixels, weights, camera, cfp::PnpRansacOptions{}, mRansacWorkspace);
@@ -112,14 +115,11 @@ class Tracking {
   }
 
   bool TrackLocalMap() {
-    const std::vector<MapPoint*> before = mCurrentFrame.mvpMapPoints;
     std::vector<MapPoint*> local;
     for (std::size_t k = mvKeyFrames.size(); k-- > 0 && mvKeyFrames.size() - k <= 10;)
       local.insert(local.end(), mvKeyFrames[k].mvpMapPoints.begin(), mvKeyFrames[k].mvpMapPoints.end());
     SearchByProjection(local, 5, 0.8F);
-    for (std::size_t i = 0; mpWeights && i < before.size(); ++i) {
-      if (mCurrentFrame.mvpMapPoints[i] && !before[i]) mpWeights->Joined(mCurrentFrame, i);  // cfp: they learn, too
-    }
+    if (mpWeights) mpWeights->Joined(mCurrentFrame);  // cfp: what was found just now learns, too
     PoseOptimization(mCurrentFrame, mK, mpWeights);
     mnMatchesInliers = 0;
     for (std::size_t i = 0; i < mCurrentFrame.mvpMapPoints.size(); ++i) {
@@ -145,9 +145,10 @@ class Tracking {
         continue;
       }
       if (mCurrentFrame.mvDepth[i] <= 0) continue;
-      if (mpWeights && !mpWeights->MayCreate(i)) continue;  // cfp: no landmark of what moves
+      const float k = mpWeights ? mCurrentFrame.mvStaticProbability[i] : 1.0F;
+      if (mpWeights && !mpWeights->MayCreate(k)) continue;  // cfp: no landmark of what moves
       mlpMapPoints.emplace_back(UnprojectStereo(mCurrentFrame, i, Twc), mCurrentFrame.Row(i));
-      if (mpWeights) mlpMapPoints.back().mStaticProbability = mpWeights->Initial(i);  // cfp: M = K
+      mlpMapPoints.back().mStaticProbability = k;  // cfp
       pMP = &mlpMapPoints.back();
       pMP->mnObservations = 1;
       ++nPoints;

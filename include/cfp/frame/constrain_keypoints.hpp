@@ -129,11 +129,12 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
   const bool has_projection = projection.status != Status::not_enough_data,
              has_epipolar = epipolar.status != Status::not_enough_data;
   if (!has_projection && !has_epipolar) return;
+  state.evidence.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     if (state.box[i] == no_box) continue;
     const std::size_t b = static_cast<std::size_t>(state.box[i]);
     const Scalar m = map_point_probability[i];
-    SecondStageKeypoint<Scalar> keypoint;
+    SecondStageKeypoint<Scalar>& keypoint = state.evidence[i] = {};
     keypoint.projection = {static_probability(projection, scratch.projection[i]), ct,
                            has_projection && scratch.projection[i] >= Scalar(0)};
     if (has_epipolar)

@@ -17,6 +17,7 @@
 #include "cfp/frame/health.hpp"
 #include "cfp/probability/object.hpp"
 #include "cfp/probability/object_memory.hpp"
+#include "cfp/probability/second_stage_probability.hpp"
 
 namespace cfp {
 
@@ -102,10 +103,11 @@ struct FrameState {
   std::vector<std::pair<std::int64_t, ObjectMemory>> memories;  ///< of the objects, by the id of their boxes
   std::vector<KeypointLabel> label;                             ///< per keypoint
   std::vector<std::int32_t> box;                                ///< per keypoint: the box that decides its K, or no_box
-  std::vector<std::int32_t> match;         ///< per keypoint: index in the frame before, or no_match
-  std::vector<Scalar> static_probability;  ///< per keypoint: K
-  std::vector<Scalar> posterior;           ///< per keypoint: K with M of before as its prior, from the fine stage
-  std::vector<Scalar> weight;              ///< per keypoint: what the pose is to use
+  std::vector<std::int32_t> match;                    ///< per keypoint: index in the frame before, or no_match
+  std::vector<SecondStageKeypoint<Scalar>> evidence;  ///< per keypoint in a box: what the fine stage knew of it
+  std::vector<Scalar> static_probability;             ///< per keypoint: K
+  std::vector<Scalar> posterior;  ///< per keypoint: K with M of before as its prior, from the fine stage
+  std::vector<Scalar> weight;     ///< per keypoint: what the pose is to use
   FrameReport report;
   FrameScratch<Scalar> scratch;
 

@@ -60,21 +60,44 @@ struct SecondStageKeypoint {
   bool box_associated = true;                ///< its box continues a box of frame k-1
 };
 
+/// The rules of the second stage, in the paper's order. A match without any available constraint (no depth and too
+/// little translation) counts as no match.
+enum class SecondStageRule : std::uint8_t {
+  new_object,            ///< foreground of a box without one in frame k-1, whose matches are false: 0
+  unmatched_foreground,  ///< no match in k-1: 0
+  unmatched_background,  ///< no match in k-1: M
+  high_dynamic,          ///< O <= O_Th: fuse_high_dynamic
+  low_dynamic            ///< O > O_Th: fuse_low_dynamic
+};
+
 inline namespace CFP_ISA {
 
-/// K after the second stage. In the paper's order:
-/// box not associated with one of frame k-1: foreground 0 (its matches are false), background by the rules below;
-/// no match in k-1: foreground 0, background M; match: fuse_high_dynamic or fuse_low_dynamic by O against O_Th.
-/// A match without any available constraint (no depth and too little translation) counts as no match. In [0, 1].
+/// The rule that holds for a keypoint.
+template <typename Scalar>
+[[nodiscard]] constexpr SecondStageRule second_stage_rule(const SecondStageKeypoint<Scalar>& keypoint,
+                                                          Scalar object_threshold) noexcept {
+  if (keypoint.foreground && !keypoint.box_associated) return SecondStageRule::new_object;
+  const bool usable = keypoint.matched && (keypoint.projection.available || keypoint.epipolar.available);
+  if (!usable)
+    return keypoint.foreground ? SecondStageRule::unmatched_foreground : SecondStageRule::unmatched_background;
+  return is_high_dynamic(keypoint.object_probability, object_threshold) ? SecondStageRule::high_dynamic
+                                                                        : SecondStageRule::low_dynamic;
+}
+
+/// K after the second stage, by the rule that holds. In [0, 1].
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar second_stage_probability(const SecondStageKeypoint<Scalar>& keypoint,
                                                         Scalar object_threshold) noexcept {
-  if (keypoint.foreground && !keypoint.box_associated) return Scalar(0);
-  const bool usable = keypoint.matched && (keypoint.projection.available || keypoint.epipolar.available);
-  if (!usable) return keypoint.foreground ? Scalar(0) : clamp_probability(keypoint.map_point_probability);
-  return is_high_dynamic(keypoint.object_probability, object_threshold)
-             ? fuse_high_dynamic(keypoint.projection, keypoint.epipolar)
-             : fuse_low_dynamic(keypoint.projection, keypoint.epipolar);
+  switch (second_stage_rule(keypoint, object_threshold)) {
+    case SecondStageRule::unmatched_background:
+      return clamp_probability(keypoint.map_point_probability);
+    case SecondStageRule::high_dynamic:
+      return fuse_high_dynamic(keypoint.projection, keypoint.epipolar);
+    case SecondStageRule::low_dynamic:
+      return fuse_low_dynamic(keypoint.projection, keypoint.epipolar);
+    default:
+      return Scalar(0);
+  }
 }
 
 }  // namespace CFP_ISA

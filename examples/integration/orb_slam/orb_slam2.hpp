@@ -1,0 +1,73 @@
+// What StaticWeights must know of ORB-SLAM2 and ORB-SLAM3, and optical flow for both. Templates, so that nothing of
+// theirs is needed here: `StaticWeights<OrbSlam2<ORB_SLAM2::Frame, ORB_SLAM2::MapPoint>>`.
+#pragma once
+
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "cfp/interop/opencv.hpp"
+#include "cfp/interop/opencv_flow.hpp"
+#include "static_weights.hpp"
+
+namespace cfp_integration {
+
+// Objects are detected in the image as the lens gives it, so the keypoints are those before undistortion (mvKeys, not
+// mvKeysUn) and the camera is the one with its distortion.
+template <typename FrameType, typename MapPointType>
+struct OrbSlam2 {
+  using Frame = FrameType;
+  using MapPoint = MapPointType;
+  using Camera = cfp::RadialTangentialCamera<float>;
+  static cfp::PointSpan<float, 2> Keys(const Frame& F) { return cfp::view(F.mvKeys); }
+  static cfp::DescriptorSpan Descriptors(const Frame& F) { return cfp::descriptor_view(F.mDescriptors); }
+  static cfp::SE3<double> Pose(const Frame& F) {
+    cfp::SE3<double> T_cam_world;
+    return cfp::to_se3(F.mTcw, T_cam_world) == cfp::Status::ok ? T_cam_world : cfp::SE3<double>{};
+  }
+};
+
+// ORB-SLAM3 1.0 has Sophus poses. Pinhole cameras only: not the pair of fisheye cameras (Nleft != -1).
+template <typename FrameType, typename MapPointType>
+struct OrbSlam3 : OrbSlam2<FrameType, MapPointType> {
+  static cfp::SE3<double> Pose(const FrameType& F) {
+    const auto T_cam_world = F.GetPose();
+    return {T_cam_world.rotationMatrix().template cast<double>(), T_cam_world.translation().template cast<double>()};
+  }
+};
+
+inline cfp::FrameOptions StaticWeightsOptions(int personClass, int width, int height) {
+  cfp::FrameOptions options;
+  options.classes = {{personClass, true}};
+  options.tracker.image_width = width;
+  options.tracker.image_height = height;
+  return options;
+}
+
+// Flow from the image of the last call to this one; the views hold until the next call.
+class FrameFlow {
+ public:
+  // gray as extracted from, depth in metres (empty: none), the keypoints of this frame, and the boxes of the last one.
+  cfp::FlowPairs<float> Next(const cv::Mat& gray, const cv::Mat& depth, const std::vector<cv::KeyPoint>& keys,
+                             const std::vector<cfp::TrackedBox<float>>& lastBoxes) {
+    mBoxes.clear();
+    for (const auto& box : lastBoxes) mBoxes.push_back(box.box);
+    mTracker.track(gray, mLastKeys, mBoxes);
+    cfp::FlowPairs<float> flow = mTracker.pairs();
+    mDepths.resize(flow.previous.size());
+    if (cfp::sample_depth(mLastDepth, flow.previous, 1, mDepths) == cfp::Status::ok) flow.previous_depths = mDepths;
+    mLastKeys = keys;
+    depth.copyTo(mLastDepth);
+    return flow;
+  }
+  void Reset() { mTracker.reset(); }
+
+ private:
+  cfp::OpticalFlowTracker mTracker;
+  std::vector<cv::KeyPoint> mLastKeys;
+  cv::Mat mLastDepth;
+  std::vector<cfp::Box<float>> mBoxes;
+  std::vector<float> mDepths;
+};
+
+}  // namespace cfp_integration
