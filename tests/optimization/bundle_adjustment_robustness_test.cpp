@@ -85,6 +85,49 @@ TEST_CASE("A second call of the same size allocates nothing; a large one nothing
   }
 }
 
+TEST_CASE("Poses in any order, and one that sees everything: the reduced system stays sparse",
+          "[optimization][bundle_adjustment]") {
+  cfp_test::BaSceneOptions options;
+  options.poses = 150;
+  options.points = 3000;
+  const cfp_test::BaScene film = cfp_test::make_ba_scene(options, 4);
+  std::vector<int> number(film.poses.size());
+  for (std::size_t k = 0; k < number.size(); ++k) number[k] = static_cast<int>(k);
+  cfp::Random random(4, "order of poses");
+  for (std::size_t k = number.size(); k > 1; --k)
+    std::swap(number[k - 1], number[random.index(static_cast<std::uint32_t>(k))]);
+  cfp_test::BaScene in_order = film, shuffled = film;
+  for (std::size_t k = 0; k < number.size(); ++k) {
+    const auto to = static_cast<std::size_t>(number[k]);
+    shuffled.poses[to] = film.poses[k], shuffled.fixed[to] = film.fixed[k];
+    shuffled.true_poses[to] = film.true_poses[k];
+  }
+  for (int& pose : shuffled.pose) pose = number[static_cast<std::size_t>(pose)];
+  const cfp::BundleResult a = adjust(in_order), b = adjust(shuffled);
+  CHECK(a.free_poses == 148);
+  CHECK(a.factor_blocks < 16 * a.free_poses);
+  CHECK(b.factor_blocks < 16 * b.free_poses);
+  CHECK(a.iterations == b.iterations);
+  CHECK(std::abs(a.final_cost - b.final_cost) < 1e-9 * a.final_cost);
+  CHECK(std::abs(in_order.position_error() - shuffled.position_error()) < 1e-9);
+
+  cfp_test::BaScene arrow;  // pose 0 sees all points, every other pose two of its own
+  constexpr int leaves = 100;
+  for (int k = 0; k <= leaves; ++k) arrow.poses.emplace_back();
+  for (int j = 0; j < 2 * leaves; ++j) {
+    arrow.points.emplace_back(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(2, 4));
+    for (const int k : {0, 1 + j / 2}) {
+      arrow.pose.push_back(k), arrow.point.push_back(j), arrow.pixels.emplace_back(320, 240);
+      arrow.u_right.push_back(-1), arrow.sigma.push_back(1), arrow.weights.push_back(1);
+    }
+  }
+  arrow.fixed.assign(arrow.poses.size(), 0);
+  const cfp::BundleResult c = adjust(arrow);
+  CHECK(c.free_poses == leaves + 1);
+  CHECK(c.factor_blocks <= 2 * c.free_poses);
+  CHECK(c.final_cost < c.initial_cost);
+}
+
 TEST_CASE("Nothing to do is reported and changes nothing", "[optimization][bundle_adjustment]") {
   cfp::BundleWorkspace workspace;
   CHECK(adjust_bundle(cfp::BundleProblem<>{}, cfp::BundleOptions{}, workspace).status ==

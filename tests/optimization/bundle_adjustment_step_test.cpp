@@ -35,11 +35,11 @@ cfp::Vector3<double> residual(const cfp_test::BaScene& scene, std::size_t i, con
 /// The pose after the library's own update.
 BundlePose moved(const cfp::BundleWorkspace& work, std::size_t rank, const cfp::Vector6<double>& xi) {
   cfp::detail::BundleSchur schur;
+  schur.point_steps.assign(work.state.points.size(), 0.0);
   schur.pose_steps.assign(6 * work.state.poses.size(), 0.0);
   for (std::size_t e = 0; e < 6; ++e) schur.pose_steps[6 * rank + e] = xi[static_cast<int>(e)];
-  cfp::detail::BundleState next;
-  next.poses.resize(work.state.poses.size());
-  (void)cfp::detail::move_poses(work.index, work.state, work.linear, schur, 1.0, next);
+  cfp::detail::BundleState next = work.state;
+  cfp::detail::move(work.index, work.state, schur, next);
   return next.poses[rank];
 }
 
@@ -53,7 +53,8 @@ template <typename Loss>
 DenseSystem dense_system(const cfp_test::BaScene& scene, const cfp::BundleWorkspace& work, const Loss& mono,
                          const Loss& stereo) {
   const auto& index = work.index;
-  const int poses = index.free_poses, points = static_cast<int>(index.caller_point.size()), n = 6 * poses + 3 * points;
+  const int poses = static_cast<int>(index.free_poses), points = static_cast<int>(index.points),
+            n = 6 * poses + 3 * points;
   DenseSystem system{Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, n), Eigen::VectorXd::Zero(n)};
   for (std::size_t i = 0; i < scene.pose.size(); ++i) {
     const std::size_t rank = to_index(index.pose_number[to_index(scene.pose[i])]),
@@ -114,8 +115,8 @@ void check_step(const Loss& mono, double stereo_share, const Camera& camera, boo
   REQUIRE(cfp::is_finite(least_squares.linearize()));
 
   const DenseSystem system = dense_system(scene, work, mono, stereo);
-  const int poses = 6 * work.index.free_poses;
-  for (int k = 0; k < work.index.free_poses; ++k) {
+  const int poses = 6 * static_cast<int>(work.index.free_poses);
+  for (int k = 0; k < static_cast<int>(work.index.free_poses); ++k) {
     const double* actual = work.linear.poses.data() + 42 * k;
     CHECK((Eigen::Map<const cfp::Matrix6<double>>(actual) - system.H.block<6, 6>(6 * k, 6 * k)).norm() <
           1e-5 * system.H.block<6, 6>(6 * k, 6 * k).norm());
@@ -176,7 +177,7 @@ TEST_CASE("At the truth without noise the gradient is zero and nothing moves", "
   CHECK(result.initial_cost < 1e-15);
   CHECK(scene.position_error() < 1e-12);
   for (const double g : work.linear.poses) CHECK(cfp::is_finite(g));
-  for (int k = 0; k < work.index.free_poses; ++k) {
+  for (int k = 0; k < static_cast<int>(work.index.free_poses); ++k) {
     CHECK(Eigen::Map<const cfp::Vector6<double>>(work.linear.poses.data() + 42 * k + 36).norm() < 1e-6);
   }
 }

@@ -6,10 +6,11 @@
 /// sigma^2); the two agree for w in {0, 1}.)
 ///
 /// Levenberg-Marquardt on the normal equations, points eliminated (Schur complement), the reduced camera system
-/// factorised by sparse block Cholesky. Time and memory per iteration are linear in the observations and in the pairs
-/// of observations of one point. With fewer than a quarter as many points as free poses the poses are eliminated
-/// instead, and the points' system is factorised. Sources: Triggs et al.: "Bundle adjustment - a modern synthesis",
-/// 2000; Lourakis, Argyros: SBA, 2009.
+/// factorised by block Cholesky within its envelope. Time and memory per iteration are linear in the observations, in
+/// the pairs of observations of one point and in the poses along a film; more than 64 free poses are ordered by their
+/// common points first. With fewer than a quarter as many points as free poses the poses are eliminated instead, and
+/// the points' system is factorised. Sources: Triggs et al.: "Bundle adjustment - a modern synthesis", 2000; Lourakis,
+/// Argyros: SBA, 2009.
 #pragma once
 
 #include <cmath>

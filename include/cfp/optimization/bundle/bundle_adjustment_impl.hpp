@@ -9,10 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "cfp/optimization/bundle/bundle_elimination_impl.hpp"
 #include "cfp/optimization/bundle/bundle_order_impl.hpp"
-#include "cfp/optimization/bundle/bundle_pose_elimination_impl.hpp"
 #include "cfp/optimization/bundle/bundle_problem.hpp"
-#include "cfp/optimization/bundle/bundle_schur_impl.hpp"
 #include "cfp/optimization/least_squares.hpp"
 
 namespace cfp {
@@ -49,36 +48,33 @@ template <typename Camera, typename Scalar>
 void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& workspace, BundleResult& result) {
   const BundleIndex& index = workspace.index;
   BundleSchur& schur = workspace.schur;
-  const std::size_t poses = index.caller_pose.size(), points = index.caller_point.size(),
-                    free_poses = to_index(index.free_poses), links = index.link_pose.size(),
-                    blocks = index.block_row.size();
-  result.free_poses = free_poses;
-  result.adjusted_points = points;
-  result.reduced_blocks = blocks;
-  if (index.eliminate_poses) {
-    analyze_blocks<3>(static_cast<int>(points), index.block_row, index.block_column, schur.factor);
-    schur.blocks[0].resize(9 * blocks);
-    schur.right_side[0].resize(3 * points);
-    schur.triangles.resize(42 * free_poses);
-    schur.couplings.resize(BundleSchur::coupling_doubles * links);
-  } else {
-    analyze_blocks<6>(index.free_poses, index.block_row, index.block_column, schur.factor);
-    for (std::size_t part = 0; part < to_index(bundle_parts); ++part) {
-      schur.blocks[part].resize(36 * blocks);
-      schur.right_side[part].resize(6 * free_poses);
-      schur.pairs[part].resize(BundleSchur::pair_doubles * to_index(index.most_free_links));
-    }
+  const std::size_t poses = index.caller_pose.size(), slots = index.slot_pose.size();
+  if (index.eliminate_poses)
+    find_envelope<6>(index, index.points, schur.envelope);
+  else
+    find_envelope<3>(index, index.free_poses, schur.envelope);
+  result.free_poses = index.free_poses;
+  result.adjusted_points = index.points;
+  result.factor_blocks = schur.envelope.blocks;
+  const std::size_t kept_size = index.eliminate_poses ? 3 : 6;
+  for (std::size_t part = 0; part < bundle_parts; ++part) {
+    schur.blocks[part].resize(kept_size * kept_size * schur.envelope.blocks);
+    schur.right_side[part].resize(kept_size * schur.envelope.first.size());
   }
-  result.factor_blocks = schur.factor.row.size();
-  schur.points.resize(BundleSchur::point_doubles * points);
-  schur.pose_steps.resize(6 * free_poses);
+  schur.triangles.resize((index.eliminate_poses ? 42 : 12) * index.eliminated_part.back());
+  schur.couplings.resize(18 * slots);
+  schur.coupled.resize(slots);
+  schur.coupled_end.resize(index.eliminated_part.back());
+  schur.pose_steps.resize(6 * index.free_poses);
+  schur.point_steps.resize(3 * index.points);
   for (BundleState* state : {&workspace.state, &workspace.next_state}) {
     state->poses.resize(poses);
-    state->points.resize(3 * points);
+    state->points.resize(3 * index.points);
   }
   for (BundleLinearization* linear : {&workspace.linear, &workspace.next_linear}) {
-    linear->links.resize(BundleLinearization::link_doubles * links);
-    linear->poses.resize(BundleLinearization::pose_doubles * free_poses);
+    linear->slots.resize(BundleLinearization::slot_doubles * slots);
+    linear->points.resize(BundleLinearization::point_doubles * index.points);
+    linear->poses.resize(BundleLinearization::pose_doubles * index.free_poses);
     linear->costs.resize(poses);
   }
   for (std::size_t k = 0; k < poses; ++k) {
@@ -88,7 +84,7 @@ void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& work
     for (int e = 0; e < 9; ++e) workspace.state.poses[k].rotation[e] = rotation(e / 3, e % 3);
     for (int e = 0; e < 3; ++e) workspace.state.poses[k].center[e] = center[e];
   }
-  for (std::size_t j = 0; j < points; ++j) {
+  for (std::size_t j = 0; j < index.points; ++j) {
     const Vector3<double>& x = problem.points[to_index(index.caller_point[j])];
     std::copy(x.data(), x.data() + 3, workspace.state.points.data() + 3 * j);
   }
@@ -113,63 +109,54 @@ struct BundleLeastSquares {
     std::swap(workspace.linear, workspace.next_linear);
   }
   double propose(double damping) {
-    const BundleIndex& index = workspace.index;
-    BundleSchur& schur = workspace.schur;
-    if (!(index.eliminate_poses ? eliminate_poses(index, workspace.state, workspace.linear, damping, schur)
-                                : solve_for_poses(damping)))
+    if (!(workspace.index.eliminate_poses ? solve<6>(damping) : solve<3>(damping)))
       return std::numeric_limits<double>::quiet_NaN();
-    return move_points(index, workspace.state, workspace.linear, schur, damping, workspace.next_state) +
-           move_poses(index, workspace.state, workspace.linear, schur, damping, workspace.next_state);
+    const BundleSchur& schur = workspace.schur;
+    move(workspace.index, workspace.state, schur, workspace.next_state);
+    return promised_by<3>(workspace.linear, schur.point_steps, damping) +
+           promised_by<6>(workspace.linear, schur.pose_steps, damping);
   }
 
  private:
   template <typename Task>
   void run(const Task& task) {
-    if (workspace.index.kept.size() >= worth_sharing) {
-      executor(bundle_parts, task);
+    const int parts = static_cast<int>(bundle_parts);
+    if (workspace.index.observations.size() >= worth_sharing) {
+      executor(parts, task);
     } else {
-      for (int part = 0; part < bundle_parts; ++part) task(part);
+      for (int part = 0; part < parts; ++part) task(part);
     }
   }
 
   double linearize_at(const BundleState& state, BundleLinearization& linear) {
     const BundleIndex& index = workspace.index;
     run([&](int part) {
-      for (int k = index.pose_part[to_index(part)]; k < index.pose_part[to_index(part) + 1]; ++k)
-        linearize_pose(index, to_index(k), camera_of(problem.cameras, index.caller_pose[to_index(k)]),
-                       problem.baseline_fx, mono, stereo, state, linear);
+      for (std::size_t k = index.pose_part[to_index(part)]; k < index.pose_part[to_index(part) + 1]; ++k)
+        linearize_pose(index, k, camera_of(problem.cameras, index.caller_pose[k]), problem.baseline_fx, mono, stereo,
+                       state, linear);
     });
+    linearize_points(index, linear);
     double cost = 0;
     for (const double c : linear.costs) cost += c;
     return cost;
   }
 
-  /// The poses' steps by elimination of the points.
-  [[nodiscard]] bool solve_for_poses(double damping) {
-    BundleSchur& schur = workspace.schur;
+  template <int E>
+  [[nodiscard]] bool solve(double damping) {
     bool definite[bundle_parts];
     run([&](int part) {
       definite[part] =
-          eliminate_points(workspace.index, workspace.state, workspace.linear, damping, to_index(part), schur);
+          eliminate<E>(workspace.index, workspace.state, workspace.linear, damping, to_index(part), workspace.schur);
     });
-    for (const bool part : definite) {
-      if (!part) return false;
-    }
-    for (std::size_t part = 1; part < to_index(bundle_parts); ++part) {
-      for (std::size_t i = 0; i < schur.blocks[0].size(); ++i) schur.blocks[0][i] += schur.blocks[part][i];
-      for (std::size_t i = 0; i < schur.right_side[0].size(); ++i) schur.right_side[0][i] += schur.right_side[part][i];
-    }
-    if (!factorize_blocks<6>(schur.blocks[0], schur.factor)) return false;
-    std::copy(schur.right_side[0].begin(), schur.right_side[0].end(), schur.pose_steps.begin());
-    solve_blocks<6>(schur.pose_steps, schur.factor);
-    return true;
+    return std::all_of(definite, definite + bundle_parts, [](bool part) { return part; }) &&
+           solve_reduced<E>(workspace.index, workspace.schur);
   }
 };
 
 template <typename Camera, typename Scalar>
 void write_back(const BundleProblem<Camera, Scalar>& problem, const BundleWorkspace& workspace) noexcept {
   const BundleIndex& index = workspace.index;
-  for (std::size_t k = 0; k < to_index(index.free_poses); ++k) {
+  for (std::size_t k = 0; k < index.free_poses; ++k) {
     const BundlePose& from = workspace.state.poses[k];
     Matrix3<double> rotation;
     for (int e = 0; e < 9; ++e) rotation(e / 3, e % 3) = from.rotation[e];
@@ -177,7 +164,7 @@ void write_back(const BundleProblem<Camera, Scalar>& problem, const BundleWorksp
     pose.rotation = normalized_rotation(rotation);
     pose.translation = -(pose.rotation * Vector3<double>(from.center[0], from.center[1], from.center[2]));
   }
-  for (std::size_t j = 0; j < index.caller_point.size(); ++j) {
+  for (std::size_t j = 0; j < index.points; ++j) {
     const double* x = workspace.state.points.data() + 3 * j;
     problem.points[to_index(index.caller_point[j])] = Vector3<double>(x[0], x[1], x[2]);
   }
@@ -190,12 +177,8 @@ void write_squared_errors(const BundleProblem<Camera, Scalar>& problem, span<dou
   for (std::size_t i = 0; i < squared_errors.size(); ++i) {
     BundleMeasurement m;
     double error = -1;
-    const bool readable = read_measurement(observations, i, problem.baseline_fx, m);
-    const std::size_t k = static_cast<std::size_t>(m.pose), j = static_cast<std::size_t>(m.point);
-    const bool judged = readable && m.pose >= 0 && k < problem.poses.size() && m.point >= 0 &&
-                        j < problem.points.size() &&
-                        squared_error(camera_of(problem.cameras, m.pose), problem.poses[k], problem.points[j], m,
-                                      problem.baseline_fx, error);
+    const bool judged = read_measurement(observations, i, problem.baseline_fx, m) && is_inside(problem, m) &&
+                        squared_error(problem, m, error);
     squared_errors[i] = judged && is_finite(error) ? error : -1;
   }
 }

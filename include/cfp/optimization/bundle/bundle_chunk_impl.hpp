@@ -13,10 +13,11 @@ struct BundlePose {
   double center[3];
 };
 
-/// Up to 32 observations of one pose: rows and residuals of u, v and u_right.
+/// Up to 32 observations of one pose: rows and residuals of u, v and u_right. What fills up the lanes has weight 0.
 struct BundleChunk {
   static constexpr int size = 32, lanes = 8;
   using Array = double[size];
+  Array u, v, disparity, weight, information;
   Array d[3];         // x - c
   Array row[3][3];    // d residual / d x
   Array residual[3];  // before the measurement is taken off

@@ -2,14 +2,12 @@
 /// Inside bundle_adjustment.hpp: chooses the observations that can be used and numbers the poses and points that
 /// take part; bundle_order_impl.hpp puts them in order.
 ///
-/// Words: *poses* and *points* are numbered anew, free poses first. A *link* joins a point and a pose that observes it,
-/// once or several times. A *part* is the share of the work that one thread may do.
+/// Words: *poses* and *points* are numbered anew, free poses first. One kind is *eliminated* from the normal equations,
+/// the other *kept*. A *part* is the share of the work that one thread may do.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
-#include <cstdint>
 #include <vector>
 
 #include "cfp/optimization/bundle/block_cholesky_impl.hpp"
@@ -18,40 +16,33 @@
 namespace cfp::detail {
 
 /// Work is always cut into this many parts, whatever the executor, so that one thread and two give the same bits.
-inline constexpr int bundle_parts = 2;
+inline constexpr std::size_t bundle_parts = 2;
 
-/// One observation as numbers, of a pose and a point of the caller's.
+/// One observation as numbers, of a pose and a point of the caller's until they are numbered.
 struct BundleMeasurement {
   int pose = 0, point = 0;
+  std::size_t slot = 0;
   double u = 0, v = 0, disparity = 0, weight = 1, information = 1;  // information: 1 / sigma^2
   bool stereo = false;
 };
 
 struct BundleIndex {
-  int free_poses = 0;
+  std::size_t free_poses = 0, points = 0;
+  bool eliminate_poses = false;
   std::vector<int> caller_pose, caller_point;  // of the caller, per pose and point
-  // Observations by pose: range 2 k of pose k holds the mono ones, range 2 k + 1 the stereo ones.
+  // By pose: range 2 k of pose k holds the mono observations, range 2 k + 1 the stereo ones.
+  std::vector<BundleMeasurement> observations;
   std::vector<std::size_t> range_begin;
-  std::vector<double> u, v, disparity, weight, information;
-  std::vector<int> point, link;
-  std::vector<char> repeats;  // an earlier observation of the pose has this link
-  // Links by point, in it by pose.
-  std::vector<std::size_t> link_begin;  // per point
-  std::vector<int> free_links;          // per point: its first links, those to free poses
-  std::vector<int> link_pose;
-  // Blocks of the reduced system. Of the pairs a <= b of the free links of a point, from pair_begin on, a slowest:
-  // their block (b, a).
-  std::vector<std::size_t> pair_begin;
-  std::vector<int> pair_block, block_row, block_column, diagonal_block;
-  int most_free_links = 0;
-  bool eliminate_poses = false;  // few points seen by many poses; the reduced system is that of the points
-  std::array<int, bundle_parts + 1> pose_part{}, point_part{};
+  // One slot per observation, by what is eliminated, in it by what is kept.
+  std::vector<std::size_t> slot_begin;  // per eliminated pose or point
+  std::vector<int> slot_pose, slot_point;
+  std::array<std::size_t, bundle_parts + 1> pose_part{}, eliminated_part{};
 
   // Scratch while building.
   std::vector<BundleMeasurement> kept;
-  std::vector<int> pose_number, point_number, order, by_pose, by_point, link_of, last_row, last_block;
+  std::vector<int> pose_number, point_number, order, by_pose, by_point;
   std::vector<char> is_rigid, is_met;
-  std::vector<std::size_t> cursor;
+  std::vector<std::size_t> pose_begin, point_begin;
 };
 
 inline namespace CFP_ISA {
@@ -73,23 +64,30 @@ template <typename Scalar>
          is_finite(m.information);
 }
 
-/// |r|^2 / sigma^2 of one observation; false when the camera does not see the point.
-template <typename Camera>
-[[nodiscard]] bool squared_error(const Camera& camera, const SE3<double>& T_cam_world, const Vector3<double>& point,
-                                 const BundleMeasurement& m, double baseline_fx, double& error) noexcept {
-  using Real = typename Camera::ScalarType;
-  const Vector3<double> p = T_cam_world * point;
-  Vector2<Real> pixel;
-  if (!camera.project(p.template cast<Real>(), pixel)) return false;
-  const double du = static_cast<double>(pixel.x()) - m.u, dv = static_cast<double>(pixel.y()) - m.v;
-  const double dr = m.stereo ? du + m.disparity - baseline_fx / p.z() : 0.0;
-  error = (du * du + dv * dv + dr * dr) * m.information;
-  return true;
-}
-
 template <typename Camera>
 [[nodiscard]] const Camera& camera_of(span<const Camera> cameras, int pose) noexcept {
   return cameras.size() == 1 ? cameras[0] : cameras[to_index(pose)];
+}
+
+/// Whether pose and point are the caller's.
+template <typename Camera, typename Scalar>
+[[nodiscard]] bool is_inside(const BundleProblem<Camera, Scalar>& problem, const BundleMeasurement& m) noexcept {
+  return m.pose >= 0 && to_index(m.pose) < problem.poses.size() && m.point >= 0 &&
+         to_index(m.point) < problem.points.size();
+}
+
+/// |r|^2 / sigma^2 of one observation; false when the camera does not see the point.
+template <typename Camera, typename Scalar>
+[[nodiscard]] bool squared_error(const BundleProblem<Camera, Scalar>& problem, const BundleMeasurement& m,
+                                 double& error) noexcept {
+  using Real = typename Camera::ScalarType;
+  const Vector3<double> p = problem.poses[to_index(m.pose)] * problem.points[to_index(m.point)];
+  Vector2<Real> pixel;
+  if (!camera_of(problem.cameras, m.pose).project(p.template cast<Real>(), pixel)) return false;
+  const double du = static_cast<double>(pixel.x()) - m.u, dv = static_cast<double>(pixel.y()) - m.v;
+  const double dr = m.stereo ? du + m.disparity - problem.baseline_fx / p.z() : 0.0;
+  error = (du * du + dv * dv + dr * dr) * m.information;
+  return true;
 }
 
 /// Keeps the observations that can be used, and marks the poses and points they touch.
@@ -102,29 +100,20 @@ void select_observations(const BundleProblem<Camera, Scalar>& problem, BundleInd
   for (std::size_t k = 0; k < problem.poses.size(); ++k) index.is_rigid[k] = is_rigid_motion(problem.poses[k]) ? 1 : 0;
   for (std::size_t i = 0; i < problem.observations.pose.size(); ++i) {
     BundleMeasurement m;
-    const bool readable = read_measurement(problem.observations, i, problem.baseline_fx, m);
-    const std::size_t k = static_cast<std::size_t>(m.pose), j = static_cast<std::size_t>(m.point);
-    if (!readable || m.pose < 0 || k >= problem.poses.size() || m.point < 0 || j >= problem.points.size()) {
-      ++result.invalid;
-      continue;
-    }
-    if (m.weight == 0) {
-      ++result.zero_weight;
-      continue;
-    }
-    if (index.is_rigid[k] == 0 || !is_finite(problem.points[j].sum())) {
-      ++result.invalid;
-      continue;
-    }
     double error = 0;
-    if (!squared_error(camera_of(problem.cameras, m.pose), problem.poses[k], problem.points[j], m, problem.baseline_fx,
-                       error)) {
+    if (!read_measurement(problem.observations, i, problem.baseline_fx, m) || !is_inside(problem, m)) {
+      ++result.invalid;
+    } else if (m.weight == 0) {
+      ++result.zero_weight;
+    } else if (index.is_rigid[to_index(m.pose)] == 0 || !is_finite(problem.points[to_index(m.point)].sum())) {
+      ++result.invalid;
+    } else if (!squared_error(problem, m, error)) {
       ++result.behind;
     } else if (!is_finite(error * m.weight)) {
       ++result.invalid;
     } else {
       index.kept.push_back(m);
-      index.pose_number[k] = index.point_number[j] = 0;
+      index.pose_number[to_index(m.pose)] = index.point_number[to_index(m.point)] = 0;
     }
   }
   result.used = index.kept.size();
@@ -138,13 +127,13 @@ inline void number_poses_and_points(span<const char> fixed_poses, BundleIndex& i
       numbers[i] = static_cast<int>(list.size());
       list.push_back(static_cast<int>(i));
     }
+    return list.size();
   };
   const auto is_fixed = [&](std::size_t k) { return !fixed_poses.empty() && fixed_poses[k] != 0; };
   index.caller_pose.clear(), index.caller_point.clear();
-  number(index.pose_number, index.caller_pose, [&](std::size_t k) { return !is_fixed(k); });
-  index.free_poses = static_cast<int>(index.caller_pose.size());
+  index.free_poses = number(index.pose_number, index.caller_pose, [&](std::size_t k) { return !is_fixed(k); });
   number(index.pose_number, index.caller_pose, is_fixed);
-  number(index.point_number, index.caller_point, [](std::size_t) { return true; });
+  index.points = number(index.point_number, index.caller_point, [](std::size_t) { return true; });
   for (BundleMeasurement& m : index.kept) {
     m.pose = index.pose_number[to_index(m.pose)];
     m.point = index.point_number[to_index(m.point)];

@@ -25,9 +25,11 @@ struct BundleState {
 
 /// The normal equations at one state.
 struct BundleLinearization {
-  static constexpr std::size_t link_doubles = 9;   // N (00 01 02 11 12 22), n
-  static constexpr std::size_t pose_doubles = 42;  // H: 6x6, both triangles; g
-  std::vector<double> links;
+  static constexpr std::size_t slot_doubles = 9;    // N (00 01 02 11 12 22), n
+  static constexpr std::size_t point_doubles = 12;  // H: 3x3; g
+  static constexpr std::size_t pose_doubles = 42;   // H: 6x6; g
+  std::vector<double> slots;
+  std::vector<double> points;
   std::vector<double> poses;  // free ones only
   std::vector<double> costs;  // per pose; NaN when an observation is behind its camera
 };
@@ -38,33 +40,30 @@ struct BundlePoseSums {
   double lane[27][BundleChunk::lanes];
 };
 
+/// Where the element of a symmetric 3x3 matrix stands among the six numbers 00 01 02 11 12 22.
+inline constexpr int symmetric[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+
 inline namespace CFP_ISA {
 
-/// Residuals, omega and the cost of the observations from `first` on.
+/// Residuals, omega and the cost of the chunk.
 template <bool Stereo, typename Loss>
-double weigh_chunk(const BundleIndex& index, std::size_t first, int count, int padded, double baseline_fx,
-                   const Loss& loss, const double* rotation, BundleChunk& chunk) noexcept {
+double weigh_chunk(int padded, double baseline_fx, const Loss& loss, const double* rotation,
+                   BundleChunk& chunk) noexcept {
   double cost = 0;
-  for (int i = 0; i < count; ++i) {
-    const std::size_t o = first + to_index(i);
-    const double ru = chunk.residual[0][i] -= index.u[o];
-    const double rv = chunk.residual[1][i] -= index.v[o];
+  for (int i = 0; i < padded; ++i) {
+    const double ru = chunk.residual[0][i] -= chunk.u[i];
+    const double rv = chunk.residual[1][i] -= chunk.v[i];
     double s = ru * ru + rv * rv;
     if constexpr (Stereo) {
-      chunk.residual[2][i] = ru + index.disparity[o] - baseline_fx / chunk.depth[i];
+      chunk.residual[2][i] = ru + chunk.disparity[i] - baseline_fx / chunk.depth[i];
       s += chunk.residual[2][i] * chunk.residual[2][i];
-    }
-    s *= index.information[o];
-    const bool seen = chunk.depth[i] > Tolerance<double>::min_depth;
-    cost += seen ? index.weight[o] * loss.value(s) : std::numeric_limits<double>::quiet_NaN();
-    chunk.omega[i] = index.weight[o] * index.information[o] * loss.first(s);
-  }
-  for (int i = count; i < padded; ++i) chunk.omega[i] = chunk.residual[2][i] = 0;
-  if constexpr (Stereo) {
-    for (int i = 0; i < padded; ++i) {
       const double t = baseline_fx / (chunk.depth[i] * chunk.depth[i]);
       for (int c = 0; c < 3; ++c) chunk.row[2][c][i] = chunk.row[0][c][i] + t * rotation[6 + c];
     }
+    s *= chunk.information[i];
+    const bool seen = chunk.depth[i] > Tolerance<double>::min_depth;
+    cost += seen ? chunk.weight[i] * loss.value(s) : std::numeric_limits<double>::quiet_NaN();
+    chunk.omega[i] = chunk.weight[i] * chunk.information[i] * loss.first(s);
   }
   return cost;
 }
@@ -117,7 +116,6 @@ inline void store_pose(const BundlePoseSums& sums, double* target) noexcept {
     s[e] = 0;
     for (const double lane : sums.lane[e]) s[e] += lane;
   }
-  constexpr int symmetric[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) {
       target[6 * c + r] = s[symmetric[r][c]];
@@ -128,31 +126,31 @@ inline void store_pose(const BundlePoseSums& sums, double* target) noexcept {
   for (int r = 0; r < 6; ++r) target[36 + r] = s[21 + r];
 }
 
-/// One range of observations of one pose: fills its links, adds to the pose's sums and returns the cost.
+/// One range of observations of one pose: fills its slots, adds to the pose's sums and returns the cost.
 template <bool Stereo, typename Camera, typename Loss>
-double linearize_range(const BundleIndex& index, std::size_t begin, std::size_t end, const Camera& camera,
-                       double baseline_fx, const Loss& loss, const BundlePose& pose, const double* points,
-                       double* links, BundlePoseSums* sums) noexcept {
+double linearize_range(span<const BundleMeasurement> range, const Camera& camera, double baseline_fx, const Loss& loss,
+                       const BundlePose& pose, const std::vector<double>& points, std::vector<double>& slots,
+                       BundlePoseSums& sums) noexcept {
   BundleChunk chunk;
   double cost = 0;
-  for (std::size_t first = begin; first < end; first += BundleChunk::size) {
-    const int count = static_cast<int>((std::min)(end - first, to_index(BundleChunk::size)));
+  for (std::size_t first = 0; first < range.size(); first += BundleChunk::size) {
+    const int count = static_cast<int>((std::min)(range.size() - first, to_index(BundleChunk::size)));
     const int padded = (count + BundleChunk::lanes - 1) / BundleChunk::lanes * BundleChunk::lanes;
-    for (int i = 0; i < padded; ++i) {  // the last observation fills up the lanes, with weight 0
-      const double* x = points + 3 * to_index(index.point[first + to_index((std::min)(i, count - 1))]);
-      for (int c = 0; c < 3; ++c) chunk.d[c][i] = x[c] - pose.center[c];
+    for (int i = 0; i < padded; ++i) {
+      const BundleMeasurement& m = range[first + to_index((std::min)(i, count - 1))];
+      for (int c = 0; c < 3; ++c) chunk.d[c][i] = points[to_index(3 * m.point + c)] - pose.center[c];
+      chunk.u[i] = m.u, chunk.v[i] = m.v, chunk.disparity[i] = m.disparity;
+      chunk.weight[i] = i < count ? m.weight : 0, chunk.information[i] = m.information;
     }
     project_chunk(camera, pose, padded, chunk);
-    cost += weigh_chunk<Stereo>(index, first, count, padded, baseline_fx, loss, pose.rotation, chunk);
+    cost += weigh_chunk<Stereo>(padded, baseline_fx, loss, pose.rotation, chunk);
     square_chunk<Stereo ? 3 : 2>(padded, chunk);
     for (int i = 0; i < count; ++i) {
-      const std::size_t o = first + to_index(i);
-      double* const target = links + BundleLinearization::link_doubles * to_index(index.link[o]);
-      if (index.repeats[o] == 0) std::fill(target, target + BundleLinearization::link_doubles, 0.0);
-      for (int e = 0; e < 6; ++e) target[e] += chunk.N[e][i];
-      for (int e = 0; e < 3; ++e) target[6 + e] += chunk.n[e][i];
+      double* const slot = slots.data() + BundleLinearization::slot_doubles * range[first + to_index(i)].slot;
+      for (int e = 0; e < 6; ++e) slot[e] = chunk.N[e][i];
+      for (int e = 0; e < 3; ++e) slot[6 + e] = chunk.n[e][i];
     }
-    if (sums != nullptr) add_to_pose(chunk, padded, *sums);
+    add_to_pose(chunk, padded, sums);
   }
   return cost;
 }
@@ -163,14 +161,31 @@ void linearize_pose(const BundleIndex& index, std::size_t k, const Camera& camer
                     const MonoLoss& mono, const StereoLoss& stereo, const BundleState& state,
                     BundleLinearization& out) noexcept {
   BundlePoseSums sums = {};
-  BundlePoseSums* const target = k < to_index(index.free_poses) ? &sums : nullptr;
-  const std::size_t* begin = index.range_begin.data() + 2 * k;
-  const double* points = state.points.data();
-  out.costs[k] = linearize_range<false>(index, begin[0], begin[1], camera, baseline_fx, mono, state.poses[k], points,
-                                        out.links.data(), target) +
-                 linearize_range<true>(index, begin[1], begin[2], camera, baseline_fx, stereo, state.poses[k], points,
-                                       out.links.data(), target);
-  if (target != nullptr) store_pose(sums, out.poses.data() + k * BundleLinearization::pose_doubles);
+  const auto range = [&](std::size_t r) {
+    return span<const BundleMeasurement>(index.observations.data() + index.range_begin[r],
+                                         index.range_begin[r + 1] - index.range_begin[r]);
+  };
+  out.costs[k] =
+      linearize_range<false>(range(2 * k), camera, baseline_fx, mono, state.poses[k], state.points, out.slots, sums) +
+      linearize_range<true>(range(2 * k + 1), camera, baseline_fx, stereo, state.poses[k], state.points, out.slots,
+                            sums);
+  if (k < index.free_poses) store_pose(sums, out.poses.data() + k * BundleLinearization::pose_doubles);
+}
+
+/// The points' own blocks, from their slots.
+inline void linearize_points(const BundleIndex& index, BundleLinearization& out) noexcept {
+  std::fill(out.points.begin(), out.points.end(), 0.0);
+  for (std::size_t s = 0; s < index.slot_point.size();) {
+    const int j = index.slot_point[s];
+    double sum[BundleLinearization::slot_doubles] = {};
+    for (; s < index.slot_point.size() && index.slot_point[s] == j; ++s) {
+      for (std::size_t e = 0; e < BundleLinearization::slot_doubles; ++e)
+        sum[e] += out.slots[BundleLinearization::slot_doubles * s + e];
+    }
+    double* const point = out.points.data() + BundleLinearization::point_doubles * to_index(j);
+    for (int e = 0; e < 9; ++e) point[e] += sum[symmetric[e / 3][e % 3]];
+    for (int e = 0; e < 3; ++e) point[9 + e] += sum[6 + e];
+  }
 }
 
 }  // namespace CFP_ISA

@@ -59,8 +59,7 @@ struct BundleResult {
   std::size_t behind = 0;       ///< left out: at the start the camera did not see the point (behind it, for example)
   std::size_t free_poses = 0;   ///< poses that were adjusted
   std::size_t adjusted_points = 0;  ///< points that were adjusted: those with a used observation
-  std::size_t reduced_blocks = 0;   ///< blocks of the reduced system, lower triangle
-  std::size_t factor_blocks = 0;    ///< blocks of its Cholesky factor
+  std::size_t factor_blocks = 0;    ///< blocks of the reduced system's Cholesky factor
 };
 
 inline namespace CFP_ISA {

@@ -1,0 +1,229 @@
+/// @file bundle_elimination_impl.hpp
+/// Inside bundle_adjustment.hpp: eliminates the points from the damped normal equations, or the poses where there are
+/// many of them and few points (a calibration target, a handful of tracks through a long film), solves what is left and
+/// recovers the steps of what was eliminated.
+///
+/// The damped block of what is eliminated is A = L L^T; with its coupling C = W L^-T to each that is kept and y = L^-1
+/// g the reduced system has blocks - C_b C_a^T and right side + C y, and the step is -L^-T (y + sum of C^T step). W = G
+/// N (6 x 3, pose by point). D of A + lambda D is isotropic per point, and per pose for translation and rotation (mean
+/// of the diagonal), so that the iterates do not depend on the direction of the world's axes.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "cfp/math/matrix3.hpp"
+#include "cfp/math/so3.hpp"
+#include "cfp/optimization/bundle/bundle_linearization_impl.hpp"
+
+namespace cfp::detail {
+
+/// The reduced system, and what is needed to recover the steps of what was eliminated.
+struct BundleSchur {
+  BlockEnvelope envelope;
+  std::vector<double> blocks[bundle_parts], right_side[bundle_parts];
+  std::vector<double> triangles;  // per eliminated: L^-1, y
+  std::vector<double>
+      couplings;  // 18 per slot: C, one for all slots of one pair, the first of each eliminated in front
+  std::vector<std::size_t> coupled, coupled_end;  // what it couples to; per eliminated, where its couplings end
+  std::vector<double> pose_steps, point_steps;
+};
+
+inline namespace CFP_ISA {
+
+/// Poses have 6 numbers, points 3; E of what is eliminated, 9 - E of what is kept.
+template <int N>
+struct BundleKind {
+  static constexpr std::size_t size = static_cast<std::size_t>(N), block = size * size, system = block + size;
+  using Matrix = Eigen::Matrix<double, N, N>;
+  using Vector = Eigen::Matrix<double, N, 1>;
+
+  static const std::vector<double>& systems(const BundleLinearization& linear) noexcept {
+    return N == 6 ? linear.poses : linear.points;
+  }
+  static Eigen::Map<const Vector> gradient(const BundleLinearization& linear, std::size_t i) noexcept {
+    return Eigen::Map<const Vector>(systems(linear).data() + system * i + block);
+  }
+  static std::size_t slot(const BundleIndex& index, std::size_t s) noexcept {
+    return to_index(N == 6 ? index.slot_pose[s] : index.slot_point[s]);
+  }
+  /// lambda D
+  static Vector damping(const BundleLinearization& linear, double lambda, std::size_t i) noexcept {
+    const Eigen::Map<const Matrix> H(systems(linear).data() + system * i);
+    Vector D;
+    for (int b = 0; b < N; b += 3)
+      D.template segment<3>(b).setConstant(lambda * (std::max)(H.diagonal().template segment<3>(b).sum() / 3, 1e-30));
+    return D;
+  }
+  static Matrix damped(const BundleLinearization& linear, double lambda, std::size_t i) noexcept {
+    Matrix A = Eigen::Map<const Matrix>(systems(linear).data() + system * i);
+    A.diagonal() += damping(linear, lambda, i);
+    return A;
+  }
+};
+
+/// d = x - c
+[[nodiscard]] inline Vector3<double> offset(const BundleState& state, std::size_t pose, std::size_t point) noexcept {
+  const double *const x = state.points.data() + 3 * point, *const c = state.poses[pose].center;
+  return {x[0] - c[0], x[1] - c[1], x[2] - c[2]};
+}
+
+/// out = G M = [M; hat(d) M], 3 numbers of M and 6 of G M per column. Number by number: a vector read back at once from
+/// single numbers waits for them.
+inline void lift(const Vector3<double>& d, const double* M, int columns, double* out) noexcept {
+  for (int c = 0; c < columns; ++c, M += 3, out += 6) {
+    out[0] = M[0], out[1] = M[1], out[2] = M[2];
+    out[3] = d[1] * M[2] - d[2] * M[1], out[4] = d[2] * M[0] - d[0] * M[2], out[5] = d[0] * M[1] - d[1] * M[0];
+  }
+}
+
+/// Which blocks of the reduced system some eliminated pose or point fills.
+template <int E>
+void find_envelope(const BundleIndex& index, std::size_t kept, BlockEnvelope& envelope) {
+  envelope.first.resize(kept);
+  for (std::size_t row = 0; row < kept; ++row) envelope.first[row] = row;
+  for (std::size_t i = 0; i < index.eliminated_part.back(); ++i) {
+    const std::size_t begin = index.slot_begin[i];
+    for (std::size_t s = begin; s < index.slot_begin[i + 1]; ++s) {
+      const std::size_t row = BundleKind<9 - E>::slot(index, s);
+      if (row < kept) envelope.first[row] = (std::min)(envelope.first[row], BundleKind<9 - E>::slot(index, begin));
+    }
+  }
+  number_blocks(envelope);
+}
+
+/// The share of one part of what is eliminated in the reduced system; part 0 starts from the blocks of what is kept.
+/// False when a damped block is not positive definite, which only rounding or overflow can cause.
+template <int E, int K = 9 - E>
+[[nodiscard]] bool eliminate(const BundleIndex& index, const BundleState& state, const BundleLinearization& linear,
+                             double lambda, std::size_t part, BundleSchur& schur) noexcept {
+  using Kept = BundleKind<K>;
+  using Eliminated = BundleKind<E>;
+  using Coupling = Eigen::Matrix<double, K, E>;
+  const std::size_t kept = schur.envelope.first.size();
+  const auto block = [&](std::size_t row, std::size_t column) {
+    return Eigen::Map<typename Kept::Matrix>(schur.blocks[part].data() + Kept::block * schur.envelope.at(row, column));
+  };
+  const auto right_side = [&](std::size_t k) {
+    return Eigen::Map<typename Kept::Vector>(schur.right_side[part].data() + Kept::size * k);
+  };
+  const auto coupling = [&](std::size_t s) { return Eigen::Map<Coupling>(schur.couplings.data() + 18 * s); };
+  std::fill(schur.blocks[part].begin(), schur.blocks[part].end(), 0.0);
+  std::fill(schur.right_side[part].begin(), schur.right_side[part].end(), 0.0);
+  for (std::size_t k = 0; part == 0 && k < kept; ++k) {
+    block(k, k) = Kept::damped(linear, lambda, k);
+    right_side(k) = -Kept::gradient(linear, k);
+  }
+  for (std::size_t i = index.eliminated_part[part]; i < index.eliminated_part[part + 1]; ++i) {
+    typename Eliminated::Matrix triangle = Eliminated::damped(linear, lambda, i);
+    if (!invert_triangle(triangle)) return false;
+    const typename Eliminated::Vector y = triangle.lazyProduct(Eliminated::gradient(linear, i));
+    double* const solved = schur.triangles.data() + Eliminated::system * i;
+    std::copy(triangle.data(), triangle.data() + Eliminated::block, solved);
+    std::copy(y.data(), y.data() + E, solved + Eliminated::block);
+    const std::size_t begin = index.slot_begin[i];
+    std::size_t end = begin;
+    for (std::size_t s = begin; s < index.slot_begin[i + 1] && Kept::slot(index, s) < kept; ++s, ++end) {
+      const std::size_t k = schur.coupled[end] = Kept::slot(index, s);
+      const Vector3<double> d = offset(state, BundleKind<6>::slot(index, s), BundleKind<3>::slot(index, s));
+      double N[9] = {};
+      for (const double* slot = linear.slots.data() + BundleLinearization::slot_doubles * s;; slot += 9, ++s) {
+        for (int e = 0; e < 9; ++e) N[e] += slot[symmetric[e / 3][e % 3]];
+        if (s + 1 == index.slot_begin[i + 1] || Kept::slot(index, s + 1) != k) break;
+      }
+      if constexpr (K == 6) {
+        double M[9], v[3] = {}, sum[6];
+        for (int e = 0; e < 9; ++e) {
+          M[e] = 0;
+          for (int c = 0; c <= e / 3; ++c) M[e] += N[3 * (e % 3) + c] * triangle(e / 3, c);
+          v[e % 3] += M[e] * y[e / 3];
+        }
+        lift(d, M, 3, coupling(end).data());
+        lift(d, v, 1, sum);
+        for (int e = 0; e < 6; ++e) right_side(k)[e] += sum[e];
+      } else {
+        Eigen::Matrix<double, 6, 3> W;
+        lift(d, N, 3, W.data());
+        coupling(end) = W.transpose().lazyProduct(triangle.transpose());
+        right_side(k) += coupling(end).lazyProduct(y);
+      }
+    }
+    schur.coupled_end[i] = end;
+    for (std::size_t a = begin; a < end; ++a) {
+      const Coupling right = coupling(a);
+      const Vector3<double> d = K == 6 ? offset(state, schur.coupled[a], i) : offset(state, i, schur.coupled[a]);
+      for (std::size_t b = a; b < end; ++b) {
+        Eigen::Map<typename Kept::Matrix> target = block(schur.coupled[b], schur.coupled[a]);
+        if constexpr (K == 6) {  // C = [M; hat(d) M]: half of the block follows from the other
+          const Coupling T = coupling(b).lazyProduct(right.template topRows<3>().transpose());
+          target.template leftCols<3>() -= T;
+          target.col(3) -= T.col(2) * d.y() - T.col(1) * d.z();
+          target.col(4) -= T.col(0) * d.z() - T.col(2) * d.x();
+          target.col(5) -= T.col(1) * d.x() - T.col(0) * d.y();
+        } else {
+          target.noalias() -= coupling(b).lazyProduct(right.transpose());
+        }
+      }
+    }
+  }
+  return true;
+}
+
+/// The steps of all, the reduced system being the sum of the parts; false when it is not positive definite.
+template <int E, int K = 9 - E>
+[[nodiscard]] bool solve_reduced(const BundleIndex& index, BundleSchur& schur) noexcept {
+  for (std::size_t part = 1; part < bundle_parts; ++part) {
+    for (std::size_t i = 0; i < schur.blocks[0].size(); ++i) schur.blocks[0][i] += schur.blocks[part][i];
+    for (std::size_t i = 0; i < schur.right_side[0].size(); ++i) schur.right_side[0][i] += schur.right_side[part][i];
+  }
+  if (!factorize_blocks<K>(schur.envelope, schur.blocks[0])) return false;
+  std::vector<double>&kept = K == 6 ? schur.pose_steps : schur.point_steps,
+  &eliminated = K == 6 ? schur.point_steps : schur.pose_steps;
+  std::copy(schur.right_side[0].begin(), schur.right_side[0].end(), kept.begin());
+  solve_blocks<K>(schur.envelope, schur.blocks[0], kept);
+  using Eliminated = BundleKind<E>;
+  for (std::size_t i = 0; i < index.eliminated_part.back(); ++i) {
+    const double* const in = schur.triangles.data() + Eliminated::system * i;
+    typename Eliminated::Vector sum = Eigen::Map<const typename Eliminated::Vector>(in + Eliminated::block);
+    for (std::size_t s = index.slot_begin[i]; s < schur.coupled_end[i]; ++s) {
+      const Eigen::Map<const Eigen::Matrix<double, K, E>> C(schur.couplings.data() + 18 * s);
+      sum += C.transpose().lazyProduct(
+          Eigen::Map<const typename BundleKind<K>::Vector>(kept.data() + BundleKind<K>::size * schur.coupled[s]));
+    }
+    Eigen::Map<typename Eliminated::Vector>(eliminated.data() + Eliminated::size * i) =
+        -Eigen::Map<const typename Eliminated::Matrix>(in).transpose().lazyProduct(sum);
+  }
+  return true;
+}
+
+/// The steps' share of h^T (lambda D h - g).
+template <int N>
+[[nodiscard]] double promised_by(const BundleLinearization& linear, const std::vector<double>& steps,
+                                 double lambda) noexcept {
+  using Kind = BundleKind<N>;
+  double promised = 0;
+  for (std::size_t i = 0; i < steps.size() / Kind::size; ++i) {
+    const Eigen::Map<const typename Kind::Vector> h(steps.data() + Kind::size * i);
+    promised += h.dot(Kind::damping(linear, lambda, i).cwiseProduct(h) - Kind::gradient(linear, i));
+  }
+  return promised;
+}
+
+/// The steps applied; fixed poses are copied.
+inline void move(const BundleIndex& index, const BundleState& state, const BundleSchur& schur,
+                 BundleState& next) noexcept {
+  std::copy(state.poses.begin(), state.poses.end(), next.poses.begin());
+  for (std::size_t k = 0; k < index.free_poses; ++k) {
+    const double* xi = schur.pose_steps.data() + 6 * k;
+    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> rotation(next.poses[k].rotation);
+    rotation = Matrix3<double>(rotation) * so3_exp(Vector3<double>(xi[3], xi[4], xi[5]));
+    for (std::size_t e = 0; e < 3; ++e) next.poses[k].center[e] -= xi[e];
+  }
+  for (std::size_t e = 0; e < state.points.size(); ++e) next.points[e] = state.points[e] + schur.point_steps[e];
+}
+
+}  // namespace CFP_ISA
+}  // namespace cfp::detail
