@@ -1,4 +1,5 @@
-# cmake -D ROOT=<project> -P check_version.cmake: version.hpp agrees with itself and with the top entry of CHANGELOG.md.
+# cmake -D ROOT=<project> -P check_version.cmake: version.hpp agrees with itself, with the top entry of
+# CHANGELOG.md and with the files of packagers.
 cmake_minimum_required(VERSION 3.16)
 file(READ "${ROOT}/include/cfp/version.hpp" header)
 foreach(part MAJOR MINOR PATCH)
@@ -16,4 +17,11 @@ list(GET entries 0 top)
 if(NOT top MATCHES "^## ${version}( |$)")
   message(FATAL_ERROR "CHANGELOG.md: the top entry is '${top}', version.hpp says ${version}")
 endif()
+# What packagers read says the same.
+foreach(file cmake/packaging/vcpkg/vcpkg.json package.xml CITATION.cff)
+  file(READ "${ROOT}/${file}" text)
+  if(NOT text MATCHES "(\"version\": \"|<version>|\nversion: )${MAJOR}\\.${MINOR}\\.${PATCH}[\"<\n]")
+    message(FATAL_ERROR "${file} does not name version ${version}")
+  endif()
+endforeach()
 message("version ${version}")
