@@ -2,7 +2,7 @@
 /// One rule for options: every options struct has a free function `OptionPath invalid_field(const Options&)`, found by
 /// argument-dependent lookup, which names the first field outside its documented range:
 ///
-///   if (!detail::positive(o.eps)) return "eps";
+///   if (!(o.eps > 0)) return "eps";
 ///   if (const OptionPath field = nested("ransac", invalid_field(o.ransac))) return field;   // "ransac.confidence"
 ///   return {};
 ///
