@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <filesystem>
 #include <fstream>
@@ -49,7 +50,7 @@ inline void read_frames(const std::filesystem::path& file, RunRecord& run) {
     notes.push_back(note == std::string::npos || text[0] == '#' ? "" : text.substr(note + 3));
   }
   cfp_examples::for_each_line(file, [&](int line, const std::vector<std::string>& words) {
-    constexpr std::size_t fixed = 10;
+    constexpr std::size_t fixed = 13;
     if (words.size() != fixed + module_count) cfp_examples::bad_line(file, line, "not the columns of this version");
     const auto number = [&](std::size_t i) { return cfp_examples::parse_number(file, line, words[i], "figure"); };
     const auto count = [&](std::size_t i) { return static_cast<std::size_t>(number(i)); };
@@ -67,6 +68,9 @@ inline void read_frames(const std::filesystem::path& file, RunRecord& run) {
     f.health.effective_points = number(7);
     f.health.box_share = number(8);
     f.fallback = number(9) != 0;
+    f.pose.inlier_share = number(10);
+    f.pose.spread = number(11);
+    f.pose.position_sigma_m = number(12);
     for (std::size_t m = 0; m < module_count; ++m) f.milliseconds[m] = number(fixed + m);
     f.note = notes[static_cast<std::size_t>(line) - 1];
     run.frames.push_back(f);
@@ -107,8 +111,13 @@ inline RunRecord read_run(const std::filesystem::path& folder) {
   std::size_t pose = 0;
   for (RunFrame& frame : run.frames) {
     if (frame.outcome > Outcome::relocalised) continue;
-    if (pose == poses.size()) throw std::runtime_error((folder / "trajectory.txt").string() + ": poses are missing");
-    frame.T_world_cam = poses[pose++].T_world_cam;
+    if (pose < poses.size() && std::abs(poses[pose].time_s - frame.time_s) < 1e-5) {
+      frame.T_world_cam = poses[pose++].T_world_cam;
+    } else if (frame.outcome == Outcome::relocalised) {
+      frame.outcome = Outcome::lost;  // taken back later
+    } else {
+      throw std::runtime_error((folder / "trajectory.txt").string() + ": poses are missing");
+    }
   }
   const auto boxes = folder / "boxes.txt", keypoints = folder / "keypoints.txt";
   detail::for_each_row(boxes, 10, [&](int line, const std::vector<double>& v) {

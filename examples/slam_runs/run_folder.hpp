@@ -70,10 +70,8 @@ inline bool is_done(const std::filesystem::path& folder, const RunSettings& sett
   return file_text(folder / "run.txt").rfind(settings.text(), 0) == 0;
 }
 
-// Runs the loop and writes its files. An interrupted run has no run.txt.
-inline void run_into(const std::filesystem::path& folder, const cfp_examples::Sequence& sequence,
-                     cfp_examples::Detector& detector, const RunSettings& settings, bool threads,
-                     const std::function<void(std::size_t)>& progress) {
+// The loop's options of a run.
+inline Options options_of(const RunSettings& settings, bool threads) {
   Options options;
   options.variant = variant_of(settings.variant);
   options.seed = settings.seed;
@@ -81,10 +79,17 @@ inline void run_into(const std::filesystem::path& folder, const cfp_examples::Se
   options.max_frames = settings.frames;
   options.features.count = settings.features;
   options.features.candidates = 3 * settings.features;
+  return options;
+}
+
+// Runs the loop and writes its files. An interrupted run has no run.txt.
+inline void run_into(const std::filesystem::path& folder, const cfp_examples::Sequence& sequence,
+                     cfp_examples::Detector& detector, const RunSettings& settings, bool threads,
+                     const std::function<void(std::size_t)>& progress) {
   std::filesystem::create_directories(folder);
   std::filesystem::remove(folder / "run.txt");
   RunWriter writer(folder, progress);
-  const RunResult result = run_slam(sequence, detector, options, writer);
+  const RunResult result = run_slam(sequence, detector, options_of(settings, threads), writer);
   writer.close();
   {
     std::ofstream out = open_text(folder / "trajectory.txt", "timestamp tx ty tz qx qy qz qw");

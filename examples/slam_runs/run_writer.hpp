@@ -107,7 +107,8 @@ class RunWriter final : public Observer {
 
   static std::string frame_columns() {
     std::string columns =
-        "timestamp image outcome keyframe keypoints matches inliers effective_points box_share fallback";
+        "timestamp image outcome keyframe keypoints matches inliers effective_points box_share fallback "
+        "inlier_share spread position_sigma_m";
     for (std::size_t m = 0; m < module_count; ++m) {
       columns += ' ';
       for (const char* c = to_string(static_cast<Module>(m)); *c != '\0'; ++c) columns += *c == ' ' ? '_' : *c;
@@ -117,10 +118,11 @@ class RunWriter final : public Observer {
   }
 
   void write_frame(const FrameRecord& f) {
-    frames_ << cfp_examples::fixed(f.time_s, 6) << ' ' << f.image << ' ' << to_string(f.outcome) << ' '
-            << f.keyframe << ' ' << f.keypoints << ' ' << f.matches << ' ' << f.inliers << ' '
-            << f.health.effective_points << ' ' << f.health.box_share << ' '
-            << (f.health.fallback != cfp::WeightFallback::none);
+    frames_ << cfp_examples::fixed(f.time_s, 6) << ' ' << f.image << ' ' << to_string(f.outcome) << ' ' << f.keyframe
+            << ' ' << f.keypoints << ' ' << f.matches << ' ' << f.inliers << ' ' << f.health.effective_points << ' '
+            << f.health.box_share << ' ' << (f.health.fallback != cfp::WeightFallback::none) << ' '
+            << f.pose.inlier_share << ' ' << f.pose.spread << ' '
+            << (cfp::is_finite(f.pose.position_sigma_m) ? f.pose.position_sigma_m : -1);
     for (std::size_t m = 0; m < module_count; ++m) frames_ << ' ' << clock_.take_ms(static_cast<Module>(m));
     frames_ << (f.note.empty() ? "" : " # ") << f.note << '\n';
   }

@@ -54,6 +54,9 @@ int main(int argc, char* argv[]) {
   app.add_flag("--all", all, "all eight sequences, as out/<scenario>_<motion>");
   app.add_option("--frames", options.frames, "length at 30 Hz")->check(CLI::Range(1, 1000000))->capture_default_str();
   app.add_option("--seed", options.seed, "of everything random")->capture_default_str();
+  app.add_option("--people", options.people, "of the two; 0: an empty room")
+      ->check(CLI::Range(0, 2))
+      ->capture_default_str();
   app.add_option("--width", width, "of the images, 4:3")->check(CLI::Range(64, 4096))->capture_default_str();
   app.add_option("--blur", options.blur_samples, "sub-exposures of the motion blur; 1 = none")
       ->check(CLI::Range(1, 64))

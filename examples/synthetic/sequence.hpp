@@ -30,6 +30,7 @@ struct SequenceOptions {
   int frames = 300;
   double rate_hz = 30;
   std::uint64_t seed = 1;
+  int people = 2;             ///< of the two; 0: an empty room
   int blur_samples = 1;       ///< sub-exposures; 1: no motion blur
   double exposure_s = 0.012;  ///< over which they are spread
   ImageCamera camera = default_camera(640);
@@ -121,7 +122,7 @@ class Sequence {
   /// Everything in the scene at a time, people last.
   [[nodiscard]] std::vector<Surface> surfaces_at(double time) const {
     std::vector<Surface> surfaces = scene_.surfaces;
-    for (int person = 0; person < 2; ++person)
+    for (int person = 0; person < options_.people; ++person)
       append_person(scene_, scripts_[person], person, time, options_.render.frame_s, surfaces);
     return surfaces;
   }

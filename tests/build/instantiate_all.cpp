@@ -214,6 +214,7 @@ static void instantiate_frame() noexcept {
   use(&cfp::remember_objects<Scalar>);
   use(&cfp::frame_health<Scalar>);
   use(&cfp::apply_fallback<Scalar>);
+  use(&cfp::assess_pose<Scalar>);
   use(&cfp::may_create_map_point<Scalar>);
   use(&cfp::counts_as_inlier<Scalar>);
   use(&cfp::explain<Scalar>);

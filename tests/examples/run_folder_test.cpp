@@ -45,6 +45,8 @@ void write_run(const TemporaryFolder& folder, const std::string& image) {
   record.image = image;
   record.outcome = Outcome::tracked;
   record.keypoints = 3;
+  record.pose.inlier_share = 0.75;
+  record.pose.position_sigma_m = 0.002;
   record.boxes.push_back({-7, {1, 2, 3.5F, 4}, true, 0.1 + 0.2, true, 12});
   writer.begin(Module::pose);
   writer.end(Module::pose);
@@ -73,6 +75,7 @@ TEST_CASE("The report reads what the loop wrote, however long the names", "[slam
   const RunFrame& first = run.frames[0];
   CHECK(first.image == image);
   CHECK(first.time_s == 1305031102.175304);
+  CHECK((first.pose.inlier_share == 0.75 && first.pose.position_sigma_m == 0.002));
   CHECK(first.T_world_cam.translation == cfp::Vector3<double>(1, 2, 3));
   CHECK(first.milliseconds[static_cast<std::size_t>(Module::pose)] > 0);
   CHECK(first.milliseconds[static_cast<std::size_t>(Module::flow)] == 0);
@@ -105,6 +108,7 @@ TEST_CASE("A file that is cut off or damaged is refused with its name", "[slam]"
   refused("frames.txt", "1 rgb/1.png tracked 0 0\n");
   refused("trajectory.txt", "");
   refused("trajectory.txt", "1 2 3\n");
+  refused("trajectory.txt", "1305031109.175304 1 2 3 0 0 0 1\n");
   for (const char* line : {"0 1 2 3", "3 1 2 3 4 5 6 7", "-1 1 2 3 4 5 6 7", "nan 1 2 3 4 5 6 7", "0 1 2 3 4 5 6 x"})
     refused("keypoints.txt", line);
   refused("boxes.txt", "9 1 1 2 3 4 0 1 0.5 0\n");

@@ -12,6 +12,7 @@ namespace cfp_slam {
 
 struct LastFrameMatches {
   std::vector<std::int32_t> match;              // per keypoint of this frame: keypoint of the last one, or no_match
+  std::size_t expected_proven = 0;              // proven map points that should be in view
   std::vector<cfp::Vector3<double>> positions;  // per keypoint of the last frame: its point in the world
 
   [[nodiscard]] bool matched(std::size_t keypoint) const { return match[keypoint] != cfp::no_match; }
@@ -25,8 +26,9 @@ class LastFrameMatching {
                   const cfp::SE3<double>& T_cam_world, const View& view, float radius, std::size_t enough,
                   LastFrameMatches& found) {
     found.match.assign(frame.size(), cfp::no_match);
+    found.expected_proven = 0;
     if (!last.has_pose) return;
-    expect(last, map, T_cam_world, view, radius, found.positions);
+    expect(last, map, T_cam_world, view, radius, found);
     const auto all = [](std::size_t) { return true; };
     match_expected(frame, grid, expected_, far_descriptor, 1.0F, all, matches_);
     if (matches_.size() < enough) {
@@ -46,8 +48,9 @@ class LastFrameMatching {
 
  private:
   void expect(const Frame& last, const Map& map, const cfp::SE3<double>& T_cam_world, const View& view, float radius,
-              std::vector<cfp::Vector3<double>>& positions) {
+              LastFrameMatches& found) {
     expected_.clear();
+    std::vector<cfp::Vector3<double>>& positions = found.positions;
     positions.assign(last.size(), cfp::Vector3<double>::Zero());
     const cfp::SE3<double> T_world_last = last.T_cam_world.inverse();
     for (std::size_t j = 0; j < last.size(); ++j) {
@@ -56,6 +59,7 @@ class LastFrameMatching {
       positions[j] = mapped ? map.point(last.map_point[j]).position : T_world_last * last.back_project(j, view.camera);
       cfp::Vector2<double> pixel;
       if (!view.sees(T_cam_world * positions[j], pixel)) continue;
+      if (mapped && map.is_proven(last.map_point[j])) ++found.expected_proven;
       const cv::KeyPoint& seen = last.keypoints[j];
       expected_.push_back({float(pixel.x()), float(pixel.y()), seen.octave, radius * view.sigma(seen),
                            &last.descriptors[j], seen.angle, static_cast<int>(j)});

@@ -29,6 +29,8 @@ class LocalMap {
   [[nodiscard]] int reference() const { return reference_; }
   void set_reference(int keyframe) { reference_ = keyframe; }
   [[nodiscard]] const std::vector<int>& points() const { return points_; }
+  // Proven ones that the last frame searched should have seen.
+  [[nodiscard]] std::size_t expected_proven() const { return expected_proven_; }
 
  private:
   // Points of the keyframes that share some with the frame, and of one neighbour of each.
@@ -64,10 +66,12 @@ class LocalMap {
     const cfp::Vector3<double> centre = frame.T_cam_world.inverse().translation;
     const double log_scale = std::log(static_cast<double>(features_.scale_factor));
     expected_.clear();
+    expected_proven_ = 0;
     for (const int p : points_) {
       MapPoint& point = map.point(p);
       if (seen_[static_cast<std::size_t>(p)] != 0) {
         ++point.in_view;
+        expected_proven_ += map.is_proven(p) ? 1U : 0U;
         continue;
       }
       cfp::Vector2<double> pixel;
@@ -78,6 +82,7 @@ class LocalMap {
           static_cast<int>(std::ceil(std::log(static_cast<double>(point.max_distance) / distance) / log_scale - 0.5));
       if (cosine < 0.5 || level < -1 || level > features_.levels) continue;
       ++point.in_view;
+      expected_proven_ += map.is_proven(p) ? 1U : 0U;
       const int clamped = std::clamp(level, 0, features_.levels - 1);
       const float radius = (cosine > 0.998 ? 2.5F : 4.0F) * widening * view.sigmas[static_cast<std::size_t>(clamped)];
       expected_.push_back({float(pixel.x()), float(pixel.y()), clamped, radius, &point.descriptor, -1, p});
@@ -86,6 +91,7 @@ class LocalMap {
 
   cfp_examples::FeatureOptions features_;
   int reference_ = 0;
+  std::size_t expected_proven_ = 0;
   std::vector<int> points_;
   std::vector<char> seen_;
   std::vector<Expected> expected_;

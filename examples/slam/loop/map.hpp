@@ -49,6 +49,10 @@ class Map {
   [[nodiscard]] bool is_alive(int point) const {
     return point != no_point && points[static_cast<std::size_t>(point)].alive;
   }
+  // Whether keyframes agree about it, as soon as there are some.
+  [[nodiscard]] bool is_proven(int index) const {
+    return keyframes.size() < 3 || point(index).observations.size() >= 2;
+  }
   [[nodiscard]] MapPoint& point(int index) { return points[static_cast<std::size_t>(index)]; }
   [[nodiscard]] const MapPoint& point(int index) const { return points[static_cast<std::size_t>(index)]; }
   [[nodiscard]] Keyframe& keyframe(int index) { return keyframes[static_cast<std::size_t>(index)]; }

@@ -14,9 +14,9 @@
 namespace cfp_slam {
 
 // M of what the frame sees: from the fine stage where the last frame saw it, too, from K alone for what the local map
-// added. Points that have become dynamic go.
+// added. Points that have become dynamic go. The map learns nothing of a frame whose pose may be wrong.
 inline void update_points(Map& map, Frame& frame, const LastFrameMatches& last,
-                          const cfp::StaticProbability<Camera>& probability) {
+                          const cfp::StaticProbability<Camera>& probability, bool learn) {
   for (std::size_t i = 0; i < frame.size(); ++i) {
     float& m = frame.map_point_probability[i];
     if (!map.is_alive(frame.map_point[i])) {
@@ -25,6 +25,10 @@ inline void update_points(Map& map, Frame& frame, const LastFrameMatches& last,
       continue;
     }
     MapPoint& point = map.point(frame.map_point[i]);
+    if (!learn) {
+      m = point.static_probability;
+      continue;
+    }
     ++point.found;
     if (!last.matched(i) || !(m >= 0)) m = probability.updated_map_point(i, point.static_probability);
     point.static_probability = m;

@@ -87,37 +87,47 @@ inline void keep_common_turn(std::vector<Match>& matches) {
                 matches.end());
 }
 
-// Mutual nearest descriptors with a ratio test, without any idea where the points may be: for relocalisation.
+// Mutual nearest descriptors with a ratio test, without any idea where the points may be: for relocalisation. Corners
+// are in map and frame several times, from several octaves and keyframes: the second nearest must be another place, and
+// the point's own nearest keypoint the same one, or one beside it.
 inline void match_descriptors(const Frame& frame, const Map& map, const std::vector<int>& candidates, int max_distance,
                               float ratio, std::vector<Match>& matches) {
+  constexpr double same_place_m = 0.05;
+  constexpr float same_place_px = 4;
   struct Nearest {
-    int distance = std::numeric_limits<int>::max(), index = no_point;
+    int distance = std::numeric_limits<int>::max();
+    std::size_t index = 0;
   };
   std::vector<Nearest> of_point(candidates.size());
+  const auto elsewhere = [&](std::size_t a, std::size_t b) {
+    return (map.point(candidates[a]).position - map.point(candidates[b]).position).squaredNorm() >
+           same_place_m * same_place_m;
+  };
   matches.clear();
   for (std::size_t i = 0; i < frame.size(); ++i) {
     int best = max_distance + 1, second = max_distance + 1;
     std::size_t nearest = 0;
     for (std::size_t c = 0; c < candidates.size(); ++c) {
       const int distance = hamming(map.point(candidates[c]).descriptor, frame.descriptors[i]);
-      if (distance < of_point[c].distance) of_point[c] = {distance, static_cast<int>(i)};
+      if (distance < of_point[c].distance) of_point[c] = {distance, i};
+      if (distance >= second) continue;
+      const bool other = best > max_distance || elsewhere(c, nearest);
       if (distance < best) {
-        second = best;
+        if (other) second = best;
         best = distance;
         nearest = c;
-      } else if (distance < second) {
+      } else if (other) {
         second = distance;
       }
     }
     if (best <= max_distance && float(best) <= ratio * float(second))
       matches.push_back({i, static_cast<int>(nearest), best, 0});
   }
-  matches.erase(std::remove_if(matches.begin(), matches.end(),
-                               [&](const Match& m) {
-                                 return of_point[static_cast<std::size_t>(m.index)].index !=
-                                        static_cast<int>(m.keypoint);
-                               }),
-                matches.end());
+  const auto one_sided = [&](const Match& m) {
+    const auto &a = frame.pixels[m.keypoint], &b = frame.pixels[of_point[static_cast<std::size_t>(m.index)].index];
+    return !(std::hypot(a[0] - b[0], a[1] - b[1]) <= same_place_px);
+  };
+  matches.erase(std::remove_if(matches.begin(), matches.end(), one_sided), matches.end());
   for (Match& m : matches) m.index = candidates[static_cast<std::size_t>(m.index)];
 }
 

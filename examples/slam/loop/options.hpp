@@ -6,6 +6,7 @@
 
 #include "../../support/orb_features.hpp"
 #include "cfp/frame/frame_options.hpp"
+#include "cfp/frame/pose_health.hpp"
 #include "cfp/interop/opencv_flow.hpp"
 #include "cfp/optimization/pose/pose_problem.hpp"
 
@@ -38,11 +39,33 @@ struct Options {
   cfp::PoseOptions pose;
   MappingOptions mapping;
   LocalBundleOptions bundle;
-  double baseline_fx = 40;             // ORB-SLAM2's Camera.bf for this sensor
-  std::size_t min_first_inliers = 10;  // for the pose of the coarse weights
-  std::size_t min_inliers = 20;        // for a tracked frame
+  double baseline_fx = 40;                                                // ORB-SLAM2's Camera.bf for this sensor
+  cfp::PoseHealthOptions first_health = first_pose_health();              // what a pose of the coarse weights must have
+  cfp::PoseHealthOptions health;                                          // what a tracked frame's pose must have
+  cfp::PoseHealthOptions relocalised_health = relocalised_pose_health();  // what one from the map alone must have
+  cfp::FrameIntervalOptions interval;                                     // the motion model is not asked over a gap
+  double unproven_share = 0.1;      // in the pose: weight of what fewer than two keyframes saw, relative to all else
+  int probation = 5;                // frames after a relocalisation in which the map learns nothing
+  std::size_t enough_matches = 40;  // with the last frame; with fewer the search is widened
   std::size_t min_initial_points = 100;
   float search_radius = 15;  // pixels at level 0, around a point of the last frame
+
+  // From few points, so not exact yet, but from points that agree.
+  static cfp::PoseHealthOptions first_pose_health() {
+    cfp::PoseHealthOptions health;
+    health.min_inliers = 10;
+    health.min_spread = 0;
+    health.max_position_sigma_m = 0.1;
+    health.max_rotation_sigma_rad = 0.05;
+    return health;
+  }
+  // Nothing but the image speaks for it.
+  static cfp::PoseHealthOptions relocalised_pose_health() {
+    cfp::PoseHealthOptions health;
+    health.min_inliers = 30;
+    health.min_inlier_share = 0.4;
+    return health;
+  }
 
   [[nodiscard]] bool use_detector() const { return probability.use_boxes; }
   [[nodiscard]] bool use_flow() const { return use_detector() && probability.coarse.use_object_probability; }

@@ -1,11 +1,14 @@
 // The frame's pose: weighted refinement over everything that it sees.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "cfp/core/span.hpp"
+#include "cfp/frame/pose_health.hpp"
 #include "cfp/frame/weigh_keypoints.hpp"
 #include "cfp/optimization/pose/pose_refinement.hpp"
 #include "last_frame_matching.hpp"
@@ -13,15 +16,28 @@
 
 namespace cfp_slam {
 
+struct BelievedPose {
+  double time_s = 0;
+  cfp::SE3<double> T_cam_world;
+};
+
+struct RefinedPose {
+  std::size_t inliers = 0;  // that count
+  cfp::PoseAssessment health;
+};
+
 class PoseSolver {
  public:
   explicit PoseSolver(const Options& options) : options_(options) {}
 
-  // Refines the frame's pose. weight: of the keypoints. Returns the number of inliers that count; the pose is left
-  // alone when the refinement fails. Outliers lose their map point when `prune`.
-  std::size_t operator()(Frame& frame, const LastFrameMatches& last, const Map& map, cfp::span<const float> weight,
-                         const View& view, bool prune) {
+  // Refines the frame's pose and judges it by `health`; it is left alone when the refinement fails. weight: of the
+  // keypoints; `expected`: proven points that should be in view; `believed`: the last pose that was, if the step from
+  // there is to be judged, too. Outliers lose their map point when `prune`.
+  RefinedPose operator()(Frame& frame, const LastFrameMatches& last, const Map& map, cfp::span<const float> weight,
+                         const View& view, std::size_t expected, bool prune, const cfp::PoseHealthOptions& health,
+                         const std::optional<BelievedPose>& believed) {
     collect(frame, last, map, weight, view);
+    let_proven_decide(expected);
     cfp::PoseObservations<double> observations;
     observations.points = points_;
     observations.pixels = pixels_;
@@ -32,17 +48,20 @@ class PoseSolver {
     inlier_.resize(keypoint_.size());
     const cfp::PoseResult result = cfp::refine_pose(observations, view.exact, frame.T_cam_world, options_.pose,
                                                     workspace_, cfp::span<char>(inlier_));
-    if (!cfp::is_solved(result.status)) return 0;
+    std::optional<cfp::PoseStep> step;
+    if (believed)
+      step = cfp::PoseStep{result.T_cam_world * believed->T_cam_world.inverse(), frame.time_s - believed->time_s};
+    RefinedPose out{0, cfp::assess_pose(result, observations.pixels, weights_, inlier_, step, health)};
+    if (!cfp::is_solved(result.status)) return out;
     frame.T_cam_world = result.T_cam_world;
-    std::size_t count = 0;
     for (std::size_t o = 0; o < keypoint_.size(); ++o) {
       if (inlier_[o] != 0) {
-        count += cfp::counts_as_inlier(weights_[o], options_.probability) ? 1U : 0U;
+        out.inliers += cfp::counts_as_inlier(weight[keypoint_[o]], options_.probability) ? 1U : 0U;
       } else if (prune) {
         frame.map_point[keypoint_[o]] = no_point;
       }
     }
-    return count;
+    return out;
   }
 
  private:
@@ -54,6 +73,7 @@ class PoseSolver {
     sigmas_.clear();
     weights_.clear();
     keypoint_.clear();
+    proven_.clear();
     for (std::size_t i = 0; i < frame.size(); ++i) {
       const bool mapped = map.is_alive(frame.map_point[i]);
       if (!mapped && !last.matched(i)) continue;
@@ -64,8 +84,21 @@ class PoseSolver {
       depths_.push_back(static_cast<double>(frame.depths_m[i]));
       sigmas_.push_back(static_cast<double>(view.sigma(frame.keypoints[i])));
       weights_.push_back(static_cast<double>(weight[i]));
+      proven_.push_back(mapped && map.is_proven(frame.map_point[i]) ? char(1) : char(0));
       keypoint_.push_back(i);
     }
+  }
+
+  // What enters the view and moves, and no detector knows, must not outvote what keyframes agree about: where enough of
+  // that is to be expected in view, all else weighs a small share of it, and only helps where that leaves the pose
+  // open. Where the camera looks at something new, all counts.
+  void let_proven_decide(std::size_t expected) {
+    constexpr double few = 20, enough = 50;
+    double proven = 0, others = 0;
+    for (std::size_t o = 0; o < weights_.size(); ++o) (proven_[o] != 0 ? proven : others) += weights_[o];
+    const double share = std::min(1.0, options_.unproven_share * proven / std::max(others, 1e-9));
+    const double known = std::clamp((static_cast<double>(expected) - few) / (enough - few), 0.0, 1.0);
+    for (std::size_t o = 0; o < weights_.size(); ++o) weights_[o] *= proven_[o] != 0 ? 1 : 1 + (share - 1) * known;
   }
 
   Options options_;
@@ -74,7 +107,7 @@ class PoseSolver {
   std::vector<std::array<double, 2>> pixels_;
   std::vector<double> depths_, sigmas_, weights_;
   std::vector<std::size_t> keypoint_;
-  std::vector<char> inlier_;
+  std::vector<char> inlier_, proven_;
 };
 
 }  // namespace cfp_slam

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cfp/frame/health.hpp"
+#include "cfp/frame/pose_health.hpp"
 #include "cfp/geometry/box.hpp"
 
 namespace cfp_slam {
@@ -39,7 +40,7 @@ constexpr const char* to_string(Module module) {
 
 enum class Outcome : std::uint8_t {
   tracked,
-  relocalised,  // a pose from the map alone, after a loss
+  relocalised,  // a pose from the map alone, after a loss or a gap, or on probation after one
   lost,         // no pose; none is invented
   skipped       // the images could not be used; `note` says why
 };
@@ -61,9 +62,10 @@ struct FrameRecord {
   double time_s = 0;
   std::string image;  // file of the colour image, relative to the recording
   Outcome outcome = Outcome::lost;
-  std::string note;  // why a frame was skipped or lost
+  std::string note;  // why a frame was skipped or lost, and whatever else a user must hear of
   bool keyframe = false;
   std::size_t keypoints = 0, matches = 0, inliers = 0;
+  cfp::PoseAssessment pose;
   cfp::FrameHealth health;
   std::vector<BoxRecord> boxes;
 };

@@ -10,25 +10,26 @@ namespace cfp_slam {
 namespace {
 
 // Those of a variant for this image size and this detector's people.
-Options fitted(Options options, const cfp_examples::Sequence& sequence, const cfp_examples::Detector& detector) {
+Options fitted(Options options, const FrameSource& source, const cfp_examples::Detector& detector) {
   cfp::FrameOptions& probability = options.probability;
   probability = cfp::variant_options(options.variant, probability);
-  probability.tracker.image_width = sequence.calibration().width;
-  probability.tracker.image_height = sequence.calibration().height;
+  probability.tracker.image_width = source.calibration.width;
+  probability.tracker.image_height = source.calibration.height;
   probability.coarse.flow.ransac.seed = options.seed;
   probability.fine.map_point_prior = true;                      // this loop keeps M
   probability.classes = {{detector.class_of("person"), true}};  // -1: nothing that it finds can move
   cfp::validate(probability);
+  if (options.variant == cfp::Variant::plain) options.unproven_share = 1e9;  // no handling of what moves at all
   return options;
 }
 
 }  // namespace
 
-RunResult run_slam(const cfp_examples::Sequence& sequence, cfp_examples::Detector& detector, const Options& chosen,
+RunResult run_slam(const FrameSource& source, cfp_examples::Detector& detector, const Options& chosen,
                    Observer& observer) {
-  const Options options = fitted(chosen, sequence, detector);
-  const cfp_examples::TumCamera& calibration = sequence.calibration();
-  const Camera camera = sequence.camera().cast<float>();
+  const Options options = fitted(chosen, source, detector);
+  const cfp_examples::TumCamera& calibration = source.calibration;
+  const Camera camera = source.camera.cast<float>();
   const View view{camera.pinhole(),
                   camera.pinhole().cast<double>(),
                   calibration.width,
@@ -39,9 +40,9 @@ RunResult run_slam(const cfp_examples::Sequence& sequence, cfp_examples::Detecto
   Tracking tracking(camera, view, options, observer);
   const auto load = [&](std::size_t k) {
     const Part part(observer, Module::reading);
-    return sequence.load(k);
+    return source.load(k);
   };
-  const std::size_t frames = options.max_frames > 0 ? std::min(options.max_frames, sequence.size()) : sequence.size();
+  const std::size_t frames = options.max_frames > 0 ? std::min(options.max_frames, source.size) : source.size;
   cfp_examples::PrefetchingReader reader(frames, load);
   for (std::size_t k = 0; k < frames; ++k) {
     const cfp_examples::SequenceFrame images = options.threads ? reader.load(k) : load(k);
@@ -60,6 +61,7 @@ RunResult run_slam(const cfp_examples::Sequence& sequence, cfp_examples::Detecto
   }
   RunResult result;
   result.trajectory = tracking.finish();
+  result.world.assign(result.trajectory.size(), 0);
   result.keyframes = tracking.map().keyframes.size();
   result.map_points = tracking.map().alive_points();
   return result;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <vector>
 
 #include "../../detection/detector_types.hpp"
@@ -11,14 +12,30 @@
 
 namespace cfp_slam {
 
+// The frames that a run sees, in the order of time: a recording's, or what somebody made of them.
+struct FrameSource {
+  // The recording must stay.
+  FrameSource(const cfp_examples::Sequence& sequence)  // NOLINT: a recording is a source
+      : calibration(sequence.calibration()),
+        camera(sequence.camera()),
+        size(sequence.size()),
+        load([&sequence](std::size_t k) { return sequence.load(k); }) {}
+
+  cfp_examples::TumCamera calibration;
+  cfp::RadialTangentialCamera<double> camera;
+  std::size_t size;
+  std::function<cfp_examples::SequenceFrame(std::size_t)> load;
+};
+
 struct RunResult {
   std::vector<cfp::StampedPose<double>> trajectory;  // camera to world, of the tracked and relocalised frames
+  std::vector<int> world;  // of each pose: poses of different worlds have nothing to do with each other
   std::size_t keyframes = 0, map_points = 0;
 };
 
 // Frames that cannot be used are skipped and say why in their record; nothing is thrown for them. Throws what the
 // detector throws.
-RunResult run_slam(const cfp_examples::Sequence& sequence, cfp_examples::Detector& detector, const Options& options,
+RunResult run_slam(const FrameSource& source, cfp_examples::Detector& detector, const Options& options,
                    Observer& observer);
 
 }  // namespace cfp_slam

@@ -33,14 +33,27 @@ class Tracking {
         refine_pose_(options),
         relocalize_(options.seed),
         local_map_(options.features),
-        mapping_(options) {}
+        mapping_(options),
+        interval_(options.interval) {
+    for (cfp::PoseHealthOptions* health : {&options_.first_health, &options_.health, &options_.relocalised_health}) {
+      health->image_width = view.width;
+      health->image_height = view.height;
+    }
+  }
 
   // `record` comes with time and image; the rest is filled in.
   void track(FrameFeatures&& features, FrameRecord& record) {
     take_bundle(false);
     Frame frame = begin_frame(features);
     relocalised_ = false;
-    inliers_ = 0;
+    pose_ = {};
+    gap_ = interval_.is_gap(frame.time_s);
+    if (gap_) {
+      note(record, "gap before this frame: " + std::to_string(frame.time_s - last_.time_s) + " s");
+      features.flow_from.clear();
+      features.flow_to.clear();
+      features.flow_depths_m.clear();
+    }
     estimate(frame, features, record);
     const Part part(observer_, Module::mapping);
     record.keypoints = frame.size();
@@ -48,15 +61,21 @@ class Tracking {
         std::count_if(from_last_.match.begin(), from_last_.match.end(), [](int j) { return j != cfp::no_match; }));
     if (map_.keyframes.empty()) {
       initialize(frame, record);
-    } else if (frame.has_pose) {
-      extend_map(frame, record);
     } else {
-      record.outcome = Outcome::lost;
-      record.note = inliers_ > 0 ? "too few inliers" : "no pose agrees with the map";
+      follow_probation(frame, record);
+      if (frame.has_pose) {
+        extend_map(frame, record);
+      } else {
+        record.outcome = Outcome::lost;
+        note(record, std::string("lost, ") + cfp::to_string(pose_.health.status));
+      }
     }
-    record.inliers = inliers_;
-    if (frame.has_pose)
+    record.inliers = pose_.inliers;
+    record.pose = pose_.health;
+    if (frame.has_pose) {
       poses_.push_back({frame.time_s, local_map_.reference(), frame.T_cam_world * reference_pose().inverse()});
+      believed_ = BelievedPose{frame.time_s, frame.T_cam_world};
+    }
     motion_.learn(last_, frame);
     last_ = std::move(frame);
   }
@@ -79,6 +98,10 @@ class Tracking {
     cfp::SE3<double> T_cam_reference;
   };
 
+  static void note(FrameRecord& record, const std::string& what) {
+    record.note += (record.note.empty() ? "" : "; ") + what;
+  }
+
   Frame begin_frame(FrameFeatures& features) const {
     Frame frame;
     const std::size_t n = features.keypoints.size();
@@ -95,12 +118,11 @@ class Tracking {
 
   // Matches, probabilities, weights and the pose, each twice.
   void estimate(Frame& frame, const FrameFeatures& features, FrameRecord& record) {
-    predicted_ = motion_.predict(last_, frame.time_s, view_);
+    predicted_ = gap_ ? MotionModel::Prediction{} : motion_.predict(last_, frame.time_s, view_);
     {
       const Part part(observer_, Module::matching);
       grid_.build(frame, view_);
-      match_last_(frame, grid_, last_, map_, predicted_.T_cam_world, view_, options_.search_radius,
-                  2 * options_.min_inliers, from_last_);
+      match_last(frame, predicted_.T_cam_world);
     }
     cfp::StageResult<float> stage = coarse(frame, features);
     observer_.weighted(stage, probability_.state(), frame);
@@ -112,6 +134,17 @@ class Tracking {
     record.health = stage.report.health;
     frame.static_probability.assign(stage.static_probability.begin(), stage.static_probability.end());
     if (frame.has_pose) second_pose(frame, stage.weight);
+  }
+
+  // Over a gap the last frame says nothing of where its points are now.
+  void match_last(Frame& frame, const cfp::SE3<double>& T_cam_world) {
+    if (gap_) {
+      from_last_.match.assign(frame.size(), cfp::no_match);
+      from_last_.expected_proven = 0;
+    } else {
+      match_last_(frame, grid_, last_, map_, T_cam_world, view_, options_.search_radius, options_.enough_matches,
+                  from_last_);
+    }
   }
 
   cfp::StageResult<float> coarse(const Frame& frame, const FrameFeatures& features) {
@@ -142,20 +175,24 @@ class Tracking {
     }
   }
 
-  // From the last frame's points or, when those do not give it, from the map. The motion since the last frame, if both
-  // frames have a pose.
+  // From the last frame's points or, when those do not give it and over a gap, from the map. The motion since the last
+  // frame, if both frames have a pose.
   std::optional<cfp::PoseEstimate> first_pose(Frame& frame, cfp::span<const float> weight) {
     if (map_.keyframes.empty()) return std::nullopt;
     const Part part(observer_, Module::pose);
     frame.T_cam_world = predicted_.T_cam_world;
-    std::size_t inliers = last_.has_pose ? refine(frame, weight, false) : 0;
-    if (inliers < options_.min_first_inliers) {
+    if (last_.has_pose && !gap_)
+      pose_ = refine(frame, weight, from_last_.expected_proven, false, options_.first_health);
+    if (!pose_.health.ok()) {
       relocalised_ = relocalize_(frame, map_, local_map_.points(), weight, view_.camera);
-      inliers = relocalised_ ? refine(frame, weight, false) : 0;
+      if (relocalised_) {
+        match_last(frame, frame.T_cam_world);
+        pose_ = refine(frame, weight, from_last_.expected_proven, false, options_.first_health);
+      }
     }
-    frame.has_pose = inliers >= options_.min_first_inliers;
-    if (!frame.has_pose || !last_.has_pose) return std::nullopt;
-    return cfp::PoseEstimate{frame.T_cam_world * last_.T_cam_world.inverse(), inliers};
+    frame.has_pose = pose_.health.ok();
+    if (!frame.has_pose || !last_.has_pose || gap_) return std::nullopt;
+    return cfp::PoseEstimate{frame.T_cam_world * last_.T_cam_world.inverse(), pose_.inliers};
   }
 
   // With the local map.
@@ -165,19 +202,40 @@ class Tracking {
       local_map_.search(frame, grid_, map_, view_, relocalised_);
     }
     const Part part(observer_, Module::pose);
-    inliers_ = refine(frame, weight, true);
-    frame.has_pose = inliers_ >= options_.min_inliers;
+    pose_ = refine(frame, weight, local_map_.expected_proven(), true,
+                   relocalised_ ? options_.relocalised_health : options_.health);
+    frame.has_pose = pose_.health.ok();
+  }
+
+  // A pose from the map alone is on probation until some frames have been tracked from it. When it turns out to have
+  // been wrong, the poses given since are taken back.
+  void follow_probation(const Frame& frame, FrameRecord& record) {
+    const bool failed = probation_ > 0 && (!frame.has_pose || (relocalised_ && is_jump(frame)));
+    if (failed) {
+      poses_.resize(first_on_probation_);
+      believed_.reset();
+      note(record, "a relocalisation was wrong, its poses are taken back");
+    }
+    if (relocalised_ && frame.has_pose && (failed || probation_ == 0)) first_on_probation_ = poses_.size();
+    probation_ = !frame.has_pose ? 0 : relocalised_ ? options_.probation : std::max(probation_ - 1, 0);
+  }
+  [[nodiscard]] bool is_jump(const Frame& frame) const {
+    return believed_ &&
+           cfp::is_jump({frame.T_cam_world * believed_->T_cam_world.inverse(), frame.time_s - believed_->time_s},
+                        options_.health);
   }
 
   // The stage's weights hold M of what the last frame saw; that of points which joined since comes on top.
-  std::size_t refine(Frame& frame, cfp::span<const float> weight, bool prune) {
+  RefinedPose refine(Frame& frame, cfp::span<const float> weight, std::size_t expected, bool prune,
+                     const cfp::PoseHealthOptions& health) {
     weights_.assign(weight.begin(), weight.end());
     for (std::size_t i = 0; i < frame.size(); ++i) {
       if (!from_last_.matched(i) && map_.is_alive(frame.map_point[i]))
         weights_[i] = cfp::observation_weight(weight[i], map_.point(frame.map_point[i]).static_probability,
                                               options_.probability.map_point.weight);
     }
-    return refine_pose_(frame, from_last_, map_, weights_, view_, prune);
+    return refine_pose_(frame, from_last_, map_, weights_, view_, expected, prune, health,
+                        relocalised_ ? std::nullopt : believed_);
   }
 
   // The first frame is the world. It needs enough points that may be static.
@@ -186,22 +244,24 @@ class Tracking {
     for (std::size_t i = 0; i < frame.size(); ++i) usable += mapping_.may_create(frame, i) ? 1U : 0U;
     if (usable < options_.min_initial_points) {
       record.outcome = Outcome::lost;
-      record.note = "waiting for " + std::to_string(options_.min_initial_points) +
-                    " static points with depth, this frame has " + std::to_string(usable);
+      note(record, "waiting for " + std::to_string(options_.min_initial_points) +
+                       " static points with depth: this frame has " + std::to_string(usable));
       return;
     }
     frame.T_cam_world = {};
     frame.has_pose = true;
-    inliers_ = usable;
+    pose_.inliers = usable;
     record.outcome = Outcome::tracked;
     make_keyframe(frame, record);
   }
 
   void extend_map(Frame& frame, FrameRecord& record) {
-    record.outcome = relocalised_ ? Outcome::relocalised : Outcome::tracked;
-    update_points(map_, frame, from_last_, probability_);
+    const bool on_probation = relocalised_ || probation_ > 0;
+    record.outcome = on_probation ? Outcome::relocalised : Outcome::tracked;
+    update_points(map_, frame, from_last_, probability_, !on_probation);
     ++frames_since_keyframe_;
-    if (mapping_.wants_keyframe(map_, frame, local_map_.reference(), inliers_, frames_since_keyframe_))
+    if (!on_probation &&
+        mapping_.wants_keyframe(map_, frame, local_map_.reference(), pose_.inliers, frames_since_keyframe_))
       make_keyframe(frame, record);
   }
 
@@ -247,8 +307,12 @@ class Tracking {
   Frame last_;
   MotionModel::Prediction predicted_;
   LastFrameMatches from_last_;
-  bool relocalised_ = false;  // in this frame
-  std::size_t inliers_ = 0;
+  bool relocalised_ = false, gap_ = false;  // in this frame, before it
+  RefinedPose pose_;                        // of this frame
+  cfp::FrameInterval interval_;
+  std::optional<BelievedPose> believed_;  // the last of all frames
+  int probation_ = 0;                     // frames left
+  std::size_t first_on_probation_ = 0;    // of poses_
   int frames_since_keyframe_ = 0;
   std::vector<RelativePose> poses_;
   std::vector<float> weights_;

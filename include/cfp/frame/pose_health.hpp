@@ -1,0 +1,214 @@
+/// @file pose_health.hpp
+/// Whether a pose may be believed, and may go into the map: a robust refinement always returns something, and from
+/// wrong matches a wrong pose with a dozen inliers. What tells it are its information, the share of the observations
+/// that agree, how they are spread over the image, and the step that it means since the last pose.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "cfp/core/assert.hpp"
+#include "cfp/core/numeric.hpp"
+#include "cfp/core/options.hpp"
+#include "cfp/core/span.hpp"
+#include "cfp/math/normal_equations.hpp"
+#include "cfp/math/se3.hpp"
+#include "cfp/math/so3.hpp"
+#include "cfp/optimization/pose/pose_problem.hpp"
+
+namespace cfp {
+
+struct PoseHealthOptions {
+  double min_inliers = 20;               ///< sum of the inliers' weights, >= 0 (ORB-SLAM2 asks for 30 matches)
+  double min_inlier_share = 0.3;         ///< of the weight of all observations, in [0, 1]; wrong matches give 0.1
+  double min_spread = 0.1;               ///< share of the image's cells that hold an inlier, in [0, 1]
+  double max_position_sigma_m = 0.03;    ///< > 0
+  double max_rotation_sigma_rad = 0.02;  ///< > 0
+  double max_speed_m_s = 4;              ///< of a step from the last pose, > 0; a hand is slower
+  double max_turn_rad_s = 8;             ///< the same for its rotation, > 0
+  double slack_m = 0.05;                 ///< a step this short is never a jump, >= 0
+  double slack_rad = 0.05;               ///< nor is a turn this small, >= 0
+  double image_width = 0;                ///< px, >= 0; 0: unknown, the spread is not judged
+  double image_height = 0;               ///< px, >= 0
+};
+
+enum class PoseHealth : std::uint8_t {
+  ok,
+  not_solved,       ///< the refinement gave no pose
+  too_few_inliers,  ///< below min_inliers
+  few_agree,        ///< most observations disagree with the pose: wrong matches, or the scene moved as a whole
+  crowded,          ///< all inliers lie in a small part of the image: one object, which may move
+  uncertain,        ///< the inliers do not determine the pose to the accuracy asked for
+  jump              ///< the camera cannot have moved so far in the time
+};
+
+/// What a pose looks like. Figures that could not be computed are infinite (uncertainties) or 0 (all others).
+struct PoseAssessment {
+  PoseHealth status = PoseHealth::not_solved;  ///< the first of its list that holds
+  double inliers = 0;                          ///< sum of their weights
+  double inlier_share = 0;                     ///< of the weight of all observations, in [0, 1]
+  double spread = 0;                           ///< share of the image's cells with an inlier, in [0, 1]
+  double position_sigma_m = std::numeric_limits<double>::infinity();    ///< of the camera's centre, all three axes
+  double rotation_sigma_rad = std::numeric_limits<double>::infinity();  ///< the same of its rotation
+
+  [[nodiscard]] constexpr bool ok() const noexcept { return status == PoseHealth::ok; }
+};
+
+/// The last pose that was believed, as seen from this one.
+struct PoseStep {
+  SE3<double> T_cur_last;
+  double dt_s = 0;  ///< time between them, > 0
+};
+
+inline namespace CFP_ISA {
+
+/// The enumerator's name, for reports.
+[[nodiscard]] constexpr const char* to_string(PoseHealth status) noexcept {
+  constexpr const char* names[] = {"ok",        "not solved", "too few inliers", "few observations agree", "crowded",
+                                   "uncertain", "jump"};
+  return status <= PoseHealth::jump ? names[static_cast<int>(status)] : "unknown";
+}
+
+[[nodiscard]] inline OptionPath invalid_field(const PoseHealthOptions& o) noexcept {
+  if (!detail::non_negative(o.min_inliers)) return "min_inliers";
+  if (!(o.min_inlier_share >= 0 && o.min_inlier_share <= 1)) return "min_inlier_share";
+  if (!(o.min_spread >= 0 && o.min_spread <= 1)) return "min_spread";
+  if (!detail::positive(o.max_position_sigma_m)) return "max_position_sigma_m";
+  if (!detail::positive(o.max_rotation_sigma_rad)) return "max_rotation_sigma_rad";
+  if (!detail::positive(o.max_speed_m_s)) return "max_speed_m_s";
+  if (!detail::positive(o.max_turn_rad_s)) return "max_turn_rad_s";
+  if (!detail::non_negative(o.slack_m)) return "slack_m";
+  if (!detail::non_negative(o.slack_rad)) return "slack_rad";
+  if (!detail::non_negative(o.image_width)) return "image_width";
+  if (!detail::non_negative(o.image_height)) return "image_height";
+  return {};
+}
+
+/// Whether the camera can have made this step. A time that is not positive and finite allows the slack alone.
+[[nodiscard]] inline bool is_jump(const PoseStep& step, const PoseHealthOptions& options) noexcept {
+  const double dt = step.dt_s > 0 && is_finite(step.dt_s) ? step.dt_s : 0;
+  return !(step.T_cur_last.translation.norm() <= options.slack_m + options.max_speed_m_s * dt) ||
+         !(so3_log<double>(step.T_cur_last.rotation).norm() <= options.slack_rad + options.max_turn_rad_s * dt);
+}
+
+/// Standard deviations of the camera's centre, in its own axes, and of its rotation, from the information of
+/// refine_pose. False, and the two untouched, when the information has no inverse.
+[[nodiscard]] inline bool pose_sigmas(const Eigen::Matrix<double, 6, 6>& information, double& position_sigma_m,
+                                      double& rotation_sigma_rad) noexcept {
+  double variance[2] = {0, 0};
+  for (int i = 0; i < 6; ++i) {
+    Eigen::Matrix<double, 6, 1> unit = Eigen::Matrix<double, 6, 1>::Zero(), column;
+    unit[i] = -1;
+    if (!solve_normal_equations<6>(information, unit, 0, 1e-12, column)) return false;
+    variance[i / 3] += column[i];
+  }
+  position_sigma_m = std::sqrt(variance[0]);
+  rotation_sigma_rad = std::sqrt(variance[1]);
+  return true;
+}
+
+/// Judges what refine_pose returned: its result, the pixels and weights (empty: 1) of its observations, and its inlier
+/// mask. `step`, when given, is judged, too. Weights outside [0, 1] are clamped. Allocates nothing.
+template <typename Scalar>
+[[nodiscard]] PoseAssessment assess_pose(const PoseResult& pose, PointSpan<Scalar, 2> pixels,
+                                         span<const non_deduced<Scalar>> weights, span<const char> inlier_mask,
+                                         const std::optional<PoseStep>& step,
+                                         const PoseHealthOptions& options) noexcept {
+  CFP_ASSERT(inlier_mask.size() == pixels.size() && (weights.empty() || weights.size() == pixels.size()));
+  constexpr int columns = 8, rows = 6;
+  const bool sized = options.image_width > 0 && options.image_height > 0;
+  std::array<bool, columns * rows> occupied{};
+  PoseAssessment out;
+  double all = 0;
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const double w = weights.empty() ? 1.0 : static_cast<double>(clamp_probability(weights[i]));
+    all += w;
+    if (inlier_mask[i] == 0) continue;
+    out.inliers += w;
+    const double x = static_cast<double>(pixels(i, 0)) * columns, y = static_cast<double>(pixels(i, 1)) * rows;
+    // A lens may put what its edge shows outside the image without distortion.
+    if (!sized || !(w > 0.1) || !is_finite(x) || !is_finite(y)) continue;
+    const auto cell = [](double at, double size, int cells) {
+      return at <= 0 ? 0 : at >= size * cells ? cells - 1 : static_cast<int>(at / size);
+    };
+    occupied[static_cast<std::size_t>(cell(y, options.image_height, rows) * columns +
+                                      cell(x, options.image_width, columns))] = true;
+  }
+  if (all > 0) out.inlier_share = clamp_probability(out.inliers / all);
+  for (const bool cell : occupied) out.spread += cell ? 1.0 / (columns * rows) : 0.0;
+  const bool determined = pose_sigmas(pose.information, out.position_sigma_m, out.rotation_sigma_rad);
+
+  if (!is_solved(pose.status)) {
+    out.status = PoseHealth::not_solved;
+  } else if (!(out.inliers >= options.min_inliers)) {
+    out.status = PoseHealth::too_few_inliers;
+  } else if (!(out.inlier_share >= options.min_inlier_share)) {
+    out.status = PoseHealth::few_agree;
+  } else if (sized && !(out.spread >= options.min_spread)) {
+    out.status = PoseHealth::crowded;
+  } else if (!determined || !(out.position_sigma_m <= options.max_position_sigma_m) ||
+             !(out.rotation_sigma_rad <= options.max_rotation_sigma_rad)) {
+    out.status = PoseHealth::uncertain;
+  } else if (step && is_jump(*step, options)) {
+    out.status = PoseHealth::jump;
+  } else {
+    out.status = PoseHealth::ok;
+  }
+  return out;
+}
+
+}  // namespace CFP_ISA
+
+struct FrameIntervalOptions {
+  double factor = 3;        ///< a gap is longer than the usual interval times this, >= 1,
+  double shortest_s = 0.2;  ///< and than this: over less, a velocity may be believed; > 0
+};
+
+inline namespace CFP_ISA {
+
+[[nodiscard]] inline OptionPath invalid_field(const FrameIntervalOptions& o) noexcept {
+  if (!(o.factor >= 1) || !is_finite(o.factor)) return "factor";
+  if (!detail::positive(o.shortest_s)) return "shortest_s";
+  return {};
+}
+
+/// The usual time between frames, and whether frames are missing before this one: then the camera may be anywhere, and
+/// a motion model finds nothing but chance matches.
+class FrameInterval {
+ public:
+  explicit FrameInterval(const FrameIntervalOptions& options = {}) noexcept : options_(options) {
+    CFP_ASSERT(!invalid_field(options));
+  }
+
+  /// Once per frame, with its time. True: there is a gap before it. A time that does not grow is no gap, and is not
+  /// learnt. The usual interval follows within some ten frames, so a recording that becomes slower has no gap after
+  /// each of its frames.
+  bool is_gap(double time_s) noexcept {
+    const double dt = time_s - last_s_;
+    const bool known = is_finite(last_s_);
+    if (!is_finite(time_s) || (known && !(dt > 0))) return false;
+    last_s_ = time_s;
+    if (!known) return false;
+    if (!(usual_s_ > 0)) {
+      usual_s_ = dt < options_.shortest_s ? dt : options_.shortest_s;
+      return dt > options_.factor * usual_s_;
+    }
+    const bool gap = dt > options_.factor * usual_s_ && dt > options_.shortest_s;
+    usual_s_ += 0.2 * ((dt < 2 * usual_s_ ? dt : 2 * usual_s_) - usual_s_);
+    return gap;
+  }
+  [[nodiscard]] double usual_s() const noexcept { return usual_s_; }  ///< 0: not known yet
+
+ private:
+  FrameIntervalOptions options_;
+  double last_s_ = std::numeric_limits<double>::quiet_NaN(), usual_s_ = 0;
+};
+
+}  // namespace CFP_ISA
+}  // namespace cfp

@@ -1,0 +1,161 @@
+#include "cfp/frame/pose_health.hpp"
+
+#include <array>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "cfp/core/random.hpp"
+#include "cfp/optimization/pose/pose_refinement.hpp"
+#include "support/catch.hpp"
+
+using cfp::PoseHealth;
+
+namespace {
+
+const cfp::PinholeCamera<double> camera{500, 500, 320, 240};
+
+/// What a camera at the origin sees of points 2 to 4 m away, over a part of the image.
+struct Scene {
+  std::vector<std::array<double, 3>> points;
+  std::vector<std::array<double, 2>> pixels;
+  std::vector<double> weights;
+  std::vector<char> inliers;
+  cfp::PoseResult pose;
+  cfp::PoseHealthOptions options;
+
+  Scene() { options.image_width = 640, options.image_height = 480; }
+  Scene& add(std::size_t count, double width, double height, double noise_px = 0.5, double weight = 1) {
+    cfp::Random random(count, "pose health");
+    const auto uniform = [&] { return static_cast<double>(random() >> 11) / 9007199254740992.0; };
+    for (std::size_t i = 0; i < count; ++i) {
+      const double u = 100 + width * uniform(), v = 100 + height * uniform(), z = 2 + 2 * uniform();
+      points.push_back({(u - 320) / 500 * z, (v - 240) / 500 * z, z});
+      pixels.push_back({u + noise_px * (2 * uniform() - 1), v + noise_px * (2 * uniform() - 1)});
+      weights.push_back(weight);
+    }
+    return *this;
+  }
+  Scene& refine() {
+    cfp::PoseObservations<double> observations;
+    observations.points = points;
+    observations.pixels = pixels;
+    observations.weights = weights;
+    cfp::PoseWorkspace<double> workspace;
+    inliers.resize(points.size());
+    pose = cfp::refine_pose(observations, camera, {}, cfp::PoseOptions{}, workspace, cfp::span<char>(inliers));
+    return *this;
+  }
+  cfp::PoseAssessment assess(const std::optional<cfp::PoseStep>& step = std::nullopt) const {
+    return cfp::assess_pose<double>(pose, pixels, weights, inliers, step, options);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("A pose from points all over the image is believed", "[health]") {
+  const Scene scene = Scene().add(200, 500, 350).refine();
+  const cfp::PoseAssessment a = scene.assess();
+  CHECK(a.status == PoseHealth::ok);
+  CHECK(a.inliers > 190);
+  CHECK(a.inlier_share > 0.95);
+  CHECK(a.spread > 0.5);
+  CHECK((a.position_sigma_m > 0 && a.position_sigma_m < 0.01));
+}
+
+TEST_CASE("Each reason not to believe a pose has its own name", "[health]") {
+  CHECK(Scene().add(12, 500, 350).refine().assess().status == PoseHealth::too_few_inliers);
+  CHECK(Scene().add(30, 500, 350).add(170, 500, 350, 200).refine().assess().status == PoseHealth::few_agree);
+  CHECK(Scene().add(100, 60, 60).refine().assess().status == PoseHealth::crowded);
+  CHECK(Scene().add(2, 500, 350).refine().assess().status == PoseHealth::not_solved);
+  Scene scene = Scene().add(200, 500, 350).refine();
+  scene.options.max_position_sigma_m = 1e-5;
+  CHECK(scene.assess().status == PoseHealth::uncertain);
+  scene.options = {};
+  scene.options.max_rotation_sigma_rad = 1e-6;
+  CHECK(scene.assess().status == PoseHealth::uncertain);
+  scene.options = {};
+  cfp::PoseStep step;
+  step.dt_s = 0.033;
+  CHECK(scene.assess(step).status == PoseHealth::ok);
+  step.T_cur_last.translation.x() = 0.5;
+  CHECK(scene.assess(step).status == PoseHealth::jump);
+  step.dt_s = 1;
+  CHECK(scene.assess(step).status == PoseHealth::ok);
+  step.T_cur_last.rotation.diagonal() << -1, -1, 1;  // half a turn
+  CHECK(scene.assess(step).status == PoseHealth::ok);
+  step.dt_s = 0.033;
+  CHECK(scene.assess(step).status == PoseHealth::jump);
+  for (int status = 0; status <= static_cast<int>(PoseHealth::jump); ++status)
+    CHECK(std::string(cfp::to_string(static_cast<PoseHealth>(status))) != "unknown");
+}
+
+TEST_CASE("Observations that weigh nothing neither speak for a pose nor against it", "[health]") {
+  const cfp::PoseAssessment a = Scene().add(100, 500, 350).add(300, 500, 350, 200, 0.001).refine().assess();
+  CHECK(a.status == PoseHealth::ok);
+  CHECK(a.inlier_share > 0.9);
+}
+
+TEST_CASE("The uncertainty of a pose is that of its errors", "[health]") {
+  // Noise of the default sigma, 1 px: many poses scatter as the information says.
+  double squares = 0, expected = 0;
+  for (std::size_t n = 60; n < 160; ++n) {
+    const Scene scene = Scene().add(n, 500, 350, 1.732).refine();  // uniform, standard deviation 1
+    squares += scene.pose.T_cam_world.inverse().translation.squaredNorm();
+    const double sigma = scene.assess().position_sigma_m;
+    expected += sigma * sigma;
+  }
+  CHECK_THAT(squares / expected, WithinAbs(1, 0.4));
+}
+
+TEST_CASE("Hostile input is judged, never believed", "[health]") {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  Scene scene = Scene().add(200, 500, 350).refine();
+  for (auto& p : scene.pixels) p = {nan, nan};
+  CHECK(scene.assess().status == PoseHealth::crowded);
+  scene = Scene().add(200, 500, 350).refine();
+  scene.pose.information.setConstant(nan);
+  CHECK(scene.assess().status == PoseHealth::uncertain);
+  scene.pose.information.setZero();
+  CHECK(scene.assess().status == PoseHealth::uncertain);
+  for (double& w : scene.weights) w = nan;
+  CHECK(scene.assess().status == PoseHealth::too_few_inliers);
+  cfp::PoseStep step;
+  step.dt_s = nan;
+  step.T_cur_last.translation.x() = nan;
+  CHECK(cfp::is_jump(step, {}));
+  CHECK(Scene().assess().status == PoseHealth::not_solved);
+}
+
+TEST_CASE("A gap is a time far above the usual; a recording that becomes slower has few", "[health]") {
+  cfp::FrameInterval interval;
+  double t = 1.3e9;
+  const auto gaps = [&](int frames, double dt) {
+    int count = 0;
+    for (int k = 0; k < frames; ++k) count += interval.is_gap(t += dt) ? 1 : 0;
+    return count;
+  };
+  CHECK(gaps(30, 1 / 30.0) == 0);
+  CHECK_THAT(interval.usual_s(), WithinAbs(1 / 30.0, 1e-6));
+  CHECK(gaps(1, 2) == 1);
+  CHECK(gaps(30, 1 / 30.0) == 0);
+  CHECK(gaps(60, 1 / 6.0) == 0);  // a velocity may still be believed
+  CHECK(gaps(10, 1 / 30.0) == 0);
+  CHECK(gaps(200, 1.5) <= 20);
+  CHECK(gaps(20, 1.5) == 0);
+  CHECK_FALSE(interval.is_gap(t - 10));
+  CHECK_FALSE(interval.is_gap(std::numeric_limits<double>::quiet_NaN()));
+  CHECK(gaps(1, 1.5) == 0);
+}
+
+TEST_CASE("Options of health outside their ranges are named", "[health]") {
+  CHECK(!invalid_field(cfp::PoseHealthOptions{}));
+  cfp::PoseHealthOptions options;
+  options.min_inlier_share = 1.5;
+  CHECK(invalid_field(options).string() == "min_inlier_share");
+  options = {};
+  options.max_speed_m_s = 0;
+  CHECK(invalid_field(options).string() == "max_speed_m_s");
+  CHECK(!invalid_field(cfp::FrameIntervalOptions{}));
+  CHECK(invalid_field(cfp::FrameIntervalOptions{0.5, 0.2}).string() == "factor");
+}
