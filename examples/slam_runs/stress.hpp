@@ -116,9 +116,10 @@ inline std::vector<Stress> stresses(std::size_t frames, double rate_hz, const cf
     }
   });
   for (const auto& [name, share] : {std::pair<const char*, double>{"board over 40 %", 0.4}, {"board over 70 %", 0.7}}) {
-    add(name, 60, &Stress::image, [=, units = camera.depth_units_per_metre](std::size_t k, SequenceFrame& f) {
-      detail::carry_board(static_cast<double>(k - first) / 60, share, 1.1, units, f);
-    });
+    add(name, 60, &Stress::image,
+        [first, share = share, units = camera.depth_units_per_metre](std::size_t k, SequenceFrame& f) {
+          detail::carry_board(static_cast<double>(k - first) / 60, share, 1.1, units, f);
+        });
   }
 
   const auto detections = [&](const char* name, double length, auto change) {

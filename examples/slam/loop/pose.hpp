@@ -37,7 +37,7 @@ class PoseSolver {
                          const View& view, std::size_t expected, bool prune, const cfp::PoseHealthOptions& health,
                          const std::optional<BelievedPose>& believed) {
     collect(frame, last, map, weight, view);
-    let_proven_decide(expected);
+    const bool decided = let_proven_decide(expected);
     cfp::PoseObservations<double> observations;
     observations.points = points_;
     observations.pixels = pixels_;
@@ -46,13 +46,23 @@ class PoseSolver {
     observations.depths = depths_;
     observations.baseline_fx = view.baseline_fx;
     inlier_.resize(keypoint_.size());
-    const cfp::PoseResult result = cfp::refine_pose(observations, view.exact, frame.T_cam_world, options_.pose,
-                                                    workspace_, cfp::span<char>(inlier_));
+    const auto solve = [&](const cfp::SE3<double>& start, const cfp::PoseOptions& options) {
+      return cfp::refine_pose(observations, view.exact, start, options, workspace_, cfp::span<char>(inlier_));
+    };
+    cfp::PoseResult result = solve(frame.T_cam_world, options_.pose);
     std::optional<cfp::PoseStep> step;
     if (believed)
       step = cfp::PoseStep{result.T_cam_world * believed->T_cam_world.inverse(), frame.time_s - believed->time_s};
     RefinedPose out{0, cfp::assess_pose(result, observations.pixels, weights_, inlier_, step, health)};
     if (!cfp::is_solved(result.status)) return out;
+    if (decided) {  // what agrees with that, proven or not, makes it more exact
+      for (std::size_t o = 0; o < weights_.size(); ++o)
+        weights_[o] = inlier_[o] != 0 ? static_cast<double>(weight[keypoint_[o]]) : 0.0;
+      cfp::PoseOptions narrow = options_.pose;
+      narrow.rounds[0] = narrow.rounds[narrow.round_count - 1];
+      narrow.round_count = 1;
+      if (const cfp::PoseResult exact = solve(result.T_cam_world, narrow); cfp::is_solved(exact.status)) result = exact;
+    }
     frame.T_cam_world = result.T_cam_world;
     for (std::size_t o = 0; o < keypoint_.size(); ++o) {
       if (inlier_[o] != 0) {
@@ -92,13 +102,15 @@ class PoseSolver {
   // What enters the view and moves, and no detector knows, must not outvote what keyframes agree about: where enough of
   // that is to be expected in view, all else weighs a small share of it, and only helps where that leaves the pose
   // open. Where the camera looks at something new, all counts.
-  void let_proven_decide(std::size_t expected) {
+  // Whether it does.
+  bool let_proven_decide(std::size_t expected) {
     constexpr double few = 20, enough = 50;
     double proven = 0, others = 0;
     for (std::size_t o = 0; o < weights_.size(); ++o) (proven_[o] != 0 ? proven : others) += weights_[o];
     const double share = std::min(1.0, options_.unproven_share * proven / std::max(others, 1e-9));
     const double known = std::clamp((static_cast<double>(expected) - few) / (enough - few), 0.0, 1.0);
     for (std::size_t o = 0; o < weights_.size(); ++o) weights_[o] *= proven_[o] != 0 ? 1 : 1 + (share - 1) * known;
+    return share < 1 && known > 0;
   }
 
   Options options_;
