@@ -58,7 +58,7 @@ void BM_reprojection_distances(benchmark::State& state) {
   std::size_t turn = 0;
   for (auto _ : state) {
     const Frame<Scalar>& frame = inputs[turn++ % inputs.size()];
-    cfp::reprojection_distances(camera_as<Scalar>(), pose().cast<Scalar>(), frame.prev, frame.depth, frame.cur, out);
+    cfp::reprojection_distances(frame.prev, frame.depth, frame.cur, pose().cast<Scalar>(), camera_as<Scalar>(), out);
     benchmark::DoNotOptimize(out.data());
     benchmark::ClobberMemory();
   }

@@ -82,7 +82,7 @@ template <bool combined, typename Scalar>
 void stage_two(const Matches<Scalar>& in, const cfp::SE3<Scalar>& T, const cfp::Matrix3<Scalar>& F,
                Buffers<Scalar>& b) {
   const cfp::ConstraintOptions options;
-  cfp::reprojection_distances(camera_as<Scalar>(), T, in.prev, in.depth, in.cur, b.projection);
+  cfp::reprojection_distances(in.prev, in.depth, in.cur, T, camera_as<Scalar>(), b.projection);
   cfp::epipolar_distances(F, in.prev, in.cur, b.epipolar);
   const auto by_projection = cfp::fit_constraint(b.projection, options, b.scratch);
   const auto by_line = cfp::fit_constraint(b.epipolar, options, b.scratch);

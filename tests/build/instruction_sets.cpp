@@ -46,7 +46,7 @@ void formulas(const Inputs<Scalar>& in, Results& results) {
   const cfp::PinholeCamera<double> camera{535.4, 539.2, 320.1, 247.6};
   const cfp::PinholeCamera<Scalar> own{Scalar(535.4), Scalar(539.2), Scalar(320.1), Scalar(247.6)};
   const cfp::Matrix3<Scalar> F = cfp::fundamental_from_pose(camera, T).template cast<Scalar>();
-  cfp::reprojection_distances(own, T.template cast<Scalar>(), in.previous, in.depth, in.current, distances);
+  cfp::reprojection_distances(in.previous, in.depth, in.current, T.template cast<Scalar>(), own, distances);
   results.add_all("reprojection distance", distances, rounding<Scalar>(1000));
   cfp::epipolar_distances(F, in.previous, in.current, distances);
   results.add_all("epipolar distance", distances, rounding<Scalar>(1000));

@@ -72,8 +72,7 @@ TEST_CASE("Every K, M and weight equals the scalar formulas applied one keypoint
     if (scene.match[i] < 0) continue;
     const cfp::Vector2<double> prev(scene.previous_keypoints[i][0], scene.previous_keypoints[i][1]),
         cur(scene.keypoints[i][0], scene.keypoints[i][1]);
-    dt[i] = cfp::reprojection_distance<cfp::PinholeCamera<double>, double>(scene.camera, scene.T_cur_prev, prev,
-                                                                           scene.previous_depths[i], cur);
+    dt[i] = cfp::reprojection_distance(prev, scene.previous_depths[i], cur, scene.T_cur_prev, scene.camera);
     df[i] = cfp::epipolar_distance<double>(F, prev, cur);
     if (run.state.label[i] != KeypointLabel::outside) continue;
     outside_t.push_back(dt[i]);

@@ -45,7 +45,7 @@ TEST_CASE("epipolar and reprojection distances differentiate with respect to the
     const auto F = cfp::fundamental_from_pose(c, pose);
     return Eigen::Matrix<std::decay_t<decltype(depth)>, 4, 1>(
         cfp::epipolar_distance(F, x_prev, x_cur), cfp::symmetric_epipolar_distance(F, x_prev, x_cur),
-        cfp::sampson_distance(F, x_prev, x_cur), cfp::reprojection_distance(c, pose, x_prev, depth, x_cur));
+        cfp::sampson_distance(F, x_prev, x_cur), cfp::reprojection_distance(x_prev, depth, x_cur, pose, c));
   };
   const Eigen::Vector4d value = distances(camera, T, prev, cur, 2.0);
   const Eigen::Matrix<Jet, 4, 1> dual = distances(dual_camera, dual_T, dual_prev, dual_cur, Jet(2.0));

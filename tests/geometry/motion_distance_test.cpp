@@ -44,7 +44,7 @@ TEST_CASE("With an exact depth the motion distance is the reprojection distance"
   for (int i = 0; i < 500; ++i) {
     const cfp::SE3<double> T = motion(random);
     const Pair p = pair(random);
-    const double expected = cfp::reprojection_distance(camera, T, p.previous, p.depth, p.current);
+    const double expected = cfp::reprojection_distance(p.previous, p.depth, p.current, T, camera);
     CHECK_THAT(cfp::motion_distance(p.previous, p.depth, p.current, T, camera, 0.2, exact_depth()),
                WithinAbs(expected, 1e-9 * (1 + expected)));
   }

@@ -32,11 +32,12 @@ TEST_CASE("the reprojection distance is the offset from the exact match", "[geom
     REQUIRE(views.camera_prev.unproject(views.prev[i], ray));
     REQUIRE(views.camera_prev.project(views.T_cur_prev * Vector3<double>(ray * views.depth_prev[i]), exact));
     CHECK_THAT(
-        cfp::reprojection_distance(views.camera_prev, views.T_cur_prev, views.prev[i], views.depth_prev[i], exact),
+        cfp::reprojection_distance(views.prev[i], views.depth_prev[i], exact, views.T_cur_prev, views.camera_prev),
         WithinAbs(0, 1e-12));
-    CHECK_THAT(cfp::reprojection_distance(views.camera_prev, views.T_cur_prev, views.prev[i], views.depth_prev[i],
-                                          Vector2<double>(exact + Vector2<double>(3, -4))),
-               WithinAbs(5, 1e-10));
+    CHECK_THAT(
+        cfp::reprojection_distance(views.prev[i], views.depth_prev[i], Vector2<double>(exact + Vector2<double>(3, -4)),
+                                   views.T_cur_prev, views.camera_prev),
+        WithinAbs(5, 1e-10));
   }
 }
 
@@ -45,20 +46,20 @@ TEST_CASE("a hand-computed reprojection", "[geometry]") {
   const cfp::PinholeCamera<double> camera{500, 500, 320, 240};
   cfp::SE3<double> T;
   T.translation << 0, 0, -1;
-  CHECK_THAT(cfp::reprojection_distance(camera, T, {420, 240}, 2.0, {520, 240}), WithinAbs(0, 1e-12));
-  CHECK_THAT(cfp::reprojection_distance(camera, T, {420, 240}, 2.0, {420, 240}), WithinAbs(100, 1e-12));
+  CHECK_THAT(cfp::reprojection_distance({420, 240}, 2.0, {520, 240}, T, camera), WithinAbs(0, 1e-12));
+  CHECK_THAT(cfp::reprojection_distance({420, 240}, 2.0, {420, 240}, T, camera), WithinAbs(100, 1e-12));
 }
 
 TEMPLATE_TEST_CASE("scaling the scene leaves reprojection distances as they are", "[geometry]", float, double) {
   TwoViews<TestType> views(60);
   for (std::size_t i = 0; i < views.prev.size(); ++i) {
-    const TestType d = cfp::reprojection_distance(views.camera_prev, views.T_cur_prev, views.prev[i],
-                                                  views.depth_prev[i], views.cur[i]);
+    const TestType d = cfp::reprojection_distance(views.prev[i], views.depth_prev[i], views.cur[i], views.T_cur_prev,
+                                                  views.camera_prev);
     for (const TestType scale : {TestType(0.01), TestType(300)}) {
       cfp::SE3<TestType> T = views.T_cur_prev;
       T.translation *= scale;
       CHECK_THAT(
-          cfp::reprojection_distance(views.camera_prev, T, views.prev[i], views.depth_prev[i] * scale, views.cur[i]),
+          cfp::reprojection_distance(views.prev[i], views.depth_prev[i] * scale, views.cur[i], T, views.camera_prev),
           WithinAbs(d, pixel_tolerance<TestType>));
     }
   }
@@ -70,12 +71,12 @@ TEMPLATE_TEST_CASE("no depth, behind the camera, not finite: no distance", "[geo
   const Vector2<TestType> pixel(300, 200);
   for (const TestType depth : {TestType(0), TestType(-1), std::numeric_limits<TestType>::quiet_NaN(),
                                std::numeric_limits<TestType>::infinity()}) {
-    CHECK(cfp::reprojection_distance(camera, T, pixel, depth, pixel) == no_distance<TestType>);
+    CHECK(cfp::reprojection_distance(pixel, depth, pixel, T, camera) == no_distance<TestType>);
   }
-  CHECK_THAT(cfp::reprojection_distance(camera, T, pixel, TestType(2), pixel), WithinAbs(0, pixel_tolerance<TestType>));
+  CHECK_THAT(cfp::reprojection_distance(pixel, TestType(2), pixel, T, camera), WithinAbs(0, pixel_tolerance<TestType>));
   T.translation << 0, 0, -2;
-  CHECK(cfp::reprojection_distance(camera, T, pixel, TestType(2), pixel) == no_distance<TestType>);
-  CHECK(cfp::reprojection_distance(camera, T, pixel, TestType(1), pixel) == no_distance<TestType>);
+  CHECK(cfp::reprojection_distance(pixel, TestType(2), pixel, T, camera) == no_distance<TestType>);
+  CHECK(cfp::reprojection_distance(pixel, TestType(1), pixel, T, camera) == no_distance<TestType>);
 }
 
 TEMPLATE_TEST_CASE("reprojection distances of arrays equal the scalar function", "[geometry]", float, double) {
@@ -96,10 +97,10 @@ TEMPLATE_TEST_CASE("reprojection distances of arrays equal the scalar function",
                                         views.depth_prev.begin() + static_cast<std::ptrdiff_t>(n));
       std::vector<TestType> out(n, TestType(-9));
       CHECK(cfp_test::allocations_in(
-                [&] { cfp::reprojection_distances(camera, views.T_cur_prev, prev, depth, cur, out); }) == 0);
+                [&] { cfp::reprojection_distances(prev, depth, cur, views.T_cur_prev, camera, out); }) == 0);
       for (std::size_t i = 0; i < n; ++i) {
         CAPTURE(n, i, prev[i].transpose(), cur[i].transpose(), depth[i]);
-        const TestType expected = cfp::reprojection_distance(camera, views.T_cur_prev, prev[i], depth[i], cur[i]);
+        const TestType expected = cfp::reprojection_distance(prev[i], depth[i], cur[i], views.T_cur_prev, camera);
         CHECK((out[i] == no_distance<TestType> || (out[i] >= 0 && cfp::is_finite(out[i]))));
         CHECK((out[i] < 0) == (expected < 0));
         CHECK_THAT(out[i], WithinAbs(expected, pixel_tolerance<TestType> * (1 + std::abs(expected))));

@@ -73,9 +73,9 @@ TEST_CASE("properties of reprojection distances", "[properties]") {
     const SE3<double> again = (T_cur_world * S) * (T_prev_world * S).inverse();
     const Vector2<double> prev(real(0, 640), real(0, 480)), cur(real(0, 640), real(0, 480));
     const double depth = real(0.8, 8);
-    const double d = cfp::reprojection_distance(camera, T_cur_prev, prev, depth, cur);
+    const double d = cfp::reprojection_distance(prev, depth, cur, T_cur_prev, camera);
     RC_PRE(cfp::has_distance(d) && d < 1e4);
-    RC_ASSERT(std::abs(cfp::reprojection_distance(camera, again, prev, depth, cur) - d) < 1e-6);
+    RC_ASSERT(std::abs(cfp::reprojection_distance(prev, depth, cur, again, camera) - d) < 1e-6);
   });
   rc::prop("the array function is permutation equivariant to the bit, and float follows double", [] {
     const std::size_t n = static_cast<std::size_t>(*rc::gen::inRange(1, 150));
@@ -92,8 +92,8 @@ TEST_CASE("properties of reprojection distances", "[properties]") {
       cur_f[i] = cur[i].cast<float>();
       depth_f[i] = static_cast<float>(depth[i]);
     }
-    cfp::reprojection_distances(camera, T, prev, depth, cur, out);
-    cfp::reprojection_distances(cfp::PinholeCamera<float>{500, 510, 320, 240}, T.cast<float>(), prev_f, depth_f, cur_f,
+    cfp::reprojection_distances(prev, depth, cur, T, camera, out);
+    cfp::reprojection_distances(prev_f, depth_f, cur_f, T.cast<float>(), cfp::PinholeCamera<float>{500, 510, 320, 240},
                                 out_f);
     for (std::size_t i = 0; i < n; ++i) {
       if (depth[i] > 1) RC_ASSERT(std::abs(out[i] - static_cast<double>(out_f[i])) < 5e-3 * (1 + out[i] * 1e-2));
@@ -101,7 +101,7 @@ TEST_CASE("properties of reprojection distances", "[properties]") {
     }
     for (std::vector<Vector2<double>>* points : {&prev, &cur}) std::reverse(points->begin(), points->end());
     std::reverse(depth.begin(), depth.end());
-    cfp::reprojection_distances(camera, T, prev, depth, cur, reversed);
+    cfp::reprojection_distances(prev, depth, cur, T, camera, reversed);
     std::reverse(reversed.begin(), reversed.end());
     RC_ASSERT(reversed == out);
   });

@@ -110,8 +110,8 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
   detail::gather_matches(state);
   scratch.projection.resize(n);
   scratch.epipolar.resize(n);
-  reprojection_distances(camera, pose.T_cur_prev.template cast<Scalar>(), PointSpan<Scalar, 2>(scratch.points),
-                         span<const Scalar>(scratch.depths), PointSpan<Scalar, 2>(state.current.keypoints),
+  reprojection_distances(PointSpan<Scalar, 2>(scratch.points), span<const Scalar>(scratch.depths),
+                         PointSpan<Scalar, 2>(state.current.keypoints), pose.T_cur_prev.template cast<Scalar>(), camera,
                          span<Scalar>(scratch.projection));
   const ConstraintModel<Scalar> projection = detail::fit_outside(scratch.projection, options.fine.projection, state);
   ConstraintModel<Scalar> epipolar;

@@ -35,9 +35,9 @@ inline namespace CFP_ISA {
 
 /// d_T = || pixel_cur - project(T_cur_prev * depth_prev * ray(pixel_prev)) ||, depth along z in metres.
 template <typename Camera, typename Scalar>
-[[nodiscard]] Scalar reprojection_distance(const Camera& camera, const SE3<Scalar>& T_cur_prev,
-                                           const Vector2<Scalar>& pixel_prev, const non_deduced<Scalar>& depth_prev,
-                                           const Vector2<Scalar>& pixel_cur) noexcept {
+[[nodiscard]] Scalar reprojection_distance(const Vector2<Scalar>& pixel_prev, const non_deduced<Scalar>& depth_prev,
+                                           const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
+                                           const Camera& camera) noexcept {
   using std::sqrt;
   Vector3<Scalar> ray = Vector3<Scalar>::Zero();
   Vector2<Scalar> projected = Vector2<Scalar>::Zero();
@@ -53,21 +53,21 @@ template <typename Camera, typename Scalar>
 
 /// reprojection_distance of every correspondence, for any camera. Allocates nothing.
 template <typename Camera>
-void reprojection_distances(const Camera& camera, const SE3<typename Camera::ScalarType>& T_cur_prev,
-                            const PointSpan<typename Camera::ScalarType, 2>& prev,
+void reprojection_distances(const PointSpan<typename Camera::ScalarType, 2>& prev,
                             span<const typename Camera::ScalarType> depth_prev,
                             const PointSpan<typename Camera::ScalarType, 2>& cur,
+                            const SE3<typename Camera::ScalarType>& T_cur_prev, const Camera& camera,
                             span<typename Camera::ScalarType> out) noexcept {
   CFP_ASSERT(prev.size() == out.size() && depth_prev.size() == out.size() && cur.size() == out.size());
   for (std::size_t i = 0; i < out.size(); ++i)
-    out[i] = reprojection_distance(camera, T_cur_prev, prev[i], depth_prev[i], cur[i]);
+    out[i] = reprojection_distance(prev[i], depth_prev[i], cur[i], T_cur_prev, camera);
 }
 
 /// The same for the pinhole camera, by a third of the operations. Equal to the scalar function up to rounding.
 template <typename Scalar>
-void reprojection_distances(const PinholeCamera<Scalar>& camera, const SE3<non_deduced<Scalar>>& T_cur_prev,
-                            const PointSpan<non_deduced<Scalar>, 2>& prev, span<const non_deduced<Scalar>> depth_prev,
-                            const PointSpan<non_deduced<Scalar>, 2>& cur, span<non_deduced<Scalar>> out) noexcept {
+void reprojection_distances(const PointSpan<non_deduced<Scalar>, 2>& prev, span<const non_deduced<Scalar>> depth_prev,
+                            const PointSpan<non_deduced<Scalar>, 2>& cur, const SE3<non_deduced<Scalar>>& T_cur_prev,
+                            const PinholeCamera<Scalar>& camera, span<non_deduced<Scalar>> out) noexcept {
   CFP_ASSERT(prev.size() == out.size() && depth_prev.size() == out.size() && cur.size() == out.size());
   const Matrix3<Scalar>& R = T_cur_prev.rotation;
   const Vector3<Scalar>& t = T_cur_prev.translation;
