@@ -97,9 +97,7 @@ void frame(benchmark::State& state) {
   }
   state.counters["keypoints"] = keypoints;
   cfp::CalibrationWorkspace workspace;
-  state.counters["auc"] = cfp::area_under_curve(cfp::span<const double>(k), cfp::span<const char>(is_static),
-                                                cfp::span<const double>(), workspace)
-                              .auc;
+  state.counters["auc"] = cfp::roc_auc(k, is_static, {}, workspace).auc;
 }
 
 }  // namespace

@@ -42,7 +42,7 @@ int main() {
   std::vector<char> inliers(points.size());
 
   for (const bool weighted : {false, true}) {
-    observations.weights = weighted ? cfp::span<const float>(weights) : cfp::span<const float>();
+    if (weighted) observations.weights = weights;
     const cfp::PoseResult result = cfp::refine_pose(observations, camera, start, options, workspace, inliers);
     const double error_mm = 1e3 * (result.T_cam_world.inverse().translation - truth.inverse().translation).norm();
     std::printf("%-8s camera centre off by %7.2f mm, %3d of %3d inliers, worth %5.1f observations, %d passes, %s\n",

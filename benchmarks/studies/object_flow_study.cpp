@@ -21,12 +21,12 @@
 #include <opencv2/video/tracking.hpp>
 
 #include "../../examples/detection/simple_detectors.hpp"
-#include "cfp/interop/opencv_flow.hpp"
 #include "../../examples/support/sequence.hpp"
 #include "../../examples/synthetic/sequence.hpp"
 #include "cfp/evaluation/calibration.hpp"
 #include "cfp/frame/estimate_objects.hpp"
 #include "cfp/interop/opencv.hpp"
+#include "cfp/interop/opencv_flow.hpp"
 
 namespace {
 
@@ -199,8 +199,7 @@ void print(const std::vector<Candidate>& all) {
               "boxes", "unkn.", "F", "H", "none");
   for (const Candidate& c : all) {
     cfp::CalibrationWorkspace workspace;
-    const auto auc = cfp::area_under_curve(cfp::span<const float>(c.score), cfp::span<const char>(c.is_static),
-                                           cfp::span<const float>(), workspace);
+    const auto auc = cfp::roc_auc(c.score, c.is_static, {}, workspace);
     const auto mean = [](double sum, std::size_t n) { return n > 0 ? sum / static_cast<double>(n) : 0.0; };
     std::printf(
         "%-36s %6.0f | %6.2f %6.2f %6.2f %6.2f %6.2f | %7.4f %7.3f %7.3f | %7.3f %7.3f | %7.3f %5zu %5zu | %4zu %4zu "

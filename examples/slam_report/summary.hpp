@@ -48,9 +48,7 @@ inline CalibrationSummary summarize(const LabelledSamples& samples) {
   CalibrationSummary out;
   if (samples.probability.size() != samples.is_static.size()) return out;
   cfp::CalibrationWorkspace workspace;
-  const auto result =
-      cfp::evaluate_calibration(cfp::span<const float>(samples.probability), cfp::span<const char>(samples.is_static),
-                                cfp::span<const float>(), workspace);
+  const auto result = cfp::evaluate_calibration(samples.probability, samples.is_static, {}, workspace);
   out.samples = result.used;
   if (result.used == 0) return out;
   out.static_fraction = result.static_fraction;

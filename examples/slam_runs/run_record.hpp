@@ -69,8 +69,8 @@ inline void evaluate(RunRecord& run) {
   if (run.truth.empty()) return;
   const std::vector<cfp::StampedPose<double>> estimate = run.trajectory();
   cfp::TrajectoryErrorWorkspace workspace;
-  run.absolute = cfp::absolute_trajectory_error<double>(run.truth, estimate, cfp::AbsoluteErrorOptions{}, workspace);
-  run.relative = cfp::relative_pose_error<double>(run.truth, estimate, cfp::RelativeErrorOptions{}, workspace);
+  run.absolute = cfp::absolute_trajectory_error(run.truth, estimate, cfp::AbsoluteErrorOptions{}, workspace);
+  run.relative = cfp::relative_pose_error(run.truth, estimate, cfp::RelativeErrorOptions{}, workspace);
 }
 
 }  // namespace cfp_slam

@@ -181,8 +181,7 @@ class Sequence {
     options.max_difference_s = max_difference_s;
     cfp::AssociationWorkspace workspace;
     std::vector<cfp::TimeMatch> matches;
-    using Stamps = cfp::span<const cfp::StampedPose<double>>;
-    cfp::associate(Stamps(colors), Stamps(others), options, workspace, matches);
+    cfp::associate(colors, others, options, workspace, matches);
     for (const cfp::TimeMatch& m : matches) frames_[m.first].*member = list[m.second];
   }
 

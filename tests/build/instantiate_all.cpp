@@ -181,14 +181,15 @@ template struct cfp::StampedPose<float>;
 template struct cfp::StampedPose<double>;
 template <typename Scalar>
 static void instantiate_evaluation() noexcept {
-  use(&cfp::align_points<Scalar>);
-  use(&cfp::area_under_curve<Scalar>);
+  use(&cfp::align_points<cfp::PointSpan<Scalar, 3>, std::vector<cfp::Vector3<Scalar>>>);
+  use(&cfp::roc_auc<std::vector<Scalar>>);
   use(&cfp::is_usable<Scalar>);
-  use(&cfp::time_order<Scalar>);
-  use(&cfp::associate<Scalar>);
-  use(&cfp::trajectory_coverage<Scalar>);
-  use(&cfp::absolute_trajectory_error<Scalar>);
-  use(&cfp::relative_pose_error<Scalar>);
+  using Poses = std::vector<cfp::StampedPose<Scalar>>;
+  use(&cfp::time_order<Poses>);
+  use(&cfp::associate<Poses, Poses>);
+  use(&cfp::trajectory_coverage<Poses, Poses>);
+  use(&cfp::absolute_trajectory_error<Poses, Poses>);
+  use(&cfp::relative_pose_error<Poses, Poses>);
 }
 
 // ---- frame ----

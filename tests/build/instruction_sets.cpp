@@ -148,9 +148,8 @@ void judgement(const std::vector<cfp_test::BaScene>& scenes, Results& results) {
       truth.push_back({static_cast<double>(i), scene.true_poses[i].inverse()});
       estimate.push_back({static_cast<double>(i), scene.poses[i].inverse()});
     }
-    using Poses = span<const cfp::StampedPose<double>>;
     results.add("trajectory error",
-                cfp::absolute_trajectory_error(Poses(truth), Poses(estimate), cfp::AbsoluteErrorOptions{}, workspace)
+                cfp::absolute_trajectory_error(truth, estimate, cfp::AbsoluteErrorOptions{}, workspace)
                     .translation_m.rmse,
                 1e-9);
     for (const auto& measured : scene.pixels) {

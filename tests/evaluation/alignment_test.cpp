@@ -6,6 +6,7 @@
 
 #include <Eigen/LU>
 
+#include "cfp/core/span.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
 #include "support/trajectories.hpp"
@@ -17,7 +18,7 @@ using Points = std::vector<cfp::Vector3<Scalar>>;
 
 template <typename Scalar>
 cfp::AlignmentResult align(const Points<Scalar>& from, const Points<Scalar>& to, bool with_scale) {
-  return cfp::align_points(cfp::PointSpan<Scalar, 3>(from), cfp::PointSpan<Scalar, 3>(to), with_scale);
+  return cfp::align_points(from, to, with_scale);
 }
 
 double cost(const cfp::Similarity& S, const Points<double>& from, const Points<double>& to) {
@@ -125,8 +126,7 @@ TEST_CASE("Alignment reads strided points and allocates nothing", "[evaluation]"
   const Points<double> to{{1, 0, 0}, {1, 1, 0}, {0, 0, 0}};
   cfp::AlignmentResult result;
   const auto work = [&] {
-    result = cfp::align_points(cfp::PointSpan<double, 3>(&from[0].x, from.size(), sizeof(Record)),
-                               cfp::PointSpan<double, 3>(to));
+    result = cfp::align_points(cfp::PointSpan<double, 3>(&from[0].x, from.size(), sizeof(Record)), to);
   };
   CHECK(cfp_test::allocations_in(work) == 0);
   CHECK_THAT((result.S_to_from * cfp::Vector3<double>(1, 0, 0) - to[1]).norm(), WithinAbs(0, 1e-12));

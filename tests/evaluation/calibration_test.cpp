@@ -13,10 +13,6 @@ template <typename Scalar>
 struct Samples {
   std::vector<Scalar> probability, weight;
   std::vector<char> is_static;
-
-  cfp::span<const Scalar> p() const { return probability; }
-  cfp::span<const Scalar> w() const { return weight; }
-  cfp::span<const char> y() const { return is_static; }
 };
 
 /// Probabilities on a grid of 1 / levels, so that ties abound; labels that agree with them.
@@ -52,7 +48,7 @@ TEMPLATE_TEST_CASE("AUC equals the count over all pairs, ties and weights includ
   cfp::CalibrationWorkspace workspace;
   for (int round = 0; round < 100; ++round) {
     const auto s = random_samples<TestType>(random, 20 + random.index(60), 1 + random.index(30), round % 2 == 0);
-    const auto result = cfp::area_under_curve(s.p(), s.y(), s.w(), workspace);
+    const auto result = cfp::roc_auc(s.probability, s.is_static, s.weight, workspace);
     REQUIRE(result.status == cfp::Status::ok);
     CHECK_THAT(result.auc, WithinAbs(auc_by_pairs(s), 1e-12));
   }
@@ -62,9 +58,7 @@ TEST_CASE("Perfect, reversed and constant scores have AUC 1, 0 and one half", "[
   cfp::CalibrationWorkspace workspace;
   const std::vector<double> rising{0.1, 0.2, 0.8, 0.9}, falling{9, 8, -2, -3}, same(4, 0.3);
   const std::vector<char> labels{0, 0, 1, 1};
-  const auto auc = [&](const std::vector<double>& scores) {
-    return cfp::area_under_curve<double>(scores, labels, {}, workspace).auc;
-  };
+  const auto auc = [&](const std::vector<double>& scores) { return cfp::roc_auc(scores, labels, {}, workspace).auc; };
   CHECK(auc(rising) == 1);
   CHECK(auc(falling) == 0);
   CHECK(auc(same) == 0.5);
@@ -73,7 +67,7 @@ TEST_CASE("Perfect, reversed and constant scores have AUC 1, 0 and one half", "[
 TEMPLATE_TEST_CASE("Brier, log loss, ECE and the table equal those by hand", "[evaluation]", float, double) {
   const Samples<TestType> s{{TestType(0.25), TestType(0.25), TestType(0.75), TestType(1)}, {1, 3, 2, 2}, {0, 1, 1, 1}};
   cfp::CalibrationWorkspace workspace;
-  const auto r = cfp::evaluate_calibration<4>(s.p(), s.y(), s.w(), workspace);
+  const auto r = cfp::evaluate_calibration<4>(s.probability, s.is_static, s.weight, workspace);
   CHECK(r.status == cfp::Status::ok);
   CHECK(r.used == 4);
   CHECK_THAT(r.brier, WithinAbs((1 * 0.0625 + 3 * 0.5625 + 2 * 0.0625) / 8, 1e-15));
@@ -94,11 +88,11 @@ TEST_CASE("Labels drawn from the probabilities are found calibrated, squashed on
   cfp::Random random(52, "calibrated");
   auto s = random_samples<double>(random, 200000, 1000, false);
   cfp::CalibrationWorkspace workspace;
-  const auto good = cfp::evaluate_calibration(s.p(), s.y(), s.w(), workspace);
+  const auto good = cfp::evaluate_calibration(s.probability, s.is_static, s.weight, workspace);
   CHECK(good.expected_calibration_error < 0.005);
   CHECK_THAT(good.brier, WithinAbs(1.0 / 6, 0.003));  // E p (1 - p) for uniform p
   for (double& p : s.probability) p = 0.5 + 0.25 * (p - 0.5);
-  const auto squashed = cfp::evaluate_calibration(s.p(), s.y(), s.w(), workspace);
+  const auto squashed = cfp::evaluate_calibration(s.probability, s.is_static, s.weight, workspace);
   CHECK(squashed.expected_calibration_error > 0.15);
   CHECK_THAT(squashed.auc, WithinAbs(good.auc, 1e-12));
 }
@@ -113,8 +107,8 @@ TEST_CASE("Whole-number weights act as repetitions", "[evaluation]") {
     repeated.is_static.insert(repeated.is_static.end(), times, weighted.is_static[i]);
   }
   cfp::CalibrationWorkspace workspace;
-  const auto a = cfp::evaluate_calibration(weighted.p(), weighted.y(), weighted.w(), workspace);
-  const auto b = cfp::evaluate_calibration(repeated.p(), repeated.y(), repeated.w(), workspace);
+  const auto a = cfp::evaluate_calibration(weighted.probability, weighted.is_static, weighted.weight, workspace);
+  const auto b = cfp::evaluate_calibration(repeated.probability, repeated.is_static, repeated.weight, workspace);
   CHECK_THAT(a.auc, WithinAbs(b.auc, 1e-12));
   CHECK_THAT(a.brier, WithinAbs(b.brier, 1e-12));
   CHECK_THAT(a.log_loss, WithinAbs(b.log_loss, 1e-12));
@@ -130,7 +124,7 @@ TEMPLATE_TEST_CASE("Hostile probabilities and weights are skipped, and everythin
       {1, 1, 1, 1, nan, -1, inf, huge, huge, huge, tiny, 0},
       {0, 1, 0, 1, 0, 1, 0, 1, 0, 0, 1, 1}};
   cfp::CalibrationWorkspace workspace;
-  const auto r = cfp::evaluate_calibration(s.p(), s.y(), s.w(), workspace);
+  const auto r = cfp::evaluate_calibration(s.probability, s.is_static, s.weight, workspace);
   CHECK(r.skipped == 7);
   CHECK(r.used == 4);
   for (const double x : {r.auc, r.brier, r.expected_calibration_error, r.largest_calibration_error, r.static_fraction})
@@ -139,11 +133,11 @@ TEMPLATE_TEST_CASE("Hostile probabilities and weights are skipped, and everythin
   for (const auto& bin : r.table)
     CHECK((cfp::is_finite(bin.weight) && bin.static_fraction >= 0 && bin.static_fraction <= 1));
 
-  const auto none = cfp::evaluate_calibration<10, TestType>({}, {}, {}, workspace);
+  const auto none = cfp::evaluate_calibration(std::vector<TestType>(), {}, {}, workspace);
   CHECK(none.status == cfp::Status::not_enough_data);
   CHECK(none.auc == 0.5);
   const Samples<TestType> one{{TestType(0.25)}, {}, {1}};
-  const auto single = cfp::evaluate_calibration(one.p(), one.y(), one.w(), workspace);
+  const auto single = cfp::evaluate_calibration(one.probability, one.is_static, one.weight, workspace);
   CHECK(single.status == cfp::Status::degenerate);
   CHECK(single.auc == 0.5);
   CHECK(single.brier == 0.5625);
@@ -153,7 +147,7 @@ TEST_CASE("A second evaluation of the same size allocates nothing", "[evaluation
   cfp::Random random(54, "allocation");
   const auto s = random_samples<float>(random, 500, 100, true);
   cfp::CalibrationWorkspace workspace;
-  const auto work = [&] { (void)cfp::evaluate_calibration(s.p(), s.y(), s.w(), workspace); };
+  const auto work = [&] { (void)cfp::evaluate_calibration(s.probability, s.is_static, s.weight, workspace); };
   work();
   CHECK(cfp_test::allocations_in(work) == 0);
 }

@@ -15,7 +15,6 @@
 namespace {
 
 using cfp_test::Trajectory;
-using cfp_test::view;
 
 /// The `name value unit` lines of the scripts' stored output, ATE's and RPE's keys apart by their names.
 std::map<std::string, double> expected_values(const std::filesystem::path& file) {
@@ -74,7 +73,7 @@ TEST_CASE("ATE and RPE equal the TUM scripts' output on fr3_walking_xyz", "[eval
   const auto expected = expected_values(folder / "expected_fr3_walking_xyz.txt");
   cfp::TrajectoryErrorWorkspace workspace;
 
-  const auto ate = cfp::absolute_trajectory_error(view(truth), view(estimate), {}, workspace);
+  const auto ate = cfp::absolute_trajectory_error(truth, estimate, {}, workspace);
   CHECK(ate.status == cfp::Status::ok);
   CHECK(static_cast<double>(ate.translation_m.count) == expected.at("compared_pose_pairs"));
   check(expected, "absolute_translational_error", ate.translation_m);
@@ -82,7 +81,7 @@ TEST_CASE("ATE and RPE equal the TUM scripts' output on fr3_walking_xyz", "[eval
   CHECK_THAT(ate.coverage.pose_fraction, WithinAbs(826.0 / 827, 1e-12));
   CHECK_THAT(ate.coverage.largest_gap_s, WithinAbs(0.069859, 1e-5));
 
-  const auto rpe = cfp::relative_pose_error(view(truth), view(estimate), {}, workspace);
+  const auto rpe = cfp::relative_pose_error(truth, estimate, {}, workspace);
   CHECK(rpe.status == cfp::Status::ok);
   CHECK(static_cast<double>(rpe.translation_m.count) == expected.at("compared_pose_pairs.rpe"));
   check(expected, "translational_error", rpe.translation_m);
@@ -101,7 +100,7 @@ TEMPLATE_TEST_CASE("A rigidly moved truth has no error after rigid alignment and
   for (const auto mode : {cfp::AlignmentMode::rigid, cfp::AlignmentMode::similarity, cfp::AlignmentMode::first_pose}) {
     cfp::AbsoluteErrorOptions options;
     options.alignment = mode;
-    const auto ate = cfp::absolute_trajectory_error(view(reference), view(estimate), options, workspace);
+    const auto ate = cfp::absolute_trajectory_error(reference, estimate, options, workspace);
     CAPTURE(to_string(ate.alignment));
     CHECK(ate.status == cfp::Status::ok);
     CHECK(ate.coverage.matched == 200);
@@ -110,7 +109,7 @@ TEMPLATE_TEST_CASE("A rigidly moved truth has no error after rigid alignment and
   }
   cfp::AbsoluteErrorOptions options;
   options.alignment = cfp::AlignmentMode::none;
-  const auto ate = cfp::absolute_trajectory_error(view(reference), view(estimate), options, workspace);
+  const auto ate = cfp::absolute_trajectory_error(reference, estimate, options, workspace);
   CHECK_THAT(ate.rotation_deg.mean, WithinAbs(0.5 * 180 / cfp::pi<double>, 100 * tolerance));
   for (std::size_t k = 0; k < truth.size(); ++k) {
     const auto& p = truth[k].T_world_cam.translation;
@@ -125,15 +124,14 @@ TEST_CASE("Only the similarity alignment removes a wrong scale", "[evaluation]")
   for (auto& pose : estimate) pose.T_world_cam.translation *= 0.5;
   cfp::TrajectoryErrorWorkspace workspace;
   cfp::AbsoluteErrorOptions options;
-  CHECK(cfp::absolute_trajectory_error(view(truth), view(estimate), options, workspace).translation_m.rmse > 0.05);
+  CHECK(cfp::absolute_trajectory_error(truth, estimate, options, workspace).translation_m.rmse > 0.05);
   options.alignment = cfp::AlignmentMode::similarity;
-  const auto ate = cfp::absolute_trajectory_error(view(truth), view(estimate), options, workspace);
+  const auto ate = cfp::absolute_trajectory_error(truth, estimate, options, workspace);
   CHECK_THAT(ate.translation_m.rmse, WithinAbs(0, 1e-12));
   CHECK_THAT(ate.S_truth_estimate.scale, WithinAbs(2, 1e-12));
   cfp::RelativeErrorOptions relative;
   relative.scale = 2;
-  CHECK_THAT(cfp::relative_pose_error(view(truth), view(estimate), relative, workspace).translation_m.rmse,
-             WithinAbs(0, 1e-12));
+  CHECK_THAT(cfp::relative_pose_error(truth, estimate, relative, workspace).translation_m.rmse, WithinAbs(0, 1e-12));
 }
 
 TEST_CASE("RPE in seconds and in frames equals the definition written with 4x4 matrices", "[evaluation]") {
@@ -146,7 +144,7 @@ TEST_CASE("RPE in seconds and in frames equals the definition written with 4x4 m
     cfp::RelativeErrorOptions options;
     options.unit = unit;
     options.delta = unit == cfp::DeltaUnit::seconds ? 2 : 8;
-    const auto rpe = cfp::relative_pose_error(view(truth), view(estimate), options, workspace);
+    const auto rpe = cfp::relative_pose_error(truth, estimate, options, workspace);
     REQUIRE(rpe.translation_m.count == expected.size());
     for (std::size_t k = 0; k < expected.size(); ++k) {
       CHECK(workspace.pose[k] == k);
@@ -161,8 +159,8 @@ TEST_CASE("Shuffled trajectories with duplicates and broken poses give the clean
   const auto truth = cfp_test::random_walk(random, 120, 50, 0.03);
   const auto estimate = cfp_test::disturbed(random, truth, 0.02);
   cfp::TrajectoryErrorWorkspace workspace;
-  const auto ate = cfp::absolute_trajectory_error(view(truth), view(estimate), {}, workspace);
-  const auto rpe = cfp::relative_pose_error(view(truth), view(estimate), {}, workspace);
+  const auto ate = cfp::absolute_trajectory_error(truth, estimate, {}, workspace);
+  const auto rpe = cfp::relative_pose_error(truth, estimate, {}, workspace);
   auto dirty = estimate;
   std::shuffle(dirty.begin(), dirty.end(), random);
   auto wrong = dirty[3];
@@ -170,10 +168,10 @@ TEST_CASE("Shuffled trajectories with duplicates and broken poses give the clean
   dirty.insert(dirty.begin(), wrong);  // an earlier line with a stamp that comes again
   wrong.time_s = std::numeric_limits<double>::quiet_NaN();
   dirty.push_back(wrong);
-  const auto dirty_ate = cfp::absolute_trajectory_error(view(truth), view(dirty), {}, workspace);
+  const auto dirty_ate = cfp::absolute_trajectory_error(truth, dirty, {}, workspace);
   CHECK(dirty_ate.translation_m.rmse == ate.translation_m.rmse);
   CHECK(dirty_ate.coverage.unusable == 2);
-  CHECK(cfp::relative_pose_error(view(truth), view(dirty), {}, workspace).rotation_deg.rmse == rpe.rotation_deg.rmse);
+  CHECK(cfp::relative_pose_error(truth, dirty, {}, workspace).rotation_deg.rmse == rpe.rotation_deg.rmse);
 }
 
 TEST_CASE("Coverage tells of lost frames, gaps and late starts", "[evaluation]") {
@@ -188,7 +186,7 @@ TEST_CASE("Coverage tells of lost frames, gaps and late starts", "[evaluation]")
   cfp::TrajectoryErrorWorkspace workspace;
   cfp::AbsoluteErrorOptions options;
   options.expected_poses = 101;
-  const auto coverage = cfp::absolute_trajectory_error(view(truth), view(estimate), options, workspace).coverage;
+  const auto coverage = cfp::absolute_trajectory_error(truth, estimate, options, workspace).coverage;
   CHECK(coverage.matched == 22);
   CHECK_THAT(coverage.pose_fraction, WithinAbs(22.0 / 101, 1e-12));
   CHECK_THAT(coverage.time_fraction, WithinAbs(0.4, 1e-12));
@@ -211,25 +209,25 @@ TEMPLATE_TEST_CASE("Hostile trajectories and options give finite results and a s
                               cfp::AlignmentMode::similarity}) {
         cfp::AbsoluteErrorOptions options;
         options.alignment = mode;
-        const auto ate = cfp::absolute_trajectory_error(view(a), view(b), options, workspace);
+        const auto ate = cfp::absolute_trajectory_error(a, b, options, workspace);
         for (const double x : {ate.translation_m.rmse, ate.translation_m.mean, ate.rotation_deg.rmse,
                                ate.coverage.largest_gap_s, ate.coverage.time_fraction}) {
           CHECK(cfp::is_finite(x));
         }
         CHECK((ate.status == cfp::Status::not_enough_data) == (ate.coverage.matched == 0));
       }
-      const auto rpe = cfp::relative_pose_error(view(a), view(b), {}, workspace);
+      const auto rpe = cfp::relative_pose_error(a, b, {}, workspace);
       CHECK(cfp::is_finite(rpe.translation_m.rmse));
       CHECK(cfp::is_finite(rpe.rotation_deg.rmse));
     }
   }
   cfp::RelativeErrorOptions options;
   options.delta = std::numeric_limits<double>::quiet_NaN();
-  CHECK(cfp::relative_pose_error(view(one), view(one), options, workspace).status == cfp::Status::invalid_input);
+  CHECK(cfp::relative_pose_error(one, one, options, workspace).status == cfp::Status::invalid_input);
   CHECK(invalid_field(options).string() == "delta");
   cfp::AbsoluteErrorOptions absolute;
   absolute.association.max_difference_s = -1;
-  CHECK(cfp::absolute_trajectory_error(view(one), view(one), absolute, workspace).status == cfp::Status::invalid_input);
+  CHECK(cfp::absolute_trajectory_error(one, one, absolute, workspace).status == cfp::Status::invalid_input);
 }
 
 TEST_CASE("Both errors allocate nothing the second time", "[evaluation]") {
@@ -238,8 +236,8 @@ TEST_CASE("Both errors allocate nothing the second time", "[evaluation]") {
              estimate = cfp_test::random_walk(random, 100, 0, 0.03);
   cfp::TrajectoryErrorWorkspace workspace;
   const auto work = [&] {
-    (void)cfp::absolute_trajectory_error(view(truth), view(estimate), {}, workspace);
-    (void)cfp::relative_pose_error(view(truth), view(estimate), {}, workspace);
+    (void)cfp::absolute_trajectory_error(truth, estimate, {}, workspace);
+    (void)cfp::relative_pose_error(truth, estimate, {}, workspace);
   };
   work();
   CHECK(cfp_test::allocations_in(work) == 0);

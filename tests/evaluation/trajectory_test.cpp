@@ -11,7 +11,6 @@
 namespace {
 
 using cfp_test::Trajectory;
-using cfp_test::view;
 
 Trajectory<double> at(const std::vector<double>& stamps) {
   Trajectory<double> poses;
@@ -55,7 +54,7 @@ TEMPLATE_TEST_CASE("time_order sorts, keeps the last of equal stamps and drops b
   poses[6].T_world_cam.translation.x() = std::numeric_limits<TestType>::infinity();
   poses[7].T_world_cam.rotation(1, 1) = std::numeric_limits<TestType>::quiet_NaN();
   std::vector<std::size_t> order;
-  cfp::time_order(view(poses), order);
+  cfp::time_order(poses, order);
   CHECK(order == std::vector<std::size_t>{3, 2, 0});
 }
 
@@ -77,7 +76,7 @@ TEST_CASE("Association equals the TUM script's, ties and offsets included", "[ev
     const double offset = grid ? random.index(5) * 0.5 - 1 : 0;
     const double max_difference = grid ? random.index(8) * 0.25 + 0.25 : random.uniform(0, 2);
     const auto first = at(a), second = at(b);
-    cfp::associate(view(first), view(second), {max_difference, offset}, workspace, matches);
+    cfp::associate(first, second, {max_difference, offset}, workspace, matches);
     std::vector<std::pair<double, double>> found;
     for (const auto& m : matches) found.emplace_back(first[m.first].time_s, second[m.second].time_s);
     REQUIRE(found == associate_by_brute_force(a, b, offset, max_difference));
@@ -90,12 +89,12 @@ TEST_CASE("Association does not depend on the order of the arrays", "[evaluation
        second = cfp_test::random_walk(random, 100, 1.3e9, 0.03);
   cfp::AssociationWorkspace workspace;
   std::vector<cfp::TimeMatch> matches, shuffled_matches;
-  cfp::associate(view(first), view(second), {}, workspace, matches);
+  cfp::associate(first, second, {}, workspace, matches);
   std::vector<std::pair<double, double>> expected, found;
   for (const auto& m : matches) expected.emplace_back(first[m.first].time_s, second[m.second].time_s);
   std::shuffle(first.begin(), first.end(), random);
   std::shuffle(second.begin(), second.end(), random);
-  cfp::associate(view(first), view(second), {}, workspace, shuffled_matches);
+  cfp::associate(first, second, {}, workspace, shuffled_matches);
   for (const auto& m : shuffled_matches) found.emplace_back(first[m.first].time_s, second[m.second].time_s);
   CHECK(expected.size() > 90);
   CHECK(found == expected);
@@ -105,15 +104,15 @@ TEST_CASE("Association with nothing, one pose or absurd options ends and matches
   cfp::AssociationWorkspace workspace;
   std::vector<cfp::TimeMatch> matches;
   const auto none = at({}), one = at({1}), far = at({-1e308, 1e308});
-  cfp::associate(view(none), view(one), {}, workspace, matches);
+  cfp::associate(none, one, {}, workspace, matches);
   CHECK(matches.empty());
-  cfp::associate(view(one), view(none), {}, workspace, matches);
+  cfp::associate(one, none, {}, workspace, matches);
   CHECK(matches.empty());
-  cfp::associate(view(one), view(one), {}, workspace, matches);
+  cfp::associate(one, one, {}, workspace, matches);
   CHECK(matches.size() == 1);
-  cfp::associate(view(far), view(far), {std::numeric_limits<double>::infinity(), 0}, workspace, matches);
+  cfp::associate(far, far, {std::numeric_limits<double>::infinity(), 0}, workspace, matches);
   CHECK(matches.size() == 2);
-  cfp::associate(view(one), view(one), {std::numeric_limits<double>::quiet_NaN(), 0}, workspace, matches);
+  cfp::associate(one, one, {std::numeric_limits<double>::quiet_NaN(), 0}, workspace, matches);
   CHECK(matches.empty());
   CHECK(invalid_field(cfp::AssociationOptions{0, 0}).string() == "max_difference_s");
   CHECK(invalid_field(cfp::AssociationOptions{1, std::numeric_limits<double>::infinity()}).string() == "offset_s");
@@ -125,7 +124,7 @@ TEST_CASE("A second association of the same size allocates nothing", "[evaluatio
   const auto first = cfp_test::random_walk(random, 300, 0, 0.01), second = cfp_test::random_walk(random, 100, 0, 0.03);
   cfp::AssociationWorkspace workspace;
   std::vector<cfp::TimeMatch> matches;
-  const auto work = [&] { cfp::associate(view(first), view(second), {}, workspace, matches); };
+  const auto work = [&] { cfp::associate(first, second, {}, workspace, matches); };
   work();
   CHECK(cfp_test::allocations_in(work) == 0);
 }

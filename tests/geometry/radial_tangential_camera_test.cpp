@@ -1,6 +1,7 @@
 #include "cfp/geometry/radial_tangential_camera.hpp"
 
 #include <cmath>
+#include <limits>
 
 #include "cfp/core/random.hpp"
 #include "support/catch.hpp"
@@ -85,4 +86,37 @@ TEST_CASE("stays_positive agrees with sampling the polynomial", "[geometry]") {
   }
   CHECK(positive > 5000);
   CHECK(positive < 19000);
+}
+
+TEMPLATE_TEST_CASE("Coefficients that are not finite give no ray, at the principal point neither", "[geometry]", float,
+                   double) {
+  using T = TestType;
+  const cfp::RadialTangentialCamera<T> good{T(500),  T(500),   T(320),   T(240), T(0.1),
+                                            T(-0.2), T(0.001), T(0.002), T(0.05)};
+  for (const T bad :
+       {std::numeric_limits<T>::quiet_NaN(), std::numeric_limits<T>::infinity(), -std::numeric_limits<T>::infinity()}) {
+    for (T cfp::RadialTangentialCamera<T>::*field :
+         {&cfp::RadialTangentialCamera<T>::k1, &cfp::RadialTangentialCamera<T>::k2, &cfp::RadialTangentialCamera<T>::p1,
+          &cfp::RadialTangentialCamera<T>::p2, &cfp::RadialTangentialCamera<T>::k3, &cfp::RadialTangentialCamera<T>::fx,
+          &cfp::RadialTangentialCamera<T>::fy, &cfp::RadialTangentialCamera<T>::cx,
+          &cfp::RadialTangentialCamera<T>::cy}) {
+      cfp::RadialTangentialCamera<T> camera = good;
+      camera.*field = bad;
+      const bool infinite_focal =
+          (field == &cfp::RadialTangentialCamera<T>::fx || field == &cfp::RadialTangentialCamera<T>::fy) &&
+          !std::isnan(bad);
+      for (const cfp::Vector2<T>& pixel : {cfp::Vector2<T>(320, 240), cfp::Vector2<T>(100, 400)}) {
+        cfp::Vector3<T> ray(7, 8, 9);
+        const bool valid = camera.unproject(pixel, ray);
+        if (infinite_focal) {  // the limit of a long lens: every pixel on the axis
+          CHECK((!valid || ray.allFinite()));
+        } else {
+          CHECK_FALSE(valid);
+        }
+        if (!valid) CHECK(ray == cfp::Vector3<T>(7, 8, 9));
+      }
+    }
+  }
+  cfp::Vector3<T> ray;
+  CHECK(good.unproject({T(320), T(240)}, ray));
 }

@@ -165,3 +165,39 @@ TEST_CASE("normalized_rotation removes drift", "[math]") {
   CHECK_THAT((back * back.transpose() - Matrix3<double>::Identity()).norm(), WithinAbs(0, 1e-14));
   CHECK_THAT((back - R).norm(), WithinAbs(0, 1e-4));
 }
+
+TEMPLATE_TEST_CASE("SE3 from a homogeneous matrix, from a quaternion of any length, and cast", "[math]", float,
+                   double) {
+  using T = TestType;
+  const T tolerance = 16 * std::numeric_limits<T>::epsilon();
+  cfp::Random random(21, "SE3 from");
+  for (int round = 0; round < 200; ++round) {
+    cfp::Vector3<T> axis, t;
+    for (int c = 0; c < 3; ++c) {
+      axis[c] = static_cast<T>(random.uniform(-1, 1));
+      t[c] = static_cast<T>(random.uniform(-9, 9));
+    }
+    axis.normalize();
+    const T angle = static_cast<T>(random.uniform(-3.1, 3.1)), length = static_cast<T>(random.uniform(0.1, 10));
+    cfp::Vector4<T> q;
+    q.template head<3>() = length * std::sin(angle / 2) * axis;
+    q[3] = length * std::cos(angle / 2);
+    const cfp::SE3<T> pose = cfp::SE3<T>::from_quaternion(q, t);
+    CHECK((pose.rotation - cfp::so3_exp(cfp::Vector3<T>(angle * axis))).norm() < tolerance);
+    CHECK(pose.translation == t);
+    CHECK((cfp::SE3<T>::from_quaternion(cfp::Vector4<T>(-q), t).rotation - pose.rotation).norm() < tolerance);
+
+    const cfp::SE3<T> again = cfp::SE3<T>::from_matrix(pose.matrix());
+    CHECK(again.rotation == pose.rotation);
+    CHECK(again.translation == pose.translation);
+    CHECK(pose.matrix().row(3) == cfp::Vector4<T>::Unit(3).transpose());
+
+    const cfp::SE3<double> wide = pose.template cast<double>();
+    CHECK(wide.rotation(0, 1) == static_cast<double>(pose.rotation(0, 1)));
+    CHECK(wide.translation[2] == static_cast<double>(pose.translation[2]));
+    const cfp::SE3<T> back = wide.template cast<T>();
+    CHECK(back.rotation == pose.rotation);
+    CHECK(back.translation == pose.translation);
+  }
+  CHECK(!(cfp::SE3<T>::from_quaternion(cfp::Vector4<T>::Zero(), cfp::Vector3<T>::Zero()).rotation.norm() >= 0));
+}

@@ -29,8 +29,17 @@ TEST_CASE("AUC follows the order of the scores only", "[properties]") {
     }
     cfp::CalibrationWorkspace workspace;
     const auto auc = [&](const std::vector<double>& s, const std::vector<char>& l) {
-      return cfp::area_under_curve<double>(s, l, {}, workspace).auc;
+      return cfp::roc_auc(s, l, {}, workspace).auc;
     };
+    double wins = 0, pairs = 0;
+    for (std::size_t i = 0; i < grid.size(); ++i) {
+      for (std::size_t j = 0; j < grid.size(); ++j) {
+        if (y[i] == 0 || y[j] != 0) continue;
+        pairs += 1;
+        wins += grid[i] > grid[j] ? 1 : grid[i] == grid[j] ? 0.5 : 0;
+      }
+    }
+    RC_ASSERT(std::abs(auc(scores, y) - (pairs > 0 ? wins / pairs : 0.5)) < 1e-12);
     RC_ASSERT(std::abs(auc(scores, y) - auc(grown, y)) < 1e-12);
     RC_ASSERT(std::abs(auc(scores, y) + auc(fallen, y) - 1) < 1e-12);
     RC_ASSERT(std::abs(auc(scores, y) + auc(scores, opposite) - 1) < 1e-12);
@@ -38,17 +47,35 @@ TEST_CASE("AUC follows the order of the scores only", "[properties]") {
 }
 
 TEST_CASE("Calibration of any doubles is finite and in range", "[properties]") {
-  rc::prop("every figure stays in its documented range; used + skipped + weightless = n", [] {
-    const auto p = *rc::gen::arbitrary<std::vector<double>>();
-    const auto w = *rc::gen::container<std::vector<double>>(p.size(), rc::gen::arbitrary<double>());
+  rc::prop("every figure stays in its documented range; every sample is used, skipped or without weight", [] {
+    const auto number = rc::gen::oneOf(rc::gen::map(rc::gen::inRange(0, 1001), [](int i) { return i / 1000.0; }),
+                                       rc::gen::element(0.0, 1.0, -0.0, 1.0 + 1e-15, std::nan(""), HUGE_VAL, 5e-324),
+                                       rc::gen::arbitrary<double>());
+    const auto p = *rc::gen::container<std::vector<double>>(number);
+    const auto w = *rc::gen::container<std::vector<double>>(p.size(), number);
     cfp::CalibrationWorkspace workspace;
     const std::vector<char> y = labels(p.size());
-    const auto r = cfp::evaluate_calibration<7, double>(p, y, w, workspace);
+    const auto r = cfp::evaluate_calibration<7>(p, y, w, workspace);
     for (const double x :
          {r.auc, r.brier, r.expected_calibration_error, r.largest_calibration_error, r.static_fraction}) {
       RC_ASSERT(x >= 0 && x <= 1);
     }
     RC_ASSERT(r.log_loss >= 0 && r.log_loss < 35);
-    RC_ASSERT(r.used + r.skipped <= p.size());
+    std::size_t used = 0, skipped = 0, in_bins = 0;
+    long double weight = 0, brier = 0, moving = 0;
+    for (std::size_t i = 0; i < p.size(); ++i) {
+      const bool valid = p[i] >= 0 && p[i] <= 1 && w[i] >= 0 && std::isfinite(w[i]);
+      skipped += valid ? 0U : 1U;
+      if (!valid || w[i] == 0) continue;
+      ++used;
+      const long double error = static_cast<long double>(p[i]) - (y[i] != 0 ? 1 : 0);
+      weight += w[i], brier += w[i] * error * error, moving += y[i] != 0 ? 0 : w[i];
+    }
+    for (const auto& bin : r.table) in_bins += bin.count;
+    RC_ASSERT(r.used == used && r.skipped == skipped && in_bins == used);
+    RC_ASSERT((r.status == cfp::Status::not_enough_data) == (used == 0));
+    if (used == 0) return;
+    RC_ASSERT(std::abs(r.brier - static_cast<double>(brier / weight)) < 1e-9);
+    RC_ASSERT(std::abs(1 - r.static_fraction - static_cast<double>(moving / weight)) < 1e-9);
   });
 }

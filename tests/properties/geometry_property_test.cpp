@@ -50,8 +50,18 @@ TEST_CASE("properties of epipolar distances", "[properties]") {
     RC_ASSERT(camera.unproject(prev, ray));
     RC_PRE(camera.project(T * Vector3<double>(ray * real(0.5, 50)), cur));
     RC_PRE(cur.norm() < 1e4);
-    const double d = cfp::epipolar_distance(cfp::fundamental_from_pose(camera, T), prev, cur);
-    RC_ASSERT(d == cfp::no_distance<double> || d < 1e-6);
+    const cfp::Matrix3<double> F = cfp::fundamental_from_pose(camera, T);
+    // A pixel away from the epipole, where the camera stands, has a line.
+    Vector2<double> epipole = Vector2<double>::Zero();
+    const Vector3<double> centre = T.inverse().translation;
+    const bool in_front = camera.project(centre, epipole) || camera.project(Vector3<double>(-centre), epipole);
+    RC_PRE(in_front && (epipole - prev).norm() > 1);
+    const double d = cfp::epipolar_distance(F, prev, cur);
+    RC_ASSERT(cfp::has_distance(d) && d < 1e-6);
+    const double away = real(-30, 30);
+    const Vector2<double> normal = cfp::epipolar_line(F, prev).head<2>().normalized();
+    const double moved = cfp::epipolar_distance(F, prev, Vector2<double>(cur + away * normal));
+    RC_ASSERT(std::abs(moved - std::abs(away)) < 1e-6);
   });
   rc::prop("moving the current pixel moves the distance by at most as much", [] {
     const cfp::Matrix3<double> F = cfp::fundamental_from_pose(camera, cfp::se3_exp(tangent(0.5, 0.3)));
@@ -125,8 +135,18 @@ TEST_CASE("properties of boxes and of the distorted camera", "[properties]") {
     const Vector2<double> pixel(real(-100, 740), real(-100, 580));
     Vector3<double> ray = Vector3<double>::Zero();
     Vector2<double> back = Vector2<double>::Zero();
-    if (!lens.unproject(pixel, ray)) return;
+    if (!lens.unproject(pixel, ray)) return;  // beyond the fold of a strong lens
     RC_ASSERT(lens.project(ray, back));
     RC_ASSERT((back - pixel).norm() < 1e-9);
+  });
+  rc::prop("the pixel that project gives unprojects to its ray, for any lens a photographer would buy", [] {
+    const cfp::RadialTangentialCamera<double> lens{
+        500, 500, 320, 240, real(-0.1, 0.3), real(-0.05, 0.05), real(-0.003, 0.003), real(-0.003, 0.003), 0};
+    const Vector3<double> point(real(-0.6, 0.6), real(-0.45, 0.45), 1);
+    Vector3<double> ray = Vector3<double>::Zero();
+    Vector2<double> pixel = Vector2<double>::Zero();
+    RC_ASSERT(lens.project(point, pixel));
+    RC_ASSERT(lens.unproject(pixel, ray));
+    RC_ASSERT((ray - point).norm() < 1e-9);
   });
 }

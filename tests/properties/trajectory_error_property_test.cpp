@@ -7,8 +7,6 @@
 
 namespace {
 
-using cfp_test::view;
-
 struct Case {
   cfp_test::Trajectory<double> truth, estimate;
   cfp::SE3<double> T_new_world;
@@ -32,11 +30,9 @@ TEST_CASE("ATE after rigid alignment does not depend on either world frame", "[p
     cfp::RelativeErrorOptions relative;
     relative.delta = 0.1;
     const auto ate = [&](const auto& a, const auto& b) {
-      return cfp::absolute_trajectory_error(view(a), view(b), {}, workspace).translation_m.rmse;
+      return cfp::absolute_trajectory_error(a, b, {}, workspace).translation_m.rmse;
     };
-    const auto rpe = [&](const auto& a, const auto& b) {
-      return cfp::relative_pose_error(view(a), view(b), relative, workspace);
-    };
+    const auto rpe = [&](const auto& a, const auto& b) { return cfp::relative_pose_error(a, b, relative, workspace); };
     const auto truth = cfp_test::moved(c.T_new_world, c.truth), estimate = cfp_test::moved(c.T_new_world, c.estimate);
     RC_ASSERT(std::abs(ate(c.truth, c.estimate) - ate(c.truth, estimate)) < 1e-9);
     RC_ASSERT(std::abs(ate(c.truth, c.estimate) - ate(truth, c.estimate)) < 1e-9);
@@ -54,13 +50,13 @@ TEST_CASE("More freedom of alignment never raises ATE, and truth and estimate ma
     const auto ate = [&](cfp::AlignmentMode mode) {
       cfp::AbsoluteErrorOptions options;
       options.alignment = mode;
-      return cfp::absolute_trajectory_error(view(c.truth), view(c.estimate), options, workspace).translation_m.rmse;
+      return cfp::absolute_trajectory_error(c.truth, c.estimate, options, workspace).translation_m.rmse;
     };
     const double rigid = ate(cfp::AlignmentMode::rigid);
     RC_ASSERT(rigid <= ate(cfp::AlignmentMode::none) + 1e-12);
     RC_ASSERT(rigid <= ate(cfp::AlignmentMode::first_pose) + 1e-12);
     RC_ASSERT(ate(cfp::AlignmentMode::similarity) <= rigid + 1e-12);
-    const auto swapped = cfp::absolute_trajectory_error(view(c.estimate), view(c.truth), {}, workspace);
+    const auto swapped = cfp::absolute_trajectory_error(c.estimate, c.truth, {}, workspace);
     RC_ASSERT(std::abs(swapped.translation_m.rmse - rigid) < 1e-9);
   });
 }

@@ -32,15 +32,14 @@ inline cfp::SE3<double> fake_truth(double t) {
 }
 
 inline void evaluate(cfp_slam::RunRecord& run) {
-  using View = cfp::span<const cfp::StampedPose<double>>;
   const auto estimate = run.trajectory();
   cfp::TrajectoryErrorWorkspace workspace;
   cfp::AbsoluteErrorOptions absolute;
   absolute.expected_poses = run.frames.size();
-  run.absolute = cfp::absolute_trajectory_error(View(run.truth), View(estimate), absolute, workspace);
+  run.absolute = cfp::absolute_trajectory_error(run.truth, estimate, absolute, workspace);
   cfp::RelativeErrorOptions relative;
   relative.expected_poses = run.frames.size();
-  run.relative = cfp::relative_pose_error(View(run.truth), View(estimate), relative, workspace);
+  run.relative = cfp::relative_pose_error(run.truth, estimate, relative, workspace);
 }
 
 inline void fake_boxes(const FakeRun& fake, std::size_t k, cfp::Random& random, cfp_slam::RunFrame& frame,

@@ -11,11 +11,6 @@ namespace cfp_test {
 template <typename Scalar>
 using Trajectory = std::vector<cfp::StampedPose<Scalar>>;
 
-template <typename Scalar>
-cfp::span<const cfp::StampedPose<Scalar>> view(const Trajectory<Scalar>& trajectory) {
-  return trajectory;
-}
-
 inline cfp::Vector3<double> random_vector(cfp::Random& random, double size) {
   return {random.uniform(-size, size), random.uniform(-size, size), random.uniform(-size, size)};
 }

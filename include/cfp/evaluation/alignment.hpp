@@ -10,8 +10,8 @@
 
 #include <Eigen/Core>
 
+#include "cfp/core/assert.hpp"
 #include "cfp/core/numeric.hpp"
-#include "cfp/core/span.hpp"
 #include "cfp/core/status.hpp"
 #include "cfp/core/types.hpp"
 #include "cfp/math/matrix3.hpp"
@@ -64,38 +64,34 @@ inline namespace CFP_ISA {
 /// argmin over (s, R, t) of sum |to_i − (s R from_i + t)|², s = 1 unless with_scale. With the centred points a_i (from)
 /// and b_i (to) and the SVD sum b_i a_iᵀ = U D Vᵀ, U and V rotations and the last singular value signed: R = U Vᵀ,
 /// s = tr(D) / sum |a_i|², t = mean(to) − s R mean(from). The scale is that of Umeyama, not the symmetric one of Horn.
+/// `from` and `to` are arrays of 3-vectors with size() and []: a std::vector, a PointSpan.
 /// Points are scaled by their largest coordinate first, so that no finite input overflows. Allocates nothing.
 ///
 /// Degenerate input: no finite pair → identity and not_enough_data. Points that do not fix the rotation (fewer than
 /// three, or on one line) → one of the minimisers, a proper rotation, and degenerate; a scale that is not determined
 /// (all of `from` equal) or zero (all of `to` equal) is 1. Source: Umeyama, "Least-squares estimation of transformation
 /// parameters between two point patterns", PAMI 1991, eqs. (34)–(43).
-template <typename Scalar>
-[[nodiscard]] AlignmentResult align_points(PointSpan<Scalar, 3> from, PointSpan<Scalar, 3> to,
-                                           bool with_scale = false) noexcept {
+template <typename From, typename To>
+[[nodiscard]] AlignmentResult align_points(const From& from, const To& to, bool with_scale = false) noexcept {
   CFP_ASSERT(from.size() == to.size());
-  const auto finite = [&](std::size_t i) {
-    for (int c = 0; c < 3; ++c) {
-      if (!is_finite(from(i, c)) || !is_finite(to(i, c))) return false;
-    }
-    return true;
+  const auto largest = [](const auto& points, std::size_t i) {
+    return points[i].template cast<double>().template lpNorm<Eigen::Infinity>();
   };
+  const auto finite = [&](std::size_t i) { return from[i].allFinite() && to[i].allFinite(); };
   AlignmentResult result;
   double from_size = 0, to_size = 0;
   for (std::size_t i = 0; i < from.size(); ++i) {
     if (!finite(i)) continue;
     ++result.used;
-    for (int c = 0; c < 3; ++c) {
-      from_size = (std::max)(from_size, std::abs(static_cast<double>(from(i, c))));
-      to_size = (std::max)(to_size, std::abs(static_cast<double>(to(i, c))));
-    }
+    from_size = (std::max)(from_size, largest(from, i));
+    to_size = (std::max)(to_size, largest(to, i));
   }
   result.skipped = from.size() - result.used;
   if (result.used == 0) return result;
 
   // A common unit keeps a rigid motion rigid; the product with 1/unit would overflow for a subnormal unit, so divide.
   const double unit = (std::max)((std::max)(from_size, to_size), (std::numeric_limits<double>::min)());
-  const auto scaled = [unit](const PointSpan<Scalar, 3>& points, std::size_t i) -> Vector3<double> {
+  const auto scaled = [unit](const auto& points, std::size_t i) -> Vector3<double> {
     return points[i].template cast<double>() / unit;
   };
   const double n = static_cast<double>(result.used);

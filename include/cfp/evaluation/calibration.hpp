@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "cfp/core/numeric.hpp"
+#include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/status.hpp"
 
@@ -37,9 +38,54 @@ struct AucResult {
   Status status = Status::not_enough_data;  ///< degenerate: only one of the classes has weight
 };
 
-namespace detail {
+/// One row of the reliability table. Bin b holds probabilities in [b / n, (b + 1) / n), the last one 1 as well.
+struct ReliabilityBin {
+  std::size_t count = 0;
+  double weight = 0;            ///< sum of the weights; count without weights
+  double mean_probability = 0;  ///< 0 for an empty bin
+  double static_fraction = 0;   ///< of the weight; a calibrated model has it equal to mean_probability
+};
 
+template <std::size_t Bins>
+struct CalibrationResult {
+  double auc = 0.5;  ///< see roc_auc
+  double brier = 0;  ///< sum w (p − y)² / sum w, y = 1 for static, in [0, 1]
+  /// −sum w (y ln p + (1 − y) ln(1 − p)) / sum w, nats; p kept in [1e-15, 1 − 1e-15], so at most 34.54
+  double log_loss = 0;
+  /// sum over bins of (weight / total) |static_fraction − mean_probability|, in [0, 1]
+  double expected_calibration_error = 0;
+  /// the largest |static_fraction − mean_probability| of a bin that is not empty
+  double largest_calibration_error = 0;
+  double static_fraction = 0;  ///< of the total weight
+  std::array<ReliabilityBin, Bins> table{};
+  std::size_t used = 0;                     ///< samples of positive weight
+  std::size_t skipped = 0;                  ///< probability not in [0, 1] or NaN; weight negative or not finite
+  Status status = Status::not_enough_data;  ///< degenerate: only one of the classes, auc is 0.5 and the rest valid
+};
+
+namespace detail {
 inline namespace CFP_ISA {
+
+/// Fills `ranked` with the samples of positive weight whose score lies in [lowest, highest], and result but for the
+/// ranking; returns the largest weight.
+template <typename Scalar, typename Result>
+double gather(span<const Scalar> scores, span<const char> is_static, span<const Scalar> weights, double lowest,
+              double highest, std::vector<RankedLabel>& ranked, Result& result) {
+  CFP_ASSERT(scores.size() == is_static.size() && (weights.empty() || weights.size() == scores.size()));
+  ranked.clear();
+  double largest_weight = 0;
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    const double score = static_cast<double>(scores[i]);
+    const double weight = weights.empty() ? 1 : static_cast<double>(weights[i]);
+    if (!(score >= lowest && score <= highest) || !non_negative(weight)) {
+      ++result.skipped;
+    } else if (weight > 0) {
+      ranked.push_back({score, weight, is_static[i] != 0});
+      largest_weight = (std::max)(largest_weight, weight);
+    }
+  }
+  return largest_weight;
+}
 
 /// Fills all of result but skipped from ranked, which it sorts. Works with weights relative to the largest, so that
 /// neither the sums nor their product can overflow.
@@ -65,85 +111,36 @@ inline void rank(std::vector<RankedLabel>& ranked, double largest_weight, AucRes
 }
 
 }  // namespace CFP_ISA
-
 }  // namespace detail
 
 inline namespace CFP_ISA {
 
-/// weights may be empty (all 1); equal lengths otherwise. Any finite scores, not only probabilities. O(n log n);
-/// allocates in the workspace on first use only.
-template <typename Scalar>
-[[nodiscard]] AucResult area_under_curve(span<const Scalar> scores, span<const char> is_static,
-                                         span<const Scalar> weights, CalibrationWorkspace& workspace) {
-  CFP_ASSERT(scores.size() == is_static.size() && (weights.empty() || weights.size() == scores.size()));
+/// Arrays of one length; weights may be empty (all 1). Any finite scores, not only probabilities. O(n log n); allocates
+/// in the workspace on first use only.
+template <typename Scores>
+[[nodiscard]] AucResult roc_auc(const Scores& scores, span<const char> is_static,
+                                span<const range_value_t<Scores>> weights, CalibrationWorkspace& workspace) {
   AucResult result;
-  workspace.ranked.clear();
-  double largest_weight = 0;
-  for (std::size_t i = 0; i < scores.size(); ++i) {
-    const double weight = weights.empty() ? 1 : static_cast<double>(weights[i]);
-    if (!is_finite(scores[i]) || !(weight >= 0) || !is_finite(weight)) {
-      ++result.skipped;
-    } else if (weight > 0) {
-      workspace.ranked.push_back({static_cast<double>(scores[i]), weight, is_static[i] != 0});
-      largest_weight = (std::max)(largest_weight, weight);
-    }
-  }
+  const double largest = (std::numeric_limits<double>::max)();
+  const double largest_weight = detail::gather(span<const range_value_t<Scores>>(scores), is_static, weights, -largest,
+                                               largest, workspace.ranked, result);
   detail::rank(workspace.ranked, largest_weight, result);
   return result;
 }
-
-}  // namespace CFP_ISA
-
-/// One row of the reliability table. Bin b holds probabilities in [b / n, (b + 1) / n), the last one 1 as well.
-struct ReliabilityBin {
-  std::size_t count = 0;
-  double weight = 0;            ///< sum of the weights; count without weights
-  double mean_probability = 0;  ///< 0 for an empty bin
-  double static_fraction = 0;   ///< of the weight; a calibrated model has it equal to mean_probability
-};
-
-template <std::size_t Bins>
-struct CalibrationResult {
-  double auc = 0.5;  ///< see area_under_curve
-  double brier = 0;  ///< sum w (p − y)² / sum w, y = 1 for static, in [0, 1]
-  /// −sum w (y ln p + (1 − y) ln(1 − p)) / sum w, nats; p kept in [1e-15, 1 − 1e-15], so at most 34.54
-  double log_loss = 0;
-  /// sum over bins of (weight / total) |static_fraction − mean_probability|, in [0, 1]
-  double expected_calibration_error = 0;
-  /// the largest |static_fraction − mean_probability| of a bin that is not empty
-  double largest_calibration_error = 0;
-  double static_fraction = 0;  ///< of the total weight
-  std::array<ReliabilityBin, Bins> table{};
-  std::size_t used = 0;                     ///< samples of positive weight
-  std::size_t skipped = 0;                  ///< probability not in [0, 1] or NaN; weight negative or not finite
-  Status status = Status::not_enough_data;  ///< degenerate: only one of the classes, auc is 0.5 and the rest valid
-};
-
-inline namespace CFP_ISA {
 
 /// All of the above for probabilities in [0, 1]; weights may be empty. No usable sample → zeros, auc 0.5,
 /// not_enough_data. O(n log n); allocates in the workspace on first use only. Sources: Brier, "Verification of
 /// forecasts expressed in terms of probability", 1950; Guo et al., "On calibration of modern neural networks", ICML
 /// 2017 (ECE, equally wide bins).
-template <std::size_t Bins = 10, typename Scalar>
-[[nodiscard]] CalibrationResult<Bins> evaluate_calibration(span<const Scalar> static_probability,
-                                                           span<const char> is_static, span<const Scalar> weights,
+template <std::size_t Bins = 10, typename Probabilities>
+[[nodiscard]] CalibrationResult<Bins> evaluate_calibration(const Probabilities& static_probability,
+                                                           span<const char> is_static,
+                                                           span<const range_value_t<Probabilities>> weights,
                                                            CalibrationWorkspace& workspace) {
   static_assert(Bins > 0, "the reliability table needs a bin");
-  CFP_ASSERT(static_probability.size() == is_static.size() && (weights.empty() || weights.size() == is_static.size()));
   CalibrationResult<Bins> result;
-  workspace.ranked.clear();
-  double largest_weight = 0;
-  for (std::size_t i = 0; i < is_static.size(); ++i) {
-    const double p = static_cast<double>(static_probability[i]);
-    const double weight = weights.empty() ? 1 : static_cast<double>(weights[i]);
-    if (!(p >= 0 && p <= 1) || !(weight >= 0) || !is_finite(weight)) {
-      ++result.skipped;
-    } else if (weight > 0) {
-      workspace.ranked.push_back({p, weight, is_static[i] != 0});
-      largest_weight = (std::max)(largest_weight, weight);
-    }
-  }
+  const double largest_weight = detail::gather(span<const range_value_t<Probabilities>>(static_probability), is_static,
+                                               weights, 0.0, 1.0, workspace.ranked, result);
   double total = 0;
   std::array<double, Bins> static_weight{};
   for (const RankedLabel& sample : workspace.ranked) {
@@ -183,5 +180,4 @@ template <std::size_t Bins = 10, typename Scalar>
 }
 
 }  // namespace CFP_ISA
-
 }  // namespace cfp

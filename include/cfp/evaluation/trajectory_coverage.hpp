@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <limits>
 
+#include "cfp/core/span.hpp"
 #include "cfp/evaluation/trajectory.hpp"
 
 namespace cfp {
@@ -26,9 +27,8 @@ inline namespace CFP_ISA {
 /// Coverage of the matches (first = truth, second = estimate), which are in order of time; the orders are those of
 /// time_order. expected_poses 0 stands for all usable estimated poses. Without a match all fractions and times are 0;
 /// times saturate at the largest double. O(matches), allocates nothing.
-template <typename Scalar>
-[[nodiscard]] TrajectoryCoverage trajectory_coverage(span<const StampedPose<Scalar>> truth,
-                                                     span<const StampedPose<Scalar>> estimate,
+template <typename Truth, typename Estimate>
+[[nodiscard]] TrajectoryCoverage trajectory_coverage(const Truth& truth, const Estimate& estimate,
                                                      span<const std::size_t> truth_order,
                                                      span<const std::size_t> estimate_order,
                                                      span<const TimeMatch> matches, std::size_t expected_poses,
@@ -56,5 +56,4 @@ template <typename Scalar>
 }
 
 }  // namespace CFP_ISA
-
 }  // namespace cfp

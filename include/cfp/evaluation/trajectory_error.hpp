@@ -28,14 +28,6 @@ struct AbsoluteErrorOptions {
   std::size_t expected_poses = 0;  ///< frames the estimate should have; 0: as many as it has usable poses
 };
 
-inline namespace CFP_ISA {
-
-[[nodiscard]] inline OptionPath invalid_field(const AbsoluteErrorOptions& options) noexcept {
-  return nested("association", invalid_field(options.association));
-}
-
-}  // namespace CFP_ISA
-
 struct AbsoluteErrorResult {
   ErrorStatistics translation_m;  ///< |t_truth − S t_estimate| after alignment; the field's "ATE" is its rmse
   ErrorStatistics rotation_deg;   ///< angle of R_truthᵀ S.R R_estimate; not in the TUM script
@@ -51,13 +43,9 @@ enum class DeltaUnit : std::uint8_t {
   frames    ///< poses of the estimate
 };
 
-inline namespace CFP_ISA {
-
 [[nodiscard]] constexpr const char* to_string(DeltaUnit unit) noexcept {
   return unit == DeltaUnit::seconds ? "s" : "frames";
 }
-
-}  // namespace CFP_ISA
 
 struct RelativeErrorOptions {
   double delta = 1;                     ///< length of the interval, > 0
@@ -66,17 +54,6 @@ struct RelativeErrorOptions {
   double scale = 1;                     ///< multiplies the translations of the estimate, > 0
   std::size_t expected_poses = 0;       ///< as in AbsoluteErrorOptions
 };
-
-inline namespace CFP_ISA {
-
-[[nodiscard]] inline OptionPath invalid_field(const RelativeErrorOptions& options) noexcept {
-  if (!detail::positive(options.delta)) return "delta";
-  if (!is_finite(options.offset_s)) return "offset_s";
-  if (!detail::positive(options.scale)) return "scale";
-  return {};
-}
-
-}  // namespace CFP_ISA
 
 struct RelativeErrorResult {
   ErrorStatistics translation_m;  ///< per interval, not divided by its length
@@ -97,42 +74,38 @@ struct TrajectoryErrorWorkspace {
   std::vector<Vector3<double>> truth_points, estimate_points;
   std::vector<double> scratch;
   std::vector<char> used;
+
+  void clear() noexcept { pose.clear(), translation_m.clear(), rotation_deg.clear(); }
+  void add(std::size_t index, double distance_m, double angle_deg) {
+    pose.push_back(index);
+    translation_m.push_back(distance_m);
+    rotation_deg.push_back(angle_deg);
+  }
 };
 
-namespace detail {
-
 inline namespace CFP_ISA {
 
-inline void clear_errors(TrajectoryErrorWorkspace& workspace) noexcept {
-  workspace.pose.clear();
-  workspace.translation_m.clear();
-  workspace.rotation_deg.clear();
+[[nodiscard]] inline OptionPath invalid_field(const AbsoluteErrorOptions& options) noexcept {
+  return nested("association", invalid_field(options.association));
 }
 
-inline void summarise(TrajectoryErrorWorkspace& workspace, ErrorStatistics& translation, ErrorStatistics& rotation) {
-  workspace.scratch.assign(workspace.translation_m.begin(), workspace.translation_m.end());
-  translation = error_statistics(workspace.scratch);
-  workspace.scratch.assign(workspace.rotation_deg.begin(), workspace.rotation_deg.end());
-  rotation = error_statistics(workspace.scratch);
+[[nodiscard]] inline OptionPath invalid_field(const RelativeErrorOptions& options) noexcept {
+  if (!detail::positive(options.delta)) return "delta";
+  if (!is_finite(options.offset_s)) return "offset_s";
+  if (!detail::positive(options.scale)) return "scale";
+  return {};
 }
-
-}  // namespace CFP_ISA
-
-}  // namespace detail
-
-inline namespace CFP_ISA {
 
 /// ATE: associates by time (see associate), aligns the matched estimated positions to the true ones, and takes the
 /// distances. status is not_enough_data without a match (errors 0), invalid_input for options that invalid_field
 /// refuses. Departure: the script stops with an error below two matches, and aligns rigidly only.
-template <typename Scalar>
-[[nodiscard]] AbsoluteErrorResult absolute_trajectory_error(span<const StampedPose<Scalar>> truth,
-                                                            span<const StampedPose<Scalar>> estimate,
+template <typename Truth, typename Estimate>
+[[nodiscard]] AbsoluteErrorResult absolute_trajectory_error(const Truth& truth, const Estimate& estimate,
                                                             const AbsoluteErrorOptions& options,
                                                             TrajectoryErrorWorkspace& workspace) {
   AbsoluteErrorResult result;
   result.alignment = options.alignment;
-  detail::clear_errors(workspace);
+  workspace.clear();
   if (invalid_field(options)) {
     result.status = Status::invalid_input;
     return result;
@@ -158,20 +131,18 @@ template <typename Scalar>
     S.translation = workspace.truth_points[0] - S.rotation * workspace.estimate_points[0];
   } else if (options.alignment != AlignmentMode::none) {
     const AlignmentResult aligned =
-        align_points(PointSpan<double, 3>(workspace.estimate_points), PointSpan<double, 3>(workspace.truth_points),
-                     options.alignment == AlignmentMode::similarity);
+        align_points(workspace.estimate_points, workspace.truth_points, options.alignment == AlignmentMode::similarity);
     S = aligned.S_to_from;
     result.status = aligned.status;
   }
   for (std::size_t k = 0; k < matches.size(); ++k) {
-    workspace.pose.push_back(matches[k].second);
-    workspace.translation_m.push_back(
-        detail::finite_norm(workspace.truth_points[k] - S * workspace.estimate_points[k]));
     const Matrix3<double> R_truth = detail::double_pose(truth[matches[k].first]).rotation;
     const Matrix3<double> R_estimate = detail::double_pose(estimate[matches[k].second]).rotation;
-    workspace.rotation_deg.push_back(detail::angle_deg(R_truth.transpose() * S.rotation * R_estimate));
+    workspace.add(matches[k].second, detail::finite_norm(workspace.truth_points[k] - S * workspace.estimate_points[k]),
+                  detail::angle_deg(R_truth.transpose() * S.rotation * R_estimate));
   }
-  detail::summarise(workspace, result.translation_m, result.rotation_deg);
+  result.translation_m = detail::statistics_of(workspace.translation_m, workspace.scratch);
+  result.rotation_deg = detail::statistics_of(workspace.rotation_deg, workspace.scratch);
   return result;
 }
 
@@ -185,15 +156,14 @@ template <typename Scalar>
 /// pairs (errors 0; the script stops), invalid_input for options that invalid_field refuses. Departures: of more than
 /// 10000 pairs the script draws 10000 at random, here all count; the angle comes from so3_log instead of the arc cosine
 /// of the trace, which loses half the digits of small angles.
-template <typename Scalar>
-[[nodiscard]] RelativeErrorResult relative_pose_error(span<const StampedPose<Scalar>> truth,
-                                                      span<const StampedPose<Scalar>> estimate,
+template <typename Truth, typename Estimate>
+[[nodiscard]] RelativeErrorResult relative_pose_error(const Truth& truth, const Estimate& estimate,
                                                       const RelativeErrorOptions& options,
                                                       TrajectoryErrorWorkspace& workspace) {
   RelativeErrorResult result;
   result.delta = options.delta;
   result.unit = options.unit;
-  detail::clear_errors(workspace);
+  workspace.clear();
   if (invalid_field(options)) {
     result.status = Status::invalid_input;
     return result;
@@ -206,7 +176,6 @@ template <typename Scalar>
   const std::size_t n = truth_order.empty() ? 0 : order.size();
   const auto truth_stamp = [&](std::size_t i) { return truth[truth_order[i]].time_s; };
   const auto stamp = [&](std::size_t i) { return estimate[order[i]].time_s; };
-  const auto index = [](std::size_t i) { return static_cast<double>(i); };
   matches.clear();
   for (std::size_t i = 0; i < n; ++i) {
     matches.push_back(
@@ -220,7 +189,8 @@ template <typename Scalar>
   for (std::size_t i = 0; i < n; ++i) {
     const std::size_t j = options.unit == DeltaUnit::seconds
                               ? detail::closest_index(n, stamp(i) + options.delta, stamp)
-                              : detail::closest_index(n, static_cast<double>(i) + options.delta, index);
+                              : detail::closest_index(n, static_cast<double>(i) + options.delta,
+                                                      [](std::size_t k) { return static_cast<double>(k); });
     if (j + 1 == n || !has_truth(i) || !has_truth(j)) continue;
     SE3<double> P = detail::double_pose(estimate[order[j]]).inverse() * detail::double_pose(estimate[order[i]]);
     const SE3<double> Q =
@@ -228,9 +198,7 @@ template <typename Scalar>
     P.translation *= options.scale;
     const SE3<double> E = P.inverse() * Q;
     workspace.used[i] = workspace.used[j] = 1;
-    workspace.pose.push_back(order[i]);
-    workspace.translation_m.push_back(detail::finite_norm(E.translation));
-    workspace.rotation_deg.push_back(detail::angle_deg(E.rotation));
+    workspace.add(order[i], detail::finite_norm(E.translation), detail::angle_deg(E.rotation));
   }
   std::size_t kept = 0;
   for (std::size_t i = 0; i < n; ++i) {
@@ -241,10 +209,10 @@ template <typename Scalar>
       trajectory_coverage(truth, estimate, truth_order, order, matches, options.expected_poses, options.offset_s);
   if (workspace.pose.size() < 2) return result;
   result.status = Status::ok;
-  detail::summarise(workspace, result.translation_m, result.rotation_deg);
+  result.translation_m = detail::statistics_of(workspace.translation_m, workspace.scratch);
+  result.rotation_deg = detail::statistics_of(workspace.rotation_deg, workspace.scratch);
   return result;
 }
 
 }  // namespace CFP_ISA
-
 }  // namespace cfp

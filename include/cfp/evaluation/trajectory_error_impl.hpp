@@ -37,10 +37,14 @@ std::size_t closest_index(std::size_t n, double target, const Value& value) noex
   return best;
 }
 
+inline ErrorStatistics statistics_of(const std::vector<double>& errors, std::vector<double>& scratch) {
+  scratch.assign(errors.begin(), errors.end());
+  return error_statistics(scratch);
+}
+
 /// Median time between neighbours (numpy.median); 0 below two poses.
-template <typename Scalar>
-double median_interval(span<const StampedPose<Scalar>> poses, const std::vector<std::size_t>& order,
-                       std::vector<double>& scratch) {
+template <typename Poses>
+double median_interval(const Poses& poses, const std::vector<std::size_t>& order, std::vector<double>& scratch) {
   scratch.clear();
   for (std::size_t i = 1; i < order.size(); ++i) {
     scratch.push_back(
