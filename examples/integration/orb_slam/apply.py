@@ -92,8 +92,8 @@ STEPS = [
      r"                    pMP = static_cast<MapPoint*>(NULL);\n                    nmatches--;\n"
      r"                }\n            }\n            \1", 1),
     # 8: the local map
-    (8, "src/Tracking.cc", "Tracking::TrackLocalMap()", r"(SearchLocalPoints\(\);)",
-     r"\1\n    " + GUARD + r"mpStaticWeights->Joined(mCurrentFrame);", 1),
+    (8, "src/Tracking.cc", "Tracking::TrackLocalMap()", r"(PoseOptimization\(\);)",
+     r"\1\n    " + GUARD + r"mpStaticWeights->Learn(mCurrentFrame);", 1),
     (8, "src/Tracking.cc", "Tracking::TrackLocalMap()", r"Observations\(\)>0\)", "Observations()>0 && Counts(i))", 1),
     # 9: keyframes and their points
     (9, "src/Tracking.cc", "Tracking::NeedNewKeyFrame()", r"mvDepth\[i\]<mThDepth\)", "mvDepth[i]<mThDepth && MayCreate(i))", 1),

@@ -39,7 +39,6 @@ class StaticWeights {
     if (detections) frame.detections = cfp::span<const cfp::Detection<float>>(*detections);
     const auto coarse = mProbability.coarse(frame);
     mReport = coarse.report;
-    mLearnt.assign(frame.keypoints.size(), false);
     F.mvStaticProbability.assign(coarse.static_probability.begin(), coarse.static_probability.end());
   }
 
@@ -52,7 +51,7 @@ class StaticWeights {
     F.mvWeight.assign(weights.begin(), weights.end());
   }
 
-  // After the first pose of a frame that follows one with a pose: the constraints of that pose. Map points learn.
+  // After the first pose of a frame that follows one with a pose: the constraints of that pose.
   void FirstPose(Frame& F, const Frame& last) {
     std::unordered_map<const MapPoint*, std::int32_t> indexInLast;
     for (std::size_t j = 0; j < last.mvpMapPoints.size(); ++j)
@@ -70,14 +69,16 @@ class StaticWeights {
     const auto fine = mProbability.fine({Host::Pose(F) * Host::Pose(last).inverse(), inliers}, mMatch, mM);
     mReport = fine.report;
     F.mvStaticProbability.assign(fine.static_probability.begin(), fine.static_probability.end());
-    for (std::size_t i = 0; i < F.mvpMapPoints.size(); ++i) Learn(F, i, mM[i]);
   }
 
-  // When the local map has been searched: the points that have just been found learn, too.
-  void Joined(const Frame& F) {
-    for (std::size_t i = 0; mReport.stage == cfp::Stage::fine && i < F.mvpMapPoints.size(); ++i)
-      if (F.mvpMapPoints[i] && !mLearnt[i])
-        Learn(F, i, mProbability.updated_map_point(i, F.mvpMapPoints[i]->mStaticProbability));
+  // When the frame has its last pose, and all matches of the local map: map points learn, once.
+  void Learn(const Frame& F) const {
+    for (std::size_t i = 0; mReport.stage == cfp::Stage::fine && i < F.mvpMapPoints.size(); ++i) {
+      if (!F.mvpMapPoints[i]) continue;
+      const float m = mProbability.updated_map_point(i, F.mvpMapPoints[i]->mStaticProbability);
+      F.mvpMapPoints[i]->mStaticProbability = m;
+      if (cfp::is_deletable(m, mProbability.options().map_point)) F.mvpMapPoints[i]->SetBadFlag();
+    }
   }
 
   // Where inliers are counted, and where a keypoint is about to make a map point (whose M is its K).
@@ -95,18 +96,10 @@ class StaticWeights {
   const cfp::FrameReport& Report() const { return mReport; }
 
  private:
-  void Learn(const Frame& F, std::size_t i, float m) {
-    if (!F.mvpMapPoints[i]) return;
-    mLearnt[i] = true;
-    F.mvpMapPoints[i]->mStaticProbability = m;
-    if (cfp::is_deletable(m, mProbability.options().map_point)) F.mvpMapPoints[i]->SetBadFlag();
-  }
-
   cfp::StaticProbability<typename Host::Camera> mProbability;
   cfp::FrameReport mReport;
   std::vector<std::int32_t> mMatch;
   std::vector<float> mM;
-  std::vector<bool> mLearnt;
 };
 // [glue]
 

@@ -41,7 +41,7 @@ class Tracking {
       }
       bool bOK = nInliers >= 10;
       if (bOK && mpWeights && mLastFrame.mbHasPose)
-        mpWeights->FirstPose(mCurrentFrame, mLastFrame);  // cfp: constraints of the first pose, M
+        mpWeights->FirstPose(mCurrentFrame, mLastFrame);  // cfp: constraints of the first pose
       if (bOK) bOK = TrackLocalMap();
       mState = bOK ? OK : LOST;
       mCurrentFrame.mbHasPose = bOK;
@@ -119,8 +119,8 @@ class Tracking {
     for (std::size_t k = mvKeyFrames.size(); k-- > 0 && mvKeyFrames.size() - k <= 10;)
       local.insert(local.end(), mvKeyFrames[k].mvpMapPoints.begin(), mvKeyFrames[k].mvpMapPoints.end());
     SearchByProjection(local, 5, 0.8F);
-    if (mpWeights) mpWeights->Joined(mCurrentFrame);  // cfp: what was found just now learns, too
     PoseOptimization(mCurrentFrame, mK, mpWeights);
+    if (mpWeights) mpWeights->Learn(mCurrentFrame);  // cfp: every M, once
     mnMatchesInliers = 0;
     for (std::size_t i = 0; i < mCurrentFrame.mvpMapPoints.size(); ++i) {
       if (!mCurrentFrame.mvpMapPoints[i] || mCurrentFrame.mvbOutlier[i]) continue;

@@ -11,6 +11,7 @@ struct cfp_weights {
       : probability(camera, options) {}
   cfp::StaticProbability<cfp::PinholeCamera<float>> probability;
   std::vector<cfp::Detection<float>> detections;
+  std::vector<float> map_point;
 };
 
 cfp_weights* cfp_weights_create(float fx, float fy, float cx, float cy, int width, int height) {
@@ -39,7 +40,8 @@ void cfp_weights_coarse(cfp_weights* w, const cfp_weights_frame* in, float* weig
   std::copy(coarse.weight.begin(), coarse.weight.end(), weight);
 }
 
-void cfp_weights_fine(cfp_weights* w, const double* T, int inliers, const int* match, float* map_point, float* weight) {
+void cfp_weights_fine(cfp_weights* w, const double* T, int inliers, const int* match, const float* map_point,
+                      float* weight) {
   const std::size_t n = w->probability.state().size();
   cfp::PoseEstimate pose;
   pose.inliers = static_cast<std::size_t>(std::max(inliers, 0));
@@ -47,7 +49,14 @@ void cfp_weights_fine(cfp_weights* w, const double* T, int inliers, const int* m
     for (int column = 0; column < 3; ++column) pose.T_cur_prev.rotation(row, column) = T[4 * row + column];
     pose.T_cur_prev.translation[row] = T[4 * row + 3];
   }
-  const auto fine = w->probability.fine(pose, {match, n}, {map_point, n});
+  std::vector<float>& m = w->map_point;
+  m.assign(map_point, map_point + n);
+  const auto fine = w->probability.fine(pose, {match, n}, m);
   std::copy(fine.weight.begin(), fine.weight.end(), weight);
+}
+
+void cfp_weights_learn(const cfp_weights* w, float* map_point) {
+  for (std::size_t i = 0; i < w->probability.state().size(); ++i)
+    map_point[i] = w->probability.updated_map_point(i, map_point[i]);
 }
 // [glue]

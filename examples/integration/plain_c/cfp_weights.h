@@ -28,9 +28,12 @@ void cfp_weights_destroy(struct cfp_weights* w);
 void cfp_weights_coarse(struct cfp_weights* w, const struct cfp_weights_frame* frame, float* weight);
 
 /* Stage 2, with the pose that stage 1's weights led to. T_cur_prev: 3 x 4, row by row. match: per keypoint the index in
-   the frame before, -1: none. map_point: M per keypoint, < 0: none; it learns. weight: one per keypoint. */
-void cfp_weights_fine(struct cfp_weights* w, const double* T_cur_prev, int inliers, const int* match, float* map_point,
-                      float* weight);
+   the frame before, -1: none. map_point: M per keypoint, < 0: none. weight: one per keypoint. */
+void cfp_weights_fine(struct cfp_weights* w, const double* T_cur_prev, int inliers, const int* match,
+                      const float* map_point, float* weight);
+
+/* After the frame's last pose: M learns, in place. */
+void cfp_weights_learn(const struct cfp_weights* w, float* map_point);
 
 #ifdef __cplusplus
 }

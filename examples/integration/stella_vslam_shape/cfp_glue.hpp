@@ -36,7 +36,7 @@ class static_weights {
     return probability_.weights(m_);
   }
 
-  // After the first pose (motion_based_track, bow_match_based_track, robust_match_based_track). Landmarks learn.
+  // After the first pose (motion_based_track, bow_match_based_track, robust_match_based_track).
   void first_pose(const stella_vslam::data::frame& frm, const stella_vslam::data::frame& last, unsigned int num_valid) {
     std::unordered_map<const stella_vslam::data::landmark*, std::int32_t> index_in_last;
     for (std::size_t i = 0; i < last.landmarks_.size(); ++i)
@@ -48,10 +48,15 @@ class static_weights {
       if (frm.landmarks_[i] && found != index_in_last.end()) match_[i] = found->second;
     }
     report_ = probability_.fine({pose(frm) * pose(last).inverse(), num_valid}, match_, m_).report;
-    for (std::size_t i = 0; i < m_.size(); ++i) {
+  }
+
+  // After the last pose (optimize_current_frame_with_local_map): landmarks learn.
+  void learn(const stella_vslam::data::frame& frm) {
+    gather(frm);
+    for (std::size_t i = 0; report_.stage == cfp::Stage::fine && i < m_.size(); ++i) {
       if (m_[i] < 0) continue;
-      frm.landmarks_[i]->static_probability_ = m_[i];
-      if (cfp::is_deletable(m_[i], probability_.options().map_point)) frm.landmarks_[i]->prepare_for_erasing();
+      const float m = frm.landmarks_[i]->static_probability_ = probability_.updated_map_point(i, m_[i]);
+      if (cfp::is_deletable(m, probability_.options().map_point)) frm.landmarks_[i]->prepare_for_erasing();
     }
   }
 

@@ -57,6 +57,7 @@ int main() {
   weights.first_pose(current, last, scene_wall);
   const auto fine = weights.weights(current);
   const double person = Mean(fine, scene_wall, scene_points), wall = Mean(fine, 0, scene_wall);
+  weights.learn(current);
   std::size_t walkers = 0;
   for (std::size_t i = scene_wall; i < scene_points; ++i) walkers += weights.may_create(i) ? 1 : 0;
   std::printf("mean weight of the person %.3f, then %.3f; of the wall %.3f; %zu landmarks would walk\n", coarse, person,
