@@ -167,8 +167,6 @@ template struct cfp::GemanMcClure<float>;
 template struct cfp::GemanMcClure<double>;
 template struct cfp::Truncated<float>;
 template struct cfp::Truncated<double>;
-template struct cfp::RobustLoss<float>;
-template struct cfp::RobustLoss<double>;
 template struct cfp::PoseObservations<float>;
 template struct cfp::PoseObservations<double>;
 template struct cfp::PoseWorkspace<float>;

@@ -106,8 +106,6 @@
   CFP_LAYOUT(cfp::GemanMcClure<double>, delta)                           \
   CFP_LAYOUT(cfp::Truncated<float>, delta)                               \
   CFP_LAYOUT(cfp::Truncated<double>, delta)                              \
-  CFP_LAYOUT(cfp::RobustLoss<float>, delta)                              \
-  CFP_LAYOUT(cfp::RobustLoss<double>, delta)                             \
   CFP_LAYOUT(cfp::PoseRound, scale)                                      \
   CFP_LAYOUT(cfp::PoseOptions, inliers_only)                      \
   CFP_LAYOUT(cfp::PoseObservations<float>, baseline_fx)                  \

@@ -170,8 +170,8 @@ TEMPLATE_TEST_CASE("Pose refinement: packets and scalars give the same pose with
     const auto scene = make_pose_scene<Scalar>(seed, mixed(17 + static_cast<int>(seed) * 13));
     cfp::PoseWorkspace<Scalar> workspace;
     std::vector<char> a_mask(scene.points.size()), b_mask(scene.points.size());
-    const auto a = cfp::detail::refine_pose_with<cfp::simd::Packet<Scalar>>(scene.observations(), scene.camera, scene.start,
-                                                                      tight(), workspace, a_mask);
+    const auto a = cfp::detail::refine_pose_with<cfp::simd::Packet<Scalar>>(scene.observations(), scene.camera,
+                                                                            scene.start, tight(), workspace, a_mask);
     const auto b = cfp::detail::refine_pose_with<Scalar>(scene.observations(), scene.camera, scene.start, tight(),
                                                          workspace, b_mask);
     CAPTURE(seed);

@@ -163,12 +163,6 @@ class PointSpan {
     return *reinterpret_cast<const Scalar*>(first_ + i * point_stride_ +
                                             static_cast<std::size_t>(c) * coordinate_stride_);
   }
-  /// The first coordinate if the points are packed, coordinate after coordinate and point after point; else nullptr.
-  [[nodiscard]] const Scalar* packed() const noexcept {
-    return coordinate_stride_ == sizeof(Scalar) && point_stride_ == Dim * sizeof(Scalar)
-               ? reinterpret_cast<const Scalar*>(first_)
-               : nullptr;
-  }
   [[nodiscard]] CFP_INLINE Point operator[](std::size_t i) const noexcept {
     Point point;
     for (int c = 0; c < Dim; ++c) point[c] = (*this)(i, c);

@@ -14,7 +14,6 @@
 #include <limits>
 
 #include "cfp/core/numeric.hpp"
-#include "cfp/core/options.hpp"
 #include "cfp/simd/packet.hpp"
 
 namespace cfp {
@@ -26,10 +25,9 @@ struct Trivial {
 
   [[nodiscard]] CFP_INLINE Scalar value(const Scalar& s) const noexcept { return s; }
   [[nodiscard]] CFP_INLINE Scalar first(const Scalar&) const noexcept { return Scalar(1); }
-  [[nodiscard]] CFP_INLINE Scalar second(const Scalar&) const noexcept { return Scalar(0); }
 };
 
-/// rho = s up to delta^2, 2 delta sqrt(s) - delta^2 beyond; rho and rho' are continuous, rho'' jumps (at delta^2: 0).
+/// rho = s up to delta^2, 2 delta sqrt(s) - delta^2 beyond; rho and rho' are continuous.
 template <typename Scalar>
 struct Huber {
   Scalar delta = Scalar(1);
@@ -42,12 +40,9 @@ struct Huber {
   [[nodiscard]] CFP_INLINE Scalar first(const Scalar& s) const noexcept {
     return simd::select(s <= delta * delta, Scalar(1), delta * simd::reciprocal_sqrt(s));
   }
-  [[nodiscard]] CFP_INLINE Scalar second(const Scalar& s) const noexcept {
-    return simd::select(s <= delta * delta, Scalar(0), Scalar(-0.5) * first(s) / s);
-  }
 };
 
-/// rho = delta^2 log(1 + s / delta^2), rho' = 1 / (1 + s / delta^2), rho''(0) = -1 / delta^2.
+/// rho = delta^2 log(1 + s / delta^2), rho' = 1 / (1 + s / delta^2).
 template <typename Scalar>
 struct Cauchy {
   Scalar delta = Scalar(1);
@@ -57,12 +52,9 @@ struct Cauchy {
     return delta * delta * log1p(s / (delta * delta));
   }
   [[nodiscard]] CFP_INLINE Scalar first(const Scalar& s) const noexcept { return delta * delta / (delta * delta + s); }
-  [[nodiscard]] CFP_INLINE Scalar second(const Scalar& s) const noexcept {
-    return -first(s) * first(s) / (delta * delta);
-  }
 };
 
-/// rho = s / (1 + s / delta^2), bounded by delta^2; rho' = 1 / (1 + s / delta^2)^2, rho''(0) = -2 / delta^2.
+/// rho = s / (1 + s / delta^2), bounded by delta^2; rho' = 1 / (1 + s / delta^2)^2.
 template <typename Scalar>
 struct GemanMcClure {
   Scalar delta = Scalar(1);
@@ -72,15 +64,12 @@ struct GemanMcClure {
     return simd::select(s <= delta * delta, s * share(s), delta * delta * (Scalar(1) - share(s)));
   }
   [[nodiscard]] CFP_INLINE Scalar first(const Scalar& s) const noexcept { return share(s) * share(s); }
-  [[nodiscard]] CFP_INLINE Scalar second(const Scalar& s) const noexcept {
-    return Scalar(-2) * share(s) * share(s) * share(s) / (delta * delta);
-  }
 
  private:
   [[nodiscard]] CFP_INLINE Scalar share(const Scalar& s) const noexcept { return delta * delta / (delta * delta + s); }
 };
 
-/// rho = min(s, delta^2); rho' = 1 up to and at delta^2, 0 beyond; rho'' = 0. A hard cut: only for a nearby start.
+/// rho = min(s, delta^2); rho' = 1 up to and at delta^2, 0 beyond. A hard cut: only for a nearby start.
 template <typename Scalar>
 struct Truncated {
   Scalar delta = Scalar(1);
@@ -91,7 +80,6 @@ struct Truncated {
   [[nodiscard]] CFP_INLINE Scalar first(const Scalar& s) const noexcept {
     return simd::select(s <= delta * delta, Scalar(1), Scalar(0));
   }
-  [[nodiscard]] CFP_INLINE Scalar second(const Scalar&) const noexcept { return Scalar(0); }
 };
 
 /// The losses by name, for options.
@@ -119,34 +107,7 @@ auto with_loss(LossType type, const Scalar& delta, Work&& work) {
   return work(Trivial<Scalar>{delta});
 }
 
-}  // namespace CFP_ISA
-
-/// A loss chosen at run time, with the members of the others; as fast as a predictable branch.
-template <typename Scalar>
-struct RobustLoss {
-  LossType type = LossType::huber;
-  Scalar delta = Scalar(1);
-
-  [[nodiscard]] CFP_INLINE Scalar value(const Scalar& s) const noexcept {
-    return with_loss(type, delta, [&s](const auto& loss) { return loss.value(s); });
-  }
-  [[nodiscard]] CFP_INLINE Scalar first(const Scalar& s) const noexcept {
-    return with_loss(type, delta, [&s](const auto& loss) { return loss.first(s); });
-  }
-  [[nodiscard]] CFP_INLINE Scalar second(const Scalar& s) const noexcept {
-    return with_loss(type, delta, [&s](const auto& loss) { return loss.second(s); });
-  }
-};
-
-inline namespace CFP_ISA {
-
-/// The first field of a loss outside its range, or nothing.
-template <typename Scalar>
-[[nodiscard]] OptionPath invalid_field(const RobustLoss<Scalar>& loss) noexcept {
-  if (!(static_cast<unsigned>(loss.type) <= static_cast<unsigned>(LossType::truncated))) return "type";
-  if (!(loss.delta > Scalar(0) && is_finite(loss.delta))) return "delta";
-  return {};
-}
+[[nodiscard]] constexpr bool is_loss(LossType type) noexcept { return type <= LossType::truncated; }
 
 }  // namespace CFP_ISA
 }  // namespace cfp

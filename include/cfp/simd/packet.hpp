@@ -12,11 +12,11 @@
 #pragma once
 
 #include <cmath>
-#include <cstddef>
+#include <type_traits>
 
 #include <Eigen/Core>
 
-#include "cfp/core/assert.hpp"
+#include "cfp/version.hpp"
 
 // GCC 12 takes the deliberately undefined registers of its own AVX-512 intrinsics for a mistake of whoever inlines
 // them.
@@ -34,7 +34,7 @@ template <typename T>
 inline constexpr int native_lanes = static_cast<int>(Eigen::internal::packet_traits<T>::size);
 
 /// Result of a comparison of packets: a choice per lane.
-template <typename T, int Lanes>
+template <typename T>
 struct PacketMask {
   typename Eigen::internal::packet_traits<T>::type bits;
 
@@ -46,12 +46,12 @@ struct PacketMask {
   }
 };
 
-/// `Lanes` numbers of type T. For registers and local arrays only: its alignment depends on flags, so no struct may
-/// hold one.
-template <typename T, int Lanes>
+/// native_lanes<T> numbers of type T. For registers and local arrays only: its alignment depends on flags, so no struct
+/// may hold one.
+template <typename T>
 struct BasicPacket {
   using Register = typename Eigen::internal::packet_traits<T>::type;
-  using Mask = PacketMask<T, Lanes>;
+  using Mask = PacketMask<T>;
   Register bits;
 
   BasicPacket() = default;
@@ -90,38 +90,29 @@ struct BasicPacket {
 
 namespace detail {
 
-template <typename T, int Lanes>
-struct PacketOf {
-  using type = BasicPacket<T, Lanes>;
-};
-template <typename T>
-struct PacketOf<T, 1> {
-  using type = T;
-};
-
 template <typename P>
 struct PacketTraits {
   using Scalar = P;
   static constexpr int lanes = 1;
 };
-template <typename T, int Lanes>
-struct PacketTraits<BasicPacket<T, Lanes>> {
+template <typename T>
+struct PacketTraits<BasicPacket<T>> {
   using Scalar = T;
-  static constexpr int lanes = Lanes;
+  static constexpr int lanes = native_lanes<T>;
 };
 
 }  // namespace detail
 
 /// The widest packet the flags of this unit allow; T itself without a vector unit.
 template <typename T>
-using Packet = typename detail::PacketOf<T, native_lanes<T>>::type;
+using Packet = std::conditional_t<native_lanes<T> == 1, T, BasicPacket<T>>;
 
 template <typename P>
 using scalar_of = typename detail::PacketTraits<P>::Scalar;
 template <typename P>
 inline constexpr int lanes_of = detail::PacketTraits<P>::lanes;
 
-/// Lanes adjacent numbers, no alignment asked.
+/// lanes_of<P> adjacent numbers, no alignment asked.
 template <typename P>
 [[nodiscard]] P load(const scalar_of<P>* from) noexcept {
   if constexpr (lanes_of<P> == 1) {
@@ -130,21 +121,12 @@ template <typename P>
     return P::wrap(Eigen::internal::ploadu<typename P::Register>(from));
   }
 }
-/// The first n numbers, n in [0, lanes]; the remaining lanes hold `rest`. Reads nothing beyond from[n - 1].
-template <typename P>
-[[nodiscard]] P load_partial(const scalar_of<P>* from, std::size_t n, scalar_of<P> rest = {}) noexcept {
-  CFP_ASSERT(n <= static_cast<std::size_t>(lanes_of<P>));
-  scalar_of<P> lanes[lanes_of<P>];
-  for (std::size_t i = 0; i < static_cast<std::size_t>(lanes_of<P>); ++i) lanes[i] = i < n ? from[i] : rest;
-  return load<P>(lanes);
-}
-
 template <typename T>
 void store(T* to, const T& x) noexcept {
   *to = x;
 }
-template <typename T, int Lanes>
-void store(T* to, const BasicPacket<T, Lanes>& p) noexcept {
+template <typename T>
+void store(T* to, const BasicPacket<T>& p) noexcept {
   Eigen::internal::pstoreu(to, p.bits);
 }
 
@@ -153,15 +135,15 @@ template <typename T>
 [[nodiscard]] T multiply_add(const T& a, const T& b, const T& c) noexcept {
   return a * b + c;
 }
-template <typename T, int Lanes>
-[[nodiscard]] BasicPacket<T, Lanes> multiply_add(const BasicPacket<T, Lanes>& a, const BasicPacket<T, Lanes>& b,
-                                                 const BasicPacket<T, Lanes>& c) noexcept {
-  return BasicPacket<T, Lanes>::wrap(Eigen::internal::pmadd(a.bits, b.bits, c.bits));
+template <typename T>
+[[nodiscard]] BasicPacket<T> multiply_add(const BasicPacket<T>& a, const BasicPacket<T>& b,
+                                          const BasicPacket<T>& c) noexcept {
+  return BasicPacket<T>::wrap(Eigen::internal::pmadd(a.bits, b.bits, c.bits));
 }
 
 /// Conjunction of two conditions, of packets or of scalars.
-template <typename T, int Lanes>
-[[nodiscard]] PacketMask<T, Lanes> both(const PacketMask<T, Lanes>& a, const PacketMask<T, Lanes>& b) noexcept {
+template <typename T>
+[[nodiscard]] PacketMask<T> both(const PacketMask<T>& a, const PacketMask<T>& b) noexcept {
   return a & b;
 }
 [[nodiscard]] constexpr bool both(bool a, bool b) noexcept { return a && b; }
@@ -171,28 +153,28 @@ template <typename T>
 [[nodiscard]] constexpr T select(bool condition, const T& a, const T& b) noexcept {
   return condition ? a : b;
 }
-template <typename T, int Lanes>
-[[nodiscard]] BasicPacket<T, Lanes> select(const PacketMask<T, Lanes>& condition, const BasicPacket<T, Lanes>& a,
-                                           const BasicPacket<T, Lanes>& b) noexcept {
-  return BasicPacket<T, Lanes>::wrap(Eigen::internal::pselect(condition.bits, a.bits, b.bits));
+template <typename T>
+[[nodiscard]] BasicPacket<T> select(const PacketMask<T>& condition, const BasicPacket<T>& a,
+                                    const BasicPacket<T>& b) noexcept {
+  return BasicPacket<T>::wrap(Eigen::internal::pselect(condition.bits, a.bits, b.bits));
 }
 
 // Found by argument-dependent lookup, as for dual numbers: `using std::sqrt; sqrt(x)` in a formula covers scalar and
 // packet.
 
 /// Within 2 units in the last place: Eigen refines the hardware estimate where that is faster; exact at 0.
-template <typename T, int Lanes>
-[[nodiscard]] BasicPacket<T, Lanes> sqrt(const BasicPacket<T, Lanes>& a) noexcept {
-  return BasicPacket<T, Lanes>::wrap(Eigen::internal::psqrt(a.bits));
+template <typename T>
+[[nodiscard]] BasicPacket<T> sqrt(const BasicPacket<T>& a) noexcept {
+  return BasicPacket<T>::wrap(Eigen::internal::psqrt(a.bits));
 }
-template <typename T, int Lanes>
-[[nodiscard]] BasicPacket<T, Lanes> abs(const BasicPacket<T, Lanes>& a) noexcept {
-  return BasicPacket<T, Lanes>::wrap(Eigen::internal::pabs(a.bits));
+template <typename T>
+[[nodiscard]] BasicPacket<T> abs(const BasicPacket<T>& a) noexcept {
+  return BasicPacket<T>::wrap(Eigen::internal::pabs(a.bits));
 }
 /// log(1 + x) for x > -1, within a few units in the last place.
-template <typename T, int Lanes>
-[[nodiscard]] BasicPacket<T, Lanes> log1p(const BasicPacket<T, Lanes>& a) noexcept {
-  return BasicPacket<T, Lanes>::wrap(Eigen::internal::generic_plog1p(a.bits));
+template <typename T>
+[[nodiscard]] BasicPacket<T> log1p(const BasicPacket<T>& a) noexcept {
+  return BasicPacket<T>::wrap(Eigen::internal::generic_plog1p(a.bits));
 }
 
 /// 1 / sqrt(x) within 3 units in the last place; infinite at 0 (for packets also at denormals), 0 at infinity. One root
@@ -202,9 +184,9 @@ template <typename T>
   using std::sqrt;
   return T(1) / sqrt(x);
 }
-template <typename T, int Lanes>
-[[nodiscard]] BasicPacket<T, Lanes> reciprocal_sqrt(const BasicPacket<T, Lanes>& x) noexcept {
-  return BasicPacket<T, Lanes>::wrap(Eigen::internal::prsqrt(x.bits));
+template <typename T>
+[[nodiscard]] BasicPacket<T> reciprocal_sqrt(const BasicPacket<T>& x) noexcept {
+  return BasicPacket<T>::wrap(Eigen::internal::prsqrt(x.bits));
 }
 
 /// 1 / x, correctly rounded (a division, not the hardware's estimate, whose bits differ between makers).
@@ -218,8 +200,8 @@ template <typename T>
 [[nodiscard]] T reduce_add(const T& x) noexcept {
   return x;
 }
-template <typename T, int Lanes>
-[[nodiscard]] T reduce_add(const BasicPacket<T, Lanes>& p) noexcept {
+template <typename T>
+[[nodiscard]] T reduce_add(const BasicPacket<T>& p) noexcept {
   return Eigen::internal::predux(p.bits);
 }
 

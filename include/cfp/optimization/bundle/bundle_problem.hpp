@@ -67,7 +67,7 @@ inline namespace CFP_ISA {
 /// The first field outside its range, or nothing.
 [[nodiscard]] inline OptionPath invalid_field(const BundleOptions& options) noexcept {
   if (const OptionPath field = nested("levenberg_marquardt", invalid_field(options.levenberg_marquardt))) return field;
-  if (invalid_field(RobustLoss<double>{options.loss, 1.0})) return "loss";
+  if (!is_loss(options.loss)) return "loss";
   if (!detail::positive(options.chi2_mono)) return "chi2_mono";
   if (!detail::positive(options.chi2_stereo)) return "chi2_stereo";
   return {};

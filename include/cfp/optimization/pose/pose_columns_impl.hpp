@@ -15,9 +15,9 @@
 namespace cfp::detail {
 
 template <typename Camera>
-struct is_pinhole : std::false_type {};
+inline constexpr bool is_pinhole = false;
 template <typename C>
-struct is_pinhole<PinholeCamera<C>> : std::true_type {};
+inline constexpr bool is_pinhole<PinholeCamera<C>> = true;
 
 /// Slots [0, mono_end) hold pixels, [stereo_begin, stereo_end) pixels with u_right; both are padded to whole packets
 /// with weight 0.
@@ -36,11 +36,22 @@ struct PoseColumns {
 
 inline namespace CFP_ISA {
 
-/// Calls visit(begin, end, chi2 threshold) for the pixels and for the pixels with a depth.
+/// Calls visit(begin, end, chi2 threshold, with a depth) for the pixels and for the pixels with a depth, where there
+/// are any.
 template <typename Scalar, typename Visit>
-void for_each_kind(const PoseColumns<Scalar>& columns, const PoseOptions& options, Visit&& visit) {
-  visit(std::size_t(0), columns.mono_end, options.chi2_mono);
-  visit(columns.stereo_begin, columns.stereo_end, options.chi2_stereo);
+void for_each_kind(const PoseColumns<Scalar>& columns, const PoseOptions& options, const Visit& visit) {
+  if (columns.mono_end > 0) visit(std::size_t(0), columns.mono_end, options.chi2_mono, std::false_type());
+  if (columns.stereo_end > columns.stereo_begin)
+    visit(columns.stereo_begin, columns.stereo_end, options.chi2_stereo, std::true_type());
+}
+
+/// Calls visit(slot, inlier) for every observation, by the stored errors.
+template <typename Scalar, typename Visit>
+void for_each_observation(const PoseColumns<Scalar>& columns, const PoseOptions& options, const Visit& visit) {
+  for_each_kind(columns, options, [&](std::size_t begin, std::size_t end, double chi2, auto) {
+    for (std::size_t i = begin; i < end; ++i)
+      visit(i, columns.error[i] >= Scalar(0) && columns.error[i] <= static_cast<Scalar>(chi2));
+  });
 }
 
 /// Divides the workspace up for n observations in packets of `lanes`. Columns begin at cache lines, and an odd number
@@ -105,7 +116,7 @@ void load_columns(const PoseObservations<Input>& observations, const Camera& cam
   const std::size_t n = observations.points.size();
   reserve_columns(n, lanes, workspace, columns);
   double fu = 1, fv = 1, cu = 0, cv = 0;
-  if constexpr (is_pinhole<Camera>::value) {
+  if constexpr (is_pinhole<Camera>) {
     fu = 1 / static_cast<double>(camera.fx), fv = 1 / static_cast<double>(camera.fy);
     cu = static_cast<double>(camera.cx), cv = static_cast<double>(camera.cy);
   }

@@ -86,7 +86,7 @@ inline namespace CFP_ISA {
 
 /// The first field outside its range, or nothing.
 [[nodiscard]] inline OptionPath invalid_field(const PoseRound& round) noexcept {
-  if (!(static_cast<unsigned>(round.loss) <= static_cast<unsigned>(LossType::truncated))) return "loss";
+  if (!is_loss(round.loss)) return "loss";
   if (!detail::positive(round.scale)) return "scale";
   return {};
 }

@@ -19,7 +19,7 @@ inline namespace CFP_ISA {
 
 template <typename Camera>
 [[nodiscard]] bool is_usable_camera(const Camera& camera) noexcept {
-  if constexpr (is_pinhole<Camera>::value) {
+  if constexpr (is_pinhole<Camera>) {
     const PinholeCamera<double> c = camera.template cast<double>();
     return c.fx >= 1e-3 && c.fx <= 1e6 && c.fy >= 1e-3 && c.fy <= 1e6 && std::abs(c.cx) <= 1e7 && std::abs(c.cy) <= 1e7;
   } else {
@@ -42,9 +42,18 @@ struct PoseModel {
 
   double linearize(const SE3<double>& T, NormalEquations<6>& equations) noexcept {
     PoseSystem system;
-    add_kind(T, columns.mono_end > 0, 0, columns.mono_end, options.chi2_mono, std::false_type(), system);
-    add_kind(T, columns.stereo_end > columns.stereo_begin, columns.stereo_begin, columns.stereo_end,
-             options.chi2_stereo, std::true_type(), system);
+    for_each_kind(columns, options, [&](std::size_t begin, std::size_t end, double chi2, auto stereo) {
+      const double delta = round.scale * std::sqrt(chi2);
+      if constexpr (is_pinhole<Camera>) {
+        with_loss<P>(round.loss, P(static_cast<Scalar>(delta)), [&](const auto& loss) {
+          add_pinhole<P, decltype(stereo)::value>(columns, begin, end, camera, columns.baseline_fx, T, loss, system);
+        });
+      } else {
+        with_loss<double>(round.loss, delta, [&](const auto& loss) {
+          add_camera<decltype(stereo)::value>(columns, begin, end, camera, columns.baseline_fx, T, loss, system);
+        });
+      }
+    });
     equations = system.equations;
     influence = system.influence;
     last_pose = T;
@@ -54,23 +63,6 @@ struct PoseModel {
   [[nodiscard]] SE3<double> moved(const SE3<double>& T, const Vector6<double>& step) const noexcept {
     return se3_exp(step) * T;
   }
-
- private:
-  template <typename Stereo>
-  void add_kind(const SE3<double>& T, bool any, std::size_t begin, std::size_t end, double chi2, Stereo,
-                PoseSystem& system) const noexcept {
-    if (!any) return;
-    const double delta = round.scale * std::sqrt(chi2);
-    if constexpr (is_pinhole<Camera>::value) {
-      with_loss<P>(round.loss, P(static_cast<Scalar>(delta)), [&](const auto& loss) {
-        add_pinhole<P, Stereo::value>(columns, begin, end, camera, columns.baseline_fx, T, loss, system);
-      });
-    } else {
-      with_loss<double>(round.loss, delta, [&](const auto& loss) {
-        add_camera<Stereo::value>(columns, begin, end, camera, columns.baseline_fx, T, loss, system);
-      });
-    }
-  }
 };
 
 /// Leaves out the outliers by the stored errors; returns how many observations stay.
@@ -78,15 +70,11 @@ template <typename Scalar>
 int keep_inliers(const PoseOptions& options, PoseColumns<Scalar>& columns, bool& changed) noexcept {
   int count = 0;
   changed = false;
-  for_each_kind(columns, options, [&](std::size_t begin, std::size_t end, double chi2) {
-    const Scalar threshold = static_cast<Scalar>(chi2);
-    for (std::size_t i = begin; i < end; ++i) {
-      const bool inlier = columns.error[i] >= Scalar(0) && columns.error[i] <= threshold;
-      const Scalar active = inlier ? columns.weight[i] : Scalar(0);
-      count += inlier ? 1 : 0;
-      changed = changed || active != columns.active[i];
-      columns.active[i] = active;
-    }
+  for_each_observation(columns, options, [&](std::size_t i, bool inlier) {
+    const Scalar active = inlier ? columns.weight[i] : Scalar(0);
+    count += inlier ? 1 : 0;
+    changed = changed || active != columns.active[i];
+    columns.active[i] = active;
   });
   return count;
 }
@@ -97,15 +85,11 @@ template <typename Scalar>
 double count_inliers(const PoseOptions& options, const PoseColumns<Scalar>& columns, PoseResult& result,
                      span<char> inliers) noexcept {
   double active = 0, chi2_sum = 0;
-  for_each_kind(columns, options, [&](std::size_t begin, std::size_t end, double chi2) {
-    const Scalar threshold = static_cast<Scalar>(chi2);
-    for (std::size_t i = begin; i < end; ++i) {
-      const bool inlier = columns.error[i] >= Scalar(0) && columns.error[i] <= threshold;
-      result.inliers += inlier ? 1 : 0;
-      chi2_sum += inlier ? static_cast<double>(columns.weight[i] * columns.error[i]) : 0.0;
-      active += inlier ? static_cast<double>(columns.active[i]) : 0.0;
-      if (!inliers.empty()) inliers[columns.index[i]] = inlier ? 1 : 0;
-    }
+  for_each_observation(columns, options, [&](std::size_t i, bool inlier) {
+    result.inliers += inlier ? 1 : 0;
+    chi2_sum += inlier ? static_cast<double>(columns.weight[i] * columns.error[i]) : 0.0;
+    active += inlier ? static_cast<double>(columns.active[i]) : 0.0;
+    if (!inliers.empty()) inliers[columns.index[i]] = inlier ? 1 : 0;
   });
   result.chi2 = chi2_sum * columns.mean_weight;
   return active;
