@@ -62,6 +62,7 @@ TEST_CASE("Each rule is told by its name", "[frame]") {
   FrameRun<double> run(make_dynamic_scene<double>({}, 82));
   run.scene.keypoints.back() = {std::numeric_limits<double>::quiet_NaN(), 1};
   cfp::FrameOptions options;
+  options.map_point.weight = cfp::WeightRule::product;
   run.coarse(options);
   run.state.boxes[1].associated = false;
   run.fine(options);

@@ -37,9 +37,8 @@ class StaticWeights {
     frame.descriptors = Host::Descriptors(F);
     frame.flow = flow;
     if (detections) frame.detections = cfp::span<const cfp::Detection<float>>(*detections);
-    const auto coarse = mProbability.coarse(frame);
-    mReport = coarse.report;
-    F.mvStaticProbability.assign(coarse.static_probability.begin(), coarse.static_probability.end());
+    mReport = mProbability.coarse(frame).report;
+    Remember(F);
   }
 
   // Before every pose optimisation: its weights. 0 where there is no map point, or one that must not count.
@@ -66,9 +65,8 @@ class StaticWeights {
       if (found != indexInLast.end()) mMatch[i] = found->second;
       inliers += !F.mvbOutlier[i] && CountsAsInlier(F, i) ? 1 : 0;
     }
-    const auto fine = mProbability.fine({Host::Pose(F) * Host::Pose(last).inverse(), inliers}, mMatch, mM);
-    mReport = fine.report;
-    F.mvStaticProbability.assign(fine.static_probability.begin(), fine.static_probability.end());
+    mReport = mProbability.fine({Host::Pose(F) * Host::Pose(last).inverse(), inliers}, mMatch, mM).report;
+    Remember(F);
   }
 
   // When the frame has its last pose, and all matches of the local map: map points learn, once.
@@ -96,6 +94,13 @@ class StaticWeights {
   const cfp::FrameReport& Report() const { return mReport; }
 
  private:
+  // What is known of each keypoint without a map point.
+  void Remember(Frame& F) const {
+    F.mvStaticProbability.resize(mProbability.state().size());
+    for (std::size_t i = 0; i < F.mvStaticProbability.size(); ++i)
+      F.mvStaticProbability[i] = mProbability.weight(i, -1.0F);
+  }
+
   cfp::StaticProbability<typename Host::Camera> mProbability;
   cfp::FrameReport mReport;
   std::vector<std::int32_t> mMatch;

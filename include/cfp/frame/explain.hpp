@@ -72,7 +72,7 @@ template <typename Scalar>
   if (is_raised(state.label[i], state.report.health.fallback)) return WeightReason::fallback;
   const bool mismatch =
       state.report.stage == Stage::fine && is_mismatch(state.static_probability[i], m, options.map_point);
-  return mismatch ? WeightReason::mismatch : WeightReason::map_point;
+  return mismatch && model_weight(i, m, options, state) == Scalar(0) ? WeightReason::mismatch : WeightReason::map_point;
 }
 
 /// Three decimals.
@@ -138,8 +138,8 @@ template <typename Scalar>
 [[nodiscard]] inline std::string to_text(const KeypointExplanation& e) {
   using detail::number;
   constexpr const char* models[] = {"nothing", "the camera's motion", "epipolar lines", "the camera's rotation"};
-  constexpr const char* rules[] = {"the object was not there in the frame before", "not matched, on the object: 0",
-                                   "not matched, behind the object: M", "moving object: K^T K^F, both must agree",
+  constexpr const char* rules[] = {"the object was not there in the frame before", "not matched, on the object",
+                                   "not matched, behind the object", "moving object: K^T K^F, both must agree",
                                    "resting object: mean of K^T and K^F by their confidences"};
   constexpr const char* reasons[] = {"K, no map point", "K and M", "K and M differ too much: a mismatch",
                                      "raised, too few static observations in this frame"};
