@@ -52,7 +52,7 @@ class WeightedLoss : public ceres::LossFunction {
   void Evaluate(double s, double rho[3]) const override {
     rho[0] = mWeight * mLoss.value(s);
     rho[1] = mWeight * mLoss.first(s);
-    rho[2] = mWeight * mLoss.second(s);
+    rho[2] = 0;  // steps of reweighted least squares, as refine_pose takes them
   }
 
  private:
