@@ -78,7 +78,7 @@ template <typename Scalar>
   const Real inverse_height = Real(1) / std::sqrt(across.squaredNorm());
   across *= inverse_height;
   Matrix3<Real> world_axes;
-  world_axes << along, across, cross(along, across);
+  world_axes.col(0) = along, world_axes.col(1) = across, world_axes.col(2) = cross(along, across);
   const Vector3<Real> y01 = y[i1] - y[i0], y02 = y[i2] - y[i0];
   for (int k = 0; k < count; ++k) {
     const detail::Triple<Real>& p = solutions[k];
@@ -89,7 +89,7 @@ template <typename Scalar>
     const Real XX = X.squaredNorm(), YY = Y.squaredNorm(), XY = X.dot(Y);
     const Vector3<Real> axis_x = (Real(1.5) - Real(0.5) * XX) * X, axis_y = (Real(1.5) - Real(0.5) * YY) * Y - XY * X;
     Matrix3<Real> axes;
-    axes << axis_x, axis_y, cross(axis_x, axis_y);
+    axes.col(0) = axis_x, axes.col(1) = axis_y, axes.col(2) = cross(axis_x, axis_y);
     const Matrix3<Real> R = axes * world_axes.transpose();
     const Vector3<Real> t = d0 * y[i0] - R * x[i0];
     if (!t.template cast<Scalar>().allFinite()) continue;

@@ -111,9 +111,9 @@ template <typename Real>
   // The column and the row of the largest elements; a line whose u and v vanish is at infinity and holds no solution.
   const Real diagonal = uu * uu - vv * vv, other = uv * uv - vu * vu;
   const bool column = diagonal > other, row = diagonal + other > Real(0);
-  lines.u << (column ? uu : uv), (row ? uu : vu);
-  lines.v << (column ? vu : vv), (row ? uv : vv);
-  lines.w << (column ? uw - v.v : vw + v.u), (row ? uw + v.v : vw - v.u);
+  lines.u = {column ? uu : uv, row ? uu : vu};
+  lines.v = {column ? vu : vv, row ? uv : vv};
+  lines.w = {column ? uw - v.v : vw + v.u, row ? uw + v.v : vw - v.u};
   return true;
 }
 

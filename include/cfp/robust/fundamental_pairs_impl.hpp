@@ -14,7 +14,7 @@
 #include "cfp/geometry/point_pairs.hpp"
 #include "cfp/math/matrix3.hpp"
 #include "cfp/math/normal_equations.hpp"
-#include "cfp/robust/ransac.hpp"
+#include "cfp/robust/ransac_data_impl.hpp"
 #include "cfp/simd/packet.hpp"
 
 namespace cfp::detail {

@@ -13,7 +13,6 @@
 
 #include "cfp/math/matrix3.hpp"
 #include "cfp/math/so3.hpp"
-#include "cfp/optimization/least_squares.hpp"
 #include "cfp/robust/fundamental_pairs_impl.hpp"
 
 namespace cfp::detail {
@@ -89,8 +88,7 @@ struct TransferModel {
       cost += distance < 9 ? w * distance * share : 0.9 * w;
       if (!(distance < 9)) continue;
       const double weight = w * share * share * inverse_z * inverse_z / scale;
-      Eigen::Matrix<double, 9, 1> products;
-      products << x * x, x * y, x, x * y, y * y, y, x, y, 1;
+      const Eigen::Matrix<double, 9, 1> products{x * x, x * y, x, x * y, y * y, y, x, y, 1};
       moments += products * Eigen::Matrix<double, 1, 4>(weight, weight * u, weight * v, weight * (u * u + v * v));
     }
     const auto block = [&](int k) { return moments.col(k).reshaped(3, 3); };
@@ -114,15 +112,8 @@ template <typename T>
 void refine_homography(const PairColumns<T>& pairs, double scale, int max_steps, Matrix3<double>& H) noexcept {
   const Matrix3<double> start = H / H(2, 2);
   if (!start.allFinite()) return;
-  LevenbergMarquardtOptions options;
-  options.max_iterations = max_steps;
-  options.initial_damping = options.min_damping = 1e-9;
-  options.min_relative_decrease = 1e-3;
-  options.min_absolute_decrease = 0;
   TransferModel<T> model{pairs, scale};
-  DenseLeastSquares<8, Matrix3<double>, TransferModel<T>> problem(model, start);
-  (void)minimize_least_squares(problem, options);
-  H = problem.state();
+  H = refined<8>(model, start, max_steps, 1e-3);
 }
 
 }  // namespace CFP_ISA

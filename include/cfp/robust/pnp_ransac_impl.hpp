@@ -16,8 +16,8 @@
 #include "cfp/core/types.hpp"
 #include "cfp/geometry/p3p.hpp"
 #include "cfp/math/se3.hpp"
-#include "cfp/optimization/least_squares.hpp"
 #include "cfp/robust/ransac.hpp"
+#include "cfp/robust/ransac_data_impl.hpp"
 
 namespace cfp::detail {
 
@@ -94,11 +94,11 @@ struct ReprojectionModel {
       const T w = in.weights()[i], e = r.distance_sq() / scale, s = 1 / (1 + e);
       cost += e < T(25) ? w * e * s : w * T(25.0 / 26);
       if (!(e < 25)) continue;  // its weight is below 0.0015
+      const Vector6<T> dx{r.inverse_z, 0, -r.x * r.inverse_z, -r.x * r.y, 1 + r.x * r.x, -r.y};
+      const Vector6<T> dy{0, r.inverse_z, -r.y * r.inverse_z, -1 - r.y * r.y, r.x * r.y, r.x};
       Eigen::Matrix<T, 2, 6> J;
-      J.row(0) << r.inverse_z, 0, -r.x * r.inverse_z, -r.x * r.y, 1 + r.x * r.x, -r.y;
-      J.row(1) << 0, r.inverse_z, -r.y * r.inverse_z, -1 - r.y * r.y, r.x * r.y, r.x;
-      J.row(0) = (in.row(s11)[i] * J.row(0) + in.row(s12)[i] * J.row(1)).eval();
-      J.row(1) *= in.row(s22)[i];
+      J.row(0) = (in.row(s11)[i] * dx + in.row(s12)[i] * dy).transpose();
+      J.row(1) = in.row(s22)[i] * dy.transpose();
       const T weight = w * s * s / scale;
       out.H += weight * J.transpose().lazyProduct(J);
       out.g += weight * J.transpose().lazyProduct(Vector2<T>(r.u, r.v));
@@ -162,15 +162,8 @@ struct PnpProblem {
   }
 
   void refine(T scale, int max_steps, Model& pose) const {
-    LevenbergMarquardtOptions options;
-    options.max_iterations = max_steps;
-    options.initial_damping = options.min_damping = 1e-9;
-    options.min_relative_decrease = 1e-4;
-    options.min_absolute_decrease = 0;
     ReprojectionModel<T> model{in, scale};
-    DenseLeastSquares<6, Model, ReprojectionModel<T>> problem(model, pose);
-    (void)minimize_least_squares(problem, options);
-    pose = problem.state();
+    pose = refined<6>(model, pose, max_steps, 1e-4);
   }
 
   // A wide loss: four squared thresholds.

@@ -77,53 +77,6 @@ struct RansacReport {
   }
 };
 
-namespace detail {
-
-// The data present as one array per coordinate, the weight last and relative to the largest; padded with zeros to whole
-// blocks, so that loops over packets need no rest. In double and, for scoring, rounded to float.
-template <std::size_t Rows>
-struct RansacColumns {
-  static constexpr std::size_t rows = Rows, block = 64;
-
-  std::size_t size = 0, capacity = 0;
-  double total_weight = 0;
-  std::vector<std::uint32_t> index;  // position in the caller's arrays
-  std::vector<double> exact;
-  std::vector<float> fast;
-
-  [[nodiscard]] const double* row(std::size_t r) const noexcept { return exact.data() + r * capacity; }
-  [[nodiscard]] double* row(std::size_t r) noexcept { return exact.data() + r * capacity; }
-  [[nodiscard]] const float* fast_row(std::size_t r) const noexcept { return fast.data() + r * capacity; }
-  [[nodiscard]] span<const double> weights() const noexcept { return {row(Rows - 1), size}; }
-
-  void begin(std::size_t most) {
-    size = 0;
-    capacity = (most + block - 1) / block * block;
-    index.resize(most);
-    exact.assign(Rows * capacity, 0.0);
-    fast.resize(Rows * capacity);
-  }
-  void push(std::size_t i, const double (&datum)[Rows]) noexcept {
-    for (std::size_t r = 0; r < Rows; ++r) row(r)[size] = datum[r];
-    index[size++] = static_cast<std::uint32_t>(i);
-  }
-};
-
-inline namespace CFP_ISA {
-
-template <std::size_t Rows>
-void finish(RansacColumns<Rows>& columns) noexcept {
-  double* const weight = columns.row(Rows - 1);
-  const double largest = columns.size > 0 ? *std::max_element(weight, weight + columns.size) : 1.0;
-  columns.total_weight = 0;
-  for (std::size_t i = 0; i < columns.size; ++i) columns.total_weight += weight[i] /= largest;
-  std::transform(columns.exact.begin(), columns.exact.end(), columns.fast.begin(),
-                 [](double x) { return static_cast<float>(x); });
-}
-
-}  // namespace CFP_ISA
-}  // namespace detail
-
 inline namespace CFP_ISA {
 
 /// The first field outside its range.
@@ -204,29 +157,4 @@ template <typename Problem>
 
 }  // namespace CFP_ISA
 
-namespace detail {
-inline namespace CFP_ISA {
-
-// Fills the counts, the share and the mask (empty, or one per datum of the caller, all 0). Too few inliers are no
-// consensus.
-template <std::size_t Rows, typename IsInlier>
-void report_inliers(const RansacColumns<Rows>& data, IsInlier&& is_inlier, std::size_t min_inliers,
-                    span<char> inlier_mask, RansacReport& report) {
-  double weight = 0;
-  for (std::size_t i = 0; i < data.size; ++i) {
-    if (!is_inlier(i)) continue;
-    ++report.inliers;
-    weight += data.weights()[i];
-    if (!inlier_mask.empty()) inlier_mask[data.index[i]] = 1;
-  }
-  report.inlier_share = (std::min)(weight / data.total_weight, 1.0);
-  if (report.inliers >= min_inliers) return;
-  std::fill(inlier_mask.begin(), inlier_mask.end(), char(0));
-  report.inliers = 0;
-  report.inlier_share = 0;
-  report.status = RansacStatus::no_consensus;
-}
-
-}  // namespace CFP_ISA
-}  // namespace detail
 }  // namespace cfp

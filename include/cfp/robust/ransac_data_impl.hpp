@@ -1,0 +1,93 @@
+/// @file ransac_data_impl.hpp
+/// What the estimators over ransac.hpp share beside the search: their data, its refinement, the report. Not an
+/// interface.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "cfp/core/span.hpp"
+#include "cfp/optimization/least_squares.hpp"
+#include "cfp/robust/ransac.hpp"
+
+namespace cfp::detail {
+
+// The data present as one array per coordinate, the weight last and relative to the largest; padded with zeros to whole
+// blocks, so that loops over packets need no rest. In double and, for scoring, rounded to float.
+template <std::size_t Rows>
+struct RansacColumns {
+  static constexpr std::size_t rows = Rows, block = 64;
+
+  std::size_t size = 0, capacity = 0;
+  double total_weight = 0;
+  std::vector<std::uint32_t> index;  // position in the caller's arrays
+  std::vector<double> exact;
+  std::vector<float> fast;
+
+  [[nodiscard]] const double* row(std::size_t r) const noexcept { return exact.data() + r * capacity; }
+  [[nodiscard]] double* row(std::size_t r) noexcept { return exact.data() + r * capacity; }
+  [[nodiscard]] const float* fast_row(std::size_t r) const noexcept { return fast.data() + r * capacity; }
+  [[nodiscard]] span<const double> weights() const noexcept { return {row(Rows - 1), size}; }
+
+  void begin(std::size_t most) {
+    size = 0;
+    capacity = (most + block - 1) / block * block;
+    index.resize(most);
+    exact.assign(Rows * capacity, 0.0);
+    fast.resize(Rows * capacity);
+  }
+  void push(std::size_t i, const double (&datum)[Rows]) noexcept {
+    for (std::size_t r = 0; r < Rows; ++r) row(r)[size] = datum[r];
+    index[size++] = static_cast<std::uint32_t>(i);
+  }
+};
+
+inline namespace CFP_ISA {
+
+template <std::size_t Rows>
+void finish(RansacColumns<Rows>& columns) noexcept {
+  double* const weight = columns.row(Rows - 1);
+  const double largest = columns.size > 0 ? *std::max_element(weight, weight + columns.size) : 1.0;
+  columns.total_weight = 0;
+  for (std::size_t i = 0; i < columns.size; ++i) columns.total_weight += weight[i] /= largest;
+  std::transform(columns.exact.begin(), columns.exact.end(), columns.fast.begin(),
+                 [](double x) { return static_cast<float>(x); });
+}
+
+// The state after at most max_steps that each lower the model's cost by more than `tolerance` of it.
+template <int N, typename Model, typename State>
+[[nodiscard]] State refined(Model& model, const State& start, int max_steps, double tolerance) {
+  LevenbergMarquardtOptions options;
+  options.max_iterations = max_steps;
+  options.initial_damping = options.min_damping = 1e-9;
+  options.min_relative_decrease = tolerance;
+  options.min_absolute_decrease = 0;
+  DenseLeastSquares<N, State, Model> problem(model, start);
+  (void)minimize_least_squares(problem, options);
+  return problem.state();
+}
+
+// Fills the counts, the share and the mask (empty, or one per datum of the caller, all 0). Too few inliers are no
+// consensus.
+template <std::size_t Rows, typename IsInlier>
+void report_inliers(const RansacColumns<Rows>& data, IsInlier&& is_inlier, std::size_t min_inliers,
+                    span<char> inlier_mask, RansacReport& report) {
+  double weight = 0;
+  for (std::size_t i = 0; i < data.size; ++i) {
+    if (!is_inlier(i)) continue;
+    ++report.inliers;
+    weight += data.weights()[i];
+    if (!inlier_mask.empty()) inlier_mask[data.index[i]] = 1;
+  }
+  report.inlier_share = (std::min)(weight / data.total_weight, 1.0);
+  if (report.inliers >= min_inliers) return;
+  std::fill(inlier_mask.begin(), inlier_mask.end(), char(0));
+  report.inliers = 0;
+  report.inlier_share = 0;
+  report.status = RansacStatus::no_consensus;
+}
+
+}  // namespace CFP_ISA
+}  // namespace cfp::detail
