@@ -187,8 +187,7 @@ void run(const std::filesystem::path& folder, const std::filesystem::path& out, 
     cv::cvtColor(picture, current.gray, cv::COLOR_BGR2GRAY);
     orb->detectAndCompute(current.gray, cv::noArray(), current.keypoints, current.descriptors);
     current.depths.resize(current.keypoints.size());
-    cfp::sample_depth(depth, cfp::view(current.keypoints), 1 / tum.depth_units_per_metre,
-                      cfp::span<float>(current.depths));
+    cfp::sample_depth(depth, cfp::view(current.keypoints), 1 / tum.depth_units_per_metre, current.depths);
     const std::vector<std::int32_t> matches = match(previous, current);
     for (const std::int32_t j : matches)
       current.map_points.push_back(j == cfp::no_match ? 1.0F : previous.map_points[static_cast<std::size_t>(j)]);

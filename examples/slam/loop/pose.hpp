@@ -47,7 +47,7 @@ class PoseSolver {
     observations.baseline_fx = view.baseline_fx;
     inlier_.resize(keypoint_.size());
     const auto solve = [&](const cfp::SE3<double>& start, const cfp::PoseOptions& options) {
-      return cfp::refine_pose(observations, view.exact, start, options, workspace_, cfp::span<char>(inlier_));
+      return cfp::refine_pose(observations, view.exact, start, options, workspace_, inlier_);
     };
     cfp::PoseResult result = solve(frame.T_cam_world, options_.pose);
     std::optional<cfp::PoseStep> step;

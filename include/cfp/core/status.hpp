@@ -20,17 +20,8 @@ enum class Status : std::uint8_t {
 
 /// The enumerator's name, for reports.
 [[nodiscard]] constexpr const char* to_string(Status status) noexcept {
-  switch (status) {
-    case Status::ok:
-      return "ok";
-    case Status::not_enough_data:
-      return "not enough data";
-    case Status::degenerate:
-      return "degenerate";
-    case Status::invalid_input:
-      return "invalid input";
-  }
-  return "unknown";
+  constexpr const char* names[] = {"ok", "not enough data", "degenerate", "invalid input"};
+  return status <= Status::invalid_input ? names[static_cast<int>(status)] : "unknown";
 }
 
 }  // namespace cfp

@@ -28,17 +28,8 @@ enum class AlignmentMode : std::uint8_t {
 
 /// The enumerator's name, for reports.
 [[nodiscard]] constexpr const char* to_string(AlignmentMode mode) noexcept {
-  switch (mode) {
-    case AlignmentMode::none:
-      return "none";
-    case AlignmentMode::first_pose:
-      return "first pose";
-    case AlignmentMode::rigid:
-      return "SE(3)";
-    case AlignmentMode::similarity:
-      return "Sim(3)";
-  }
-  return "unknown";
+  constexpr const char* names[] = {"none", "first pose", "SE(3)", "Sim(3)"};
+  return mode <= AlignmentMode::similarity ? names[static_cast<int>(mode)] : "unknown";
 }
 
 /// p_a = scale * rotation * p_b + translation.

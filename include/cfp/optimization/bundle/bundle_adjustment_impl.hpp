@@ -9,6 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/Core>
+
+#include "cfp/math/so3.hpp"
 #include "cfp/optimization/bundle/bundle_elimination_impl.hpp"
 #include "cfp/optimization/bundle/bundle_order_impl.hpp"
 #include "cfp/optimization/bundle/bundle_problem.hpp"
@@ -88,6 +91,19 @@ void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& work
     const Vector3<double>& x = problem.points[to_index(index.caller_point[j])];
     std::copy(x.data(), x.data() + 3, workspace.state.points.data() + 3 * j);
   }
+}
+
+/// The steps applied; fixed poses are copied.
+inline void move(const BundleIndex& index, const BundleState& state, const BundleSchur& schur,
+                 BundleState& next) noexcept {
+  std::copy(state.poses.begin(), state.poses.end(), next.poses.begin());
+  for (std::size_t k = 0; k < index.free_poses; ++k) {
+    const double* xi = schur.pose_steps.data() + 6 * k;
+    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> rotation(next.poses[k].rotation);
+    rotation = Matrix3<double>(rotation) * so3_exp(Vector3<double>(xi[3], xi[4], xi[5]));
+    for (std::size_t e = 0; e < 3; ++e) next.poses[k].center[e] -= xi[e];
+  }
+  for (std::size_t e = 0; e < state.points.size(); ++e) next.points[e] = state.points[e] + schur.point_steps[e];
 }
 
 /// Bundle adjustment as minimize_least_squares wants it.

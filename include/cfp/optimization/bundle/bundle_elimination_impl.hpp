@@ -15,8 +15,7 @@
 
 #include <Eigen/Core>
 
-#include "cfp/math/matrix3.hpp"
-#include "cfp/math/so3.hpp"
+#include "cfp/core/types.hpp"
 #include "cfp/optimization/bundle/bundle_linearization_impl.hpp"
 
 namespace cfp::detail {
@@ -210,19 +209,6 @@ template <int N>
     promised += h.dot(Kind::damping(linear, lambda, i).cwiseProduct(h) - Kind::gradient(linear, i));
   }
   return promised;
-}
-
-/// The steps applied; fixed poses are copied.
-inline void move(const BundleIndex& index, const BundleState& state, const BundleSchur& schur,
-                 BundleState& next) noexcept {
-  std::copy(state.poses.begin(), state.poses.end(), next.poses.begin());
-  for (std::size_t k = 0; k < index.free_poses; ++k) {
-    const double* xi = schur.pose_steps.data() + 6 * k;
-    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> rotation(next.poses[k].rotation);
-    rotation = Matrix3<double>(rotation) * so3_exp(Vector3<double>(xi[3], xi[4], xi[5]));
-    for (std::size_t e = 0; e < 3; ++e) next.poses[k].center[e] -= xi[e];
-  }
-  for (std::size_t e = 0; e < state.points.size(); ++e) next.points[e] = state.points[e] + schur.point_steps[e];
 }
 
 }  // namespace CFP_ISA
