@@ -73,6 +73,7 @@ TEST_CASE("With a label image, the pairs on an object are those on its label", "
   FrameRun<double> run(scene);
   cfp::Frame<double> frame = run.frame();
   frame.labels = {pixels.data(), 640, 480, 640};
+  frame.fundamental = cfp::fundamental_from_pose(scene.camera, scene.T_cur_prev);
   const cfp::FrameReport report = run.coarse({}, frame, scene.camera);
   for (std::size_t i = 0; i < scene.keypoints.size(); ++i) {
     const int label = cfp::label_at(frame.labels, scene.keypoints[i][0], scene.keypoints[i][1]);

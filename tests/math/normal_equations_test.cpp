@@ -85,9 +85,9 @@ TEST_CASE("An undetermined, indefinite or non-finite system has no step", "[math
   CHECK_FALSE(solve_normal_equations<3>(H, g, 0, 1e-12, step));
   CHECK(solve_normal_equations<3>(H, g, 1e-3, 1e-12, step));
   H = Eigen::Matrix3d::Identity();
-  H(0, 1) = H(1, 0) = 0.99;  // pivot 1 - 0.99^2 = 0.0199
-  CHECK(solve_normal_equations<3>(H, g, 0, 0.0198, step));
-  CHECK_FALSE(solve_normal_equations<3>(H, g, 0, 0.02, step));
+  H(0, 1) = H(1, 0) = 0.99;  // pivot 1 - 0.99^2 = 0.0199 of v = (-0.99, 1): 0.0199 / 1.99^2 = 0.005025
+  CHECK(solve_normal_equations<3>(H, g, 0, 0.00502, step));
+  CHECK_FALSE(solve_normal_equations<3>(H, g, 0, 0.00503, step));
   for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     H = Eigen::Matrix3d::Identity();
     H(2, 2) = bad;

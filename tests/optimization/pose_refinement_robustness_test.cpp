@@ -80,7 +80,7 @@ TEMPLATE_TEST_CASE("Pose refinement: three observations suffice", "[optimization
 
 TEMPLATE_TEST_CASE("Pose refinement: collinear and coincident points are degenerate", "[optimization]", float, double) {
   for (const bool coincident : {false, true}) {
-    for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    for (std::uint64_t seed = 0; seed < 100; ++seed) {
       auto scene = make_pose_scene<double>(seed);
       cfp::Random random(seed, "line");
       const cfp::Vector3<double> a = scene.truth.inverse() * cfp::Vector3<double>(0.1, -0.2, 2),

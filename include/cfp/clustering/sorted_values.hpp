@@ -58,9 +58,9 @@ SortedValues<Scalar> sort_values(span<const non_deduced<Scalar>> values, const K
 
   // The bucket is monotone in the value, also after rounding, so the buckets are in order.
   Scalar scale = static_cast<Scalar>(2 * n) / (high - low);
-  if (!is_finite(scale)) scale = Scalar(0);  // equal values, or too near each other
+  if (!is_finite(scale)) scale = Scalar(0);  // equal values, or too near each other; 0 for a range that overflows
   const auto bucket = [=](const Item& item) {
-    return (std::min)(static_cast<std::size_t>((item.value - low) * scale), 2 * n);
+    return scale > Scalar(0) ? (std::min)(static_cast<std::size_t>((item.value - low) * scale), 2 * n) : 0;
   };
   std::vector<std::size_t>& end = workspace.bucket_end;
   end.assign(2 * n + 2, 0);

@@ -25,15 +25,16 @@ namespace cfp {
 inline namespace CFP_ISA {
 
 /// Solves (H + damping diag H) step = -g by Cholesky (L D L^T) of the matrix scaled to a unit diagonal; H symmetric,
-/// its upper triangle is read. False, and step meaningless, for an H that is not positive definite, whose smallest
-/// pivot, 1 - (multiple correlation)^2 of an unknown with those before it, is at or below `tolerance`, or when the step
-/// is not finite. Allocates nothing.
+/// its upper triangle is read. False, and step meaningless, for an H that is not positive definite, one of whose
+/// pivots, 1 - (multiple correlation)^2 of an unknown with those before it, does not stand out of the rounding of H, or
+/// when the step is not finite. A pivot is v' H v with v = (-regression on those before, 1): elements of H with a
+/// relative error of `tolerance` move it by up to tolerance |v|_1^2. Allocates nothing.
 template <int N>
 [[nodiscard]] bool solve_normal_equations(const Eigen::Matrix<double, N, N>& H, const Eigen::Matrix<double, N, 1>& g,
                                           double damping, double tolerance,
                                           Eigen::Matrix<double, N, 1>& step) noexcept {
   constexpr std::size_t n = static_cast<std::size_t>(N);
-  double scale[n], L[n][n], pivot[n], inverse[n];
+  double scale[n], L[n][n], V[n][n], pivot[n], inverse[n];  // V = L^-1
   for (int i = 0; i < N; ++i) {
     if (!(H(i, i) > 0) || !is_finite(H(i, i))) return false;
     scale[i] = 1 / std::sqrt(H(i, i));
@@ -41,7 +42,13 @@ template <int N>
   for (int j = 0; j < N; ++j) {
     double d = 1 + damping;
     for (int k = 0; k < j; ++k) d -= L[j][k] * L[j][k] * pivot[k];
-    if (!(d > tolerance)) return false;
+    double spread = 1;
+    for (int i = 0; i < j; ++i) {
+      V[j][i] = -L[j][i];
+      for (int k = i + 1; k < j; ++k) V[j][i] -= L[j][k] * V[k][i];
+      spread += std::abs(V[j][i]);
+    }
+    if (!(d > tolerance * spread * spread)) return false;
     pivot[j] = d;
     inverse[j] = 1 / d;
     for (int i = j + 1; i < N; ++i) {
