@@ -96,7 +96,8 @@ void run_recording(const fs::path& recording, const Arguments& a) {
       const fs::path out = cfp_slam::run_folder(a.out, settings);
       if (a.resume && cfp_slam::is_done(out, settings)) continue;
       cfp_examples::Progress progress(sequence.name() + ' ' + variant, frames);
-      cfp_slam::run_into(out, sequence, *detector, settings, a.threads > 1, progress);
+      const std::string said = cfp_slam::run_into(out, sequence, *detector, settings, a.threads > 1, progress);
+      if (!said.empty()) std::fprintf(stderr, "%s %s: %s\n", sequence.name().c_str(), variant.c_str(), said.c_str());
       std::printf("%s\n", (out / "trajectory.txt").c_str());
     }
   }

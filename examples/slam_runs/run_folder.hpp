@@ -82,10 +82,10 @@ inline Options options_of(const RunSettings& settings, bool threads) {
   return options;
 }
 
-// Runs the loop and writes its files. An interrupted run has no run.txt.
-inline void run_into(const std::filesystem::path& folder, const cfp_examples::Sequence& sequence,
-                     cfp_examples::Detector& detector, const RunSettings& settings, bool threads,
-                     const std::function<void(std::size_t)>& progress) {
+// Runs the loop and writes its files. An interrupted run has no run.txt. Returns what went wrong on the way, in words.
+inline std::string run_into(const std::filesystem::path& folder, const cfp_examples::Sequence& sequence,
+                            cfp_examples::Detector& detector, const RunSettings& settings, bool threads,
+                            const std::function<void(std::size_t)>& progress) {
   std::filesystem::create_directories(folder);
   std::filesystem::remove(folder / "run.txt");
   RunWriter writer(folder, progress);
@@ -93,12 +93,17 @@ inline void run_into(const std::filesystem::path& folder, const cfp_examples::Se
   writer.close();
   {
     std::ofstream out = open_text(folder / "trajectory.txt", "timestamp tx ty tz qx qy qz qw");
-    for (const auto& pose : result.trajectory) out << cfp_examples::tum_line(pose) << '\n';
+    for (std::size_t p = 0; p < result.trajectory.size(); ++p) {
+      if (p > 0 && result.world[p] != result.world[p - 1])
+        out << "# cut: the poses from here to the next cut are in world " << result.world[p] << '\n';
+      out << cfp_examples::tum_line(result.trajectory[p]) << '\n';
+    }
     if (!out.flush()) throw std::runtime_error("cannot write " + (folder / "trajectory.txt").string());
   }
   std::ofstream out(folder / "run.txt", std::ios::binary);
   out << settings.text() << "keyframes " << result.keyframes << "\nmap_points " << result.map_points << '\n';
   if (!out.flush()) throw std::runtime_error("cannot write " + (folder / "run.txt").string());
+  return text_of(writer.said());
 }
 
 }  // namespace cfp_slam

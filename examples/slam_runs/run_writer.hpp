@@ -2,6 +2,7 @@
 // every column).
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
@@ -11,6 +12,7 @@
 #include <fstream>
 #include <functional>
 #include <locale>
+#include <map>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -45,6 +47,22 @@ inline std::ofstream open_text(const std::filesystem::path& file, const char* co
   out << "# " << columns << '\n';
   if (!out) throw std::runtime_error("cannot write " + file.string());
   return out;
+}
+
+// What the notes of frames said, without their numbers, and in how many frames.
+using Said = std::map<std::string, int>;
+inline void listen(const FrameRecord& record, Said& said) {
+  for (std::size_t from = 0; from < record.note.size();) {
+    const std::size_t to = std::min(record.note.find("; ", from), record.note.size());
+    const std::string note = record.note.substr(from, to - from);
+    ++said[note.substr(0, note.find(": "))];
+    from = to + 2;
+  }
+}
+inline std::string text_of(const Said& said) {
+  std::string text;
+  for (const auto& [what, times] : said) text += (text.empty() ? "" : "; ") + std::to_string(times) + "x " + what;
+  return text;
 }
 
 class RunWriter final : public Observer {
@@ -86,8 +104,12 @@ class RunWriter final : public Observer {
                  << k.foreground << ' ' << k.coarse << ' ' << k.fine << ' ' << k.map_point << '\n';
     }
     inside_.clear();
+    listen(record, said_);
     progress_(++frame_);
   }
+
+  // How often something was said, numbers left out.
+  [[nodiscard]] const Said& said() const { return said_; }
 
   // Throws when something could not be written.
   void close() {
@@ -132,6 +154,7 @@ class RunWriter final : public Observer {
   std::ofstream frames_, boxes_, keypoints_;
   std::vector<Inside> inside_;  // the keypoints in boxes of the frame under way
   std::size_t frame_ = 0;
+  Said said_;
 };
 
 }  // namespace cfp_slam

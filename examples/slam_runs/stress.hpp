@@ -99,6 +99,14 @@ inline std::vector<Stress> stresses(std::size_t frames, double rate_hz, const cf
   add("covered", 10, &Stress::image, [](std::size_t, SequenceFrame& f) {
     detail::each_image(f, [](cv::Mat& image) { image.setTo(cv::Scalar::all(image.channels() == 3 ? 60 : 0)); });
   });
+  // The camera sees the left half of everything, then for two seconds the right half, of which no map knows, then all.
+  add("halves", 2 * rate_hz, &Stress::image, [first](std::size_t k, SequenceFrame& f) {
+    detail::each_image(f, [&](cv::Mat& image) {
+      const cv::Rect hidden(k < first ? image.cols / 2 : 0, 0, image.cols / 2, image.rows);
+      image(hidden).setTo(cv::Scalar::all(image.channels() == 3 ? 60 : 0));
+    });
+  });
+  if (all.back().name == "halves") all.back().first = 0;
   add("motion blur", 12, &Stress::image, [](std::size_t, SequenceFrame& f) {
     cv::Mat blurred;
     cv::blur(f.bgr, blurred, {31, 3});

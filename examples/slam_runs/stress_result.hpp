@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cfp/evaluation/trajectory.hpp"
+#include "run_writer.hpp"
 #include "stress.hpp"
 
 namespace cfp_slam {
@@ -79,12 +80,11 @@ inline StressResult judge(const cfp_examples::Sequence& sequence, const Stress& 
       squares += errors[k] * errors[k];
     }
   }
-  std::map<std::string, int> said;
+  Said said;
   std::size_t wrong_in_a_row = 0;
   int since_stress = 0;
   for (const FrameRecord& record : records) {
-    const std::string what = record.note.substr(0, record.note.find(':'));
-    if (!what.empty()) ++said[what];
+    listen(record, said);
     const auto error = error_at.find(record.time_s);
     const bool posed = error != error_at.end();
     result.poses += posed;
@@ -99,8 +99,7 @@ inline StressResult judge(const cfp_examples::Sequence& sequence, const Stress& 
     }
   }
   result.rmse_m = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(run.trajectory.size(), 1)));
-  for (const auto& [what, times] : said)
-    result.reported += (result.reported.empty() ? "" : "; ") + std::to_string(times) + "x " + what;
+  result.reported = text_of(said);
   return result;
 }
 

@@ -195,6 +195,8 @@ template struct cfp::Frame<float>;
 template struct cfp::Frame<double>;
 template struct cfp::FrameState<float>;
 template struct cfp::FrameState<double>;
+template class cfp::DetectorHealth<float>;
+template class cfp::DetectorHealth<double>;
 template struct cfp::FlowModel<float>;
 template struct cfp::FlowModel<double>;
 template class cfp::StaticProbability<cfp::PinholeCamera<float>>;
@@ -214,6 +216,8 @@ static void instantiate_frame() noexcept {
   use(&cfp::frame_health<Scalar>);
   use(&cfp::apply_fallback<Scalar>);
   use(&cfp::assess_pose<Scalar>);
+  use(&cfp::is_absurd<Scalar>);
+  use(&cfp::is_jump<Scalar>);
   use(&cfp::may_create_map_point<Scalar>);
   use(&cfp::counts_as_inlier<Scalar>);
   use(&cfp::explain<Scalar>);

@@ -175,9 +175,13 @@
   CFP_LAYOUT(cfp::FrameReport, health) \
   CFP_LAYOUT(cfp::ConstraintExplanation, confidence) \
   CFP_LAYOUT(cfp::KeypointExplanation, weight) \
+  CFP_LAYOUT(cfp::DetectorHealthOptions, image_height) \
+  CFP_LAYOUT_OPAQUE(cfp::DetectorHealth<float>) \
+  CFP_LAYOUT_OPAQUE(cfp::DetectorHealth<double>) \
   CFP_LAYOUT(cfp::PoseHealthOptions, image_height) \
   CFP_LAYOUT(cfp::PoseAssessment, rotation_sigma_rad) \
-  CFP_LAYOUT(cfp::PoseStep, dt_s) \
+  CFP_LAYOUT(cfp::PoseStep<float>, dt_s) \
+  CFP_LAYOUT(cfp::PoseStep<double>, dt_s) \
   CFP_LAYOUT(cfp::FrameIntervalOptions, shortest_s) \
   CFP_LAYOUT_OPAQUE(cfp::FrameInterval) \
   CFP_LAYOUT(cfp::FrameMemory<float>, descriptor_bytes) \

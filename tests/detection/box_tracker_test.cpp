@@ -193,6 +193,22 @@ TEST_CASE("A frame without a detector run predicts and forgets nobody", "[detect
   }
 }
 
+TEST_CASE("While the detector does not run, boxes are carried on for max_idle frames", "[detection]") {
+  for (const int max_idle : {0, 3, 20}) {  // never shorter than max_coast, 6
+    cfp::BoxTrackerOptions options;
+    options.max_idle = max_idle;
+    cfp::BoxTracker<double> tracker(options);
+    for (int k = 0; k < 30; ++k) tracker.track(Detections{{{10, 10, 90, 200}, 0, 1}}, 1.0 / 30);
+    int carried = 0;
+    while (!tracker.coast(1.0 / 30).boxes.empty()) ++carried;
+    CHECK(carried == std::max(6, max_idle));
+    for (int k = 0; k < 30; ++k) tracker.track(Detections{{{10, 10, 90, 200}, 0, 1}}, 1.0 / 30);
+    carried = 0;
+    while (!tracker.track({}, 1.0 / 30).boxes.empty()) ++carried;
+    CHECK(carried == 6);  // it ran, and saw nothing
+  }
+}
+
 TEST_CASE("A long gap ends all tracks", "[detection]") {
   cfp::BoxTracker<double> tracker;
   const Box box{10, 10, 60, 160};
@@ -318,6 +334,7 @@ TEST_CASE("Tracker options outside their range are named", "[detection]") {
   };
   CHECK(named([](auto& o) { o.min_iou = 1; }) == "min_iou");
   CHECK(named([](auto& o) { o.max_coast = -1; }) == "max_coast");
+  CHECK(named([](auto& o) { o.max_idle = -1; }) == "max_idle");
   CHECK(named([](auto& o) { o.confirm_hits = 0; }) == "confirm_hits");
   CHECK(named([](auto& o) { o.max_gap_s = nan_value; }) == "max_gap_s");
   CHECK(named([](auto& o) { o.motion.edge_noise = 0; }) == "motion.edge_noise");

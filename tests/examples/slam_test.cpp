@@ -212,6 +212,40 @@ TEST_CASE("What crosses the view and no detector knows does not take the camera 
   CHECK(result.right >= 105);
 }
 
+TEST_CASE("After a second of being lost a new map begins, and is joined to the old one when both are in view",
+          "[slam]") {
+  std::vector<FrameRecord> records;
+  const StressResult result = under("halves", records);
+  REQUIRE(records.size() == 120);
+  for (std::size_t k = 40; k < 69; ++k) CHECK(records[k].outcome == Outcome::lost);
+  CHECK(result.reported.find("1x new map") != std::string::npos);
+  CHECK(result.reported.find("1x joined") != std::string::npos);
+  CHECK(result.wrong == 0);
+  CHECK(result.right == result.poses);
+}
+
+TEST_CASE("A detector that falls silent is noticed, and what it knew is carried on", "[slam]") {
+  struct Silent final : cfp_examples::Detector {
+    Silent() : Detector("silent", {"person"}) {}
+    cfp_examples::Detections detect(const cv::Mat& bgr, double) override {
+      const float shift = 0.01F * static_cast<float>(++frame_);
+      if (frame_ > 20) return {};
+      return {{{0.3F * float(bgr.cols) + shift, 10, 0.6F * float(bgr.cols), float(bgr.rows) - 10}, 0, 0.9F}};
+    }
+    int frame_ = 0;
+  } detector;
+  StressObserver observer;
+  Options options;
+  options.threads = false;
+  run_slam(Sequence(rendered()), detector, options, observer);
+  REQUIRE(observer.records.size() == frames);
+  for (std::size_t k = 0; k < frames; ++k) {
+    CAPTURE(k);
+    CHECK((observer.records[k].note.find("detector silent") != std::string::npos) == (k >= 22));
+    CHECK(observer.records[k].boxes.size() == 1);  // six frames without its being noticed
+  }
+}
+
 TEST_CASE("Damaged frames are skipped with their line; the others are tracked", "[slam]") {
   cfp_test::TemporaryFolder folder;
   changed(folder, [&](std::size_t k, const std::filesystem::path& image) {

@@ -46,7 +46,7 @@ struct Scene {
     pose = cfp::refine_pose(observations, camera, {}, cfp::PoseOptions{}, workspace, cfp::span<char>(inliers));
     return *this;
   }
-  cfp::PoseAssessment assess(const std::optional<cfp::PoseStep>& step = std::nullopt) const {
+  cfp::PoseAssessment assess(const std::optional<cfp::PoseStep<double>>& step = std::nullopt) const {
     return cfp::assess_pose<double>(pose, pixels, weights, inliers, step, options);
   }
 };
@@ -75,7 +75,7 @@ TEST_CASE("Each reason not to believe a pose has its own name", "[health]") {
   scene.options.max_rotation_sigma_rad = 1e-6;
   CHECK(scene.assess().status == PoseHealth::uncertain);
   scene.options = {};
-  cfp::PoseStep step;
+  cfp::PoseStep<double> step;
   step.dt_s = 0.033;
   CHECK(scene.assess(step).status == PoseHealth::ok);
   step.T_cur_last.translation.x() = 0.5;
@@ -120,7 +120,7 @@ TEST_CASE("Hostile input is judged, never believed", "[health]") {
   CHECK(scene.assess().status == PoseHealth::uncertain);
   for (double& w : scene.weights) w = nan;
   CHECK(scene.assess().status == PoseHealth::too_few_inliers);
-  cfp::PoseStep step;
+  cfp::PoseStep<double> step;
   step.dt_s = nan;
   step.T_cur_last.translation.x() = nan;
   CHECK(cfp::is_jump(step, {}));

@@ -38,6 +38,7 @@ struct MapPoint {
 
 struct Keyframe {
   Frame frame;
+  int world = 0;                // after a loss a new one begins; what is in two of them has no common frame
   std::vector<int> neighbours;  // keyframes that share points when this one was made, most first
 };
 
@@ -49,9 +50,28 @@ class Map {
   [[nodiscard]] bool is_alive(int point) const {
     return point != no_point && points[static_cast<std::size_t>(point)].alive;
   }
-  // Whether keyframes agree about it, as soon as there are some.
+  // Whether keyframes agree about it, as soon as there are some in its world.
   [[nodiscard]] bool is_proven(int index) const {
-    return keyframes.size() < 3 || point(index).observations.size() >= 2;
+    return keyframes.size() < first_of_world_ + 3 || point(index).observations.size() >= 2;
+  }
+  // The keyframes to come are in a world of their own.
+  int begin_world() {
+    first_of_world_ = keyframes.size();
+    return ++newest_world_;
+  }
+  [[nodiscard]] int newest_world() const { return newest_world_; }
+  // Moves the newest world onto another, of which it is a part from now on.
+  void join(int other, const cfp::SE3<double>& T_other_newest) {
+    for (MapPoint& p : points) {
+      if (!p.alive || keyframe(p.created_by).world != newest_world_) continue;
+      p.position = T_other_newest * p.position;
+      p.normal = T_other_newest.rotation * p.normal;
+    }
+    for (Keyframe& k : keyframes) {
+      if (k.world != newest_world_) continue;
+      k.frame.T_cam_world = k.frame.T_cam_world * T_other_newest.inverse();
+      k.world = other;
+    }
   }
   [[nodiscard]] MapPoint& point(int index) { return points[static_cast<std::size_t>(index)]; }
   [[nodiscard]] const MapPoint& point(int index) const { return points[static_cast<std::size_t>(index)]; }
@@ -97,6 +117,10 @@ class Map {
     }
     return result;
   }
+
+ private:
+  int newest_world_ = 0;
+  std::size_t first_of_world_ = 0;
 };
 
 }  // namespace cfp_slam

@@ -55,9 +55,7 @@ class Mapping {
     if (frames_since >= options_.max_gap) return true;
     std::size_t of_reference = 0, close = 0, close_new = 0;
     for (const int p : map.keyframe(reference).frame.map_point) {
-      if (map.is_alive(p) &&
-          (map.keyframes.size() < 3 || map.point(p).observations.size() >= options_.min_observations))
-        ++of_reference;
+      if (map.is_alive(p) && map.is_proven(p)) ++of_reference;
     }
     for (std::size_t i = 0; i < frame.size(); ++i) {
       if (may_create(frame, i) && frame.depths_m[i] < options_.close_m)
@@ -69,9 +67,9 @@ class Mapping {
 
   // Adds the frame as a keyframe; keypoints with depth that see no point yet and may be static make new ones, M = K.
   // Returns its index.
-  int insert(Map& map, const Frame& frame, const View& view) const {
+  int insert(Map& map, const Frame& frame, int world, const View& view) const {
     const int index = static_cast<int>(map.keyframes.size());
-    map.keyframes.push_back({frame, {}});
+    map.keyframes.push_back({frame, world, {}});
     Frame& kept = map.keyframes.back().frame;
     const cfp::SE3<double> T_world_cam = kept.T_cam_world.inverse();
     for (std::size_t i = 0; i < kept.size(); ++i) {

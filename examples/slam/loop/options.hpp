@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "../../support/orb_features.hpp"
+#include "cfp/frame/detector_health.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/pose_health.hpp"
 #include "cfp/interop/opencv_flow.hpp"
@@ -43,10 +44,13 @@ struct Options {
   cfp::PoseHealthOptions first_health = first_pose_health();              // what a pose of the coarse weights must have
   cfp::PoseHealthOptions health;                                          // what a tracked frame's pose must have
   cfp::PoseHealthOptions relocalised_health = relocalised_pose_health();  // what one from the map alone must have
-  cfp::FrameIntervalOptions interval;                                     // the motion model is not asked over a gap
-  double unproven_share = 0.1;      // in the pose: weight of what fewer than two keyframes saw, relative to all else
-  int probation = 5;                // frames after a relocalisation in which the map learns nothing
-  std::size_t enough_matches = 40;  // with the last frame; with fewer the search is widened
+  cfp::DetectorHealthOptions detector_health;
+  int max_idle = 30;                   // frames over which boxes are carried on while the detector is not believed
+  double new_map_after_s = 1;          // of being lost
+  cfp::FrameIntervalOptions interval;  // the motion model is not asked over a gap
+  double unproven_share = 0.1;         // in the pose: weight of what fewer than two keyframes saw, relative to all else
+  int probation = 5;                   // frames after a relocalisation in which the map learns nothing
+  std::size_t enough_matches = 40;     // with the last frame; with fewer the search is widened
   std::size_t min_initial_points = 100;
   float search_radius = 15;  // pixels at level 0, around a point of the last frame
 

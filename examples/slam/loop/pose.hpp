@@ -50,9 +50,10 @@ class PoseSolver {
       return cfp::refine_pose(observations, view.exact, start, options, workspace_, inlier_);
     };
     cfp::PoseResult result = solve(frame.T_cam_world, options_.pose);
-    std::optional<cfp::PoseStep> step;
+    std::optional<cfp::PoseStep<double>> step;
     if (believed)
-      step = cfp::PoseStep{result.T_cam_world * believed->T_cam_world.inverse(), frame.time_s - believed->time_s};
+      step =
+          cfp::PoseStep<double>{result.T_cam_world * believed->T_cam_world.inverse(), frame.time_s - believed->time_s};
     RefinedPose out{0, cfp::assess_pose(result, observations.pixels, weights_, inlier_, step, health)};
     if (!cfp::is_solved(result.status)) return out;
     if (decided) {  // what agrees with that, proven or not, makes it more exact

@@ -23,10 +23,18 @@ class Relocalization {
   bool operator()(Frame& frame, const Map& map, const std::vector<int>& local_points, cfp::span<const float> weight,
                   const cfp::PinholeCamera<float>& camera) {
     if (try_points(frame, map, local_points, weight, camera)) return true;
-    // Then keyframe by keyframe, the newest first, a few in each lost frame, so that a lost frame costs no more than a
-    // bounded time.
-    for (int tries = 0; tries < 8 && !map.keyframes.empty(); ++tries) {
+    return from_keyframes(frame, map, 8, -1, weight, camera);
+  }
+
+  // The same from so many keyframes, going on where the last call ended, but none of world `not_of`.
+  bool from_keyframes(Frame& frame, const Map& map, int most, int not_of, cfp::span<const float> weight,
+                      const cfp::PinholeCamera<float>& camera) {
+    // The newest first, a few in each lost frame, so that a lost frame costs no more than a bounded time.
+    int tries = 0;
+    for (std::size_t looked = 0; looked < map.keyframes.size() && tries < most; ++looked) {
       const std::size_t back = next_++ % map.keyframes.size();
+      if (map.keyframes[map.keyframes.size() - 1 - back].world == not_of) continue;
+      ++tries;
       candidates_.clear();
       for (const int p : map.keyframes[map.keyframes.size() - 1 - back].frame.map_point) {
         if (map.is_alive(p)) candidates_.push_back(p);

@@ -15,6 +15,7 @@ Options fitted(Options options, const FrameSource& source, const cfp_examples::D
   probability = cfp::variant_options(options.variant, probability);
   probability.tracker.image_width = source.calibration.width;
   probability.tracker.image_height = source.calibration.height;
+  if (probability.tracker.max_coast > 0) probability.tracker.max_idle = options.max_idle;
   probability.coarse.flow.ransac.seed = options.seed;
   probability.fine.map_point_prior = true;                      // this loop keeps M
   probability.classes = {{detector.class_of("person"), true}};  // -1: nothing that it finds can move
@@ -61,7 +62,7 @@ RunResult run_slam(const FrameSource& source, cfp_examples::Detector& detector, 
   }
   RunResult result;
   result.trajectory = tracking.finish();
-  result.world.assign(result.trajectory.size(), 0);
+  result.world = tracking.worlds();
   result.keyframes = tracking.map().keyframes.size();
   result.map_points = tracking.map().alive_points();
   return result;

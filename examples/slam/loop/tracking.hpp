@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "cfp/evaluation/trajectory.hpp"
+#include "cfp/frame/detector_health.hpp"
 #include "cfp/frame/static_probability.hpp"
 #include "cfp/interop/opencv.hpp"
 #include "front_end.hpp"
@@ -34,11 +36,11 @@ class Tracking {
         relocalize_(options.seed),
         local_map_(options.features),
         mapping_(options),
-        interval_(options.interval) {
-    for (cfp::PoseHealthOptions* health : {&options_.first_health, &options_.health, &options_.relocalised_health}) {
-      health->image_width = view.width;
-      health->image_height = view.height;
-    }
+        interval_(options.interval),
+        detector_(sized(options.detector_health, view)) {
+    options_.detector_health = sized(options_.detector_health, view);
+    for (cfp::PoseHealthOptions* health : {&options_.first_health, &options_.health, &options_.relocalised_health})
+      *health = sized(*health, view);
   }
 
   // `record` comes with time and image; the rest is filled in.
@@ -64,8 +66,10 @@ class Tracking {
     } else {
       follow_probation(frame, record);
       if (frame.has_pose) {
+        world_ = map_.keyframe(local_map_.reference()).world;
+        join_worlds(frame, record);
         extend_map(frame, record);
-      } else {
+      } else if (frame.time_s - seen_s_ < options_.new_map_after_s || !begin_world(frame, record)) {
         record.outcome = Outcome::lost;
         note(record, std::string("lost, ") + cfp::to_string(pose_.health.status));
       }
@@ -75,6 +79,7 @@ class Tracking {
     if (frame.has_pose) {
       poses_.push_back({frame.time_s, local_map_.reference(), frame.T_cam_world * reference_pose().inverse()});
       believed_ = BelievedPose{frame.time_s, frame.T_cam_world};
+      seen_s_ = frame.time_s;
     }
     motion_.learn(last_, frame);
     last_ = std::move(frame);
@@ -89,6 +94,12 @@ class Tracking {
       trajectory.push_back({p.time_s, (p.T_cam_reference * map_.keyframe(p.reference).frame.T_cam_world).inverse()});
     return trajectory;
   }
+  // Of each pose of that.
+  [[nodiscard]] std::vector<int> worlds() const {
+    std::vector<int> worlds;
+    for (const RelativePose& p : poses_) worlds.push_back(map_.keyframe(p.reference).world);
+    return worlds;
+  }
   [[nodiscard]] const Map& map() const { return map_; }
 
  private:
@@ -98,6 +109,12 @@ class Tracking {
     cfp::SE3<double> T_cam_reference;
   };
 
+  template <typename HealthOptions>
+  static HealthOptions sized(HealthOptions health, const View& view) {
+    health.image_width = view.width;
+    health.image_height = view.height;
+    return health;
+  }
   static void note(FrameRecord& record, const std::string& what) {
     record.note += (record.note.empty() ? "" : "; ") + what;
   }
@@ -124,7 +141,7 @@ class Tracking {
       grid_.build(frame, view_);
       match_last(frame, predicted_.T_cam_world);
     }
-    cfp::StageResult<float> stage = coarse(frame, features);
+    cfp::StageResult<float> stage = coarse(frame, features, record);
     observer_.weighted(stage, probability_.state(), frame);
     note_boxes(record);
     if (const std::optional<cfp::PoseEstimate> pose = first_pose(frame, stage.weight)) {
@@ -147,12 +164,12 @@ class Tracking {
     }
   }
 
-  cfp::StageResult<float> coarse(const Frame& frame, const FrameFeatures& features) {
+  cfp::StageResult<float> coarse(const Frame& frame, const FrameFeatures& features, FrameRecord& record) {
     cfp::Frame<float> input;
     input.timestamp_s = frame.time_s;
     input.keypoints = cfp::view(frame.keypoints);
     input.depths = frame.depths_m;
-    if (features.detections) input.detections = *features.detections;
+    if (features.detections) input.detections = believed_detections(*features.detections, record);
     input.flow = {cfp::view(features.flow_from), cfp::view(features.flow_to), features.flow_depths_m};
     input.map_point_probability = frame.map_point_probability;
     input.image_motion = predicted_.image_motion;
@@ -160,9 +177,29 @@ class Tracking {
     return probability_.coarse(input);
   }
 
+  // Nothing, as if it had not run, of a detector that is silent or stuck: its boxes are carried on.
+  std::optional<cfp::span<const cfp::Detection<float>>> believed_detections(const cfp_examples::Detections& detections,
+                                                                            FrameRecord& record) {
+    const cfp::DetectorStatus status = detector_.update(cfp::span<const cfp::Detection<float>>(detections));
+    if (status != cfp::DetectorStatus::ok) note(record, std::string("detector ") + cfp::to_string(status));
+    detector_ok_ = status == cfp::DetectorStatus::ok || status == cfp::DetectorStatus::absurd;
+    if (!detector_ok_) return std::nullopt;
+    detections_.clear();
+    std::copy_if(detections.begin(), detections.end(), std::back_inserter(detections_),
+                 [&](const auto& d) { return !cfp::is_absurd(d, options_.detector_health); });
+    return cfp::span<const cfp::Detection<float>>(detections_);
+  }
+
+  // What was known to move stays so while no detector says where it is.
   cfp::StageResult<float> fine(Frame& frame, const cfp::PoseEstimate& pose) {
     const Part part(observer_, Module::fine);
-    return probability_.fine(pose, from_last_.match, frame.map_point_probability);
+    const std::vector<float> before = frame.map_point_probability;
+    cfp::StageResult<float> result = probability_.fine(pose, from_last_.match, frame.map_point_probability);
+    for (std::size_t i = 0; i < frame.size() && !detector_ok_; ++i) {
+      if (before[i] >= 0 && before[i] < 0.5F)
+        frame.map_point_probability[i] = std::min(before[i], frame.map_point_probability[i]);
+    }
+    return result;
   }
 
   void note_boxes(FrameRecord& record) const {
@@ -220,9 +257,9 @@ class Tracking {
     probation_ = !frame.has_pose ? 0 : relocalised_ ? options_.probation : std::max(probation_ - 1, 0);
   }
   [[nodiscard]] bool is_jump(const Frame& frame) const {
-    return believed_ &&
-           cfp::is_jump({frame.T_cam_world * believed_->T_cam_world.inverse(), frame.time_s - believed_->time_s},
-                        options_.health);
+    return believed_ && cfp::is_jump<double>(
+                            {frame.T_cam_world * believed_->T_cam_world.inverse(), frame.time_s - believed_->time_s},
+                            options_.health);
   }
 
   // The stage's weights hold M of what the last frame saw; that of points which joined since comes on top.
@@ -238,10 +275,15 @@ class Tracking {
                         relocalised_ ? std::nullopt : believed_);
   }
 
-  // The first frame is the world. It needs enough points that may be static.
-  void initialize(Frame& frame, FrameRecord& record) {
+  [[nodiscard]] std::size_t usable_points(const Frame& frame) const {
     std::size_t usable = 0;
     for (std::size_t i = 0; i < frame.size(); ++i) usable += mapping_.may_create(frame, i) ? 1U : 0U;
+    return usable;
+  }
+
+  // The first frame is the world. It needs enough points that may be static.
+  void initialize(Frame& frame, FrameRecord& record) {
+    const std::size_t usable = usable_points(frame);
     if (usable < options_.min_initial_points) {
       record.outcome = Outcome::lost;
       note(record, "waiting for " + std::to_string(options_.min_initial_points) +
@@ -253,6 +295,58 @@ class Tracking {
     pose_.inliers = usable;
     record.outcome = Outcome::tracked;
     make_keyframe(frame, record);
+  }
+
+  // After some time of being lost the map is left alone, and a new one begins. Its poses have nothing to do with those
+  // before until the camera sees the old map again.
+  bool begin_world(Frame& frame, FrameRecord& record) {
+    if (usable_points(frame) < options_.min_initial_points) return false;
+    std::fill(frame.map_point.begin(), frame.map_point.end(), no_point);
+    world_ = map_.begin_world();
+    frames_since_join_ = 0;
+    T_old_new_.reset();
+    initialize(frame, record);
+    note(record, "new map");
+    return true;
+  }
+
+  // Looks for the older maps now and then. Two finds in a row that agree join the newest map to the one found.
+  void join_worlds(Frame& frame, FrameRecord& record) {
+    constexpr int interval = 5;             // frames
+    const int world = map_.newest_world();  // the one that can be joined
+    if (world_ != world || world == 0 || map_.keyframes.front().world == world || probation_ > 0 ||
+        ++frames_since_join_ % interval != 0)
+      return;
+    Frame probe = frame;
+    from_last_.match.swap(no_match_);
+    from_last_.match.assign(frame.size(), cfp::no_match);
+    weights_.assign(frame.static_probability.begin(), frame.static_probability.end());
+    const std::vector<float> weight = weights_;
+    std::optional<cfp::SE3<double>> T_old_new;
+    if (relocalize_.from_keyframes(probe, map_, 3, world, weight, view_.camera)) {
+      LocalMap around(options_.features);
+      around.search(probe, grid_, map_, view_, true);
+      relocalised_ = true;  // the step to this pose is none of the camera's
+      if (refine(probe, weight, around.expected_proven(), true, options_.relocalised_health).health.ok())
+        T_old_new = probe.T_cam_world.inverse() * frame.T_cam_world;
+      relocalised_ = false;
+      if (T_old_new && T_old_new_ && agree(*T_old_new, *T_old_new_, frame)) {
+        take_bundle(true);
+        map_.join(map_.keyframe(around.reference()).world, *T_old_new);
+        note(record, "joined to the old map");
+        last_.T_cam_world = last_.T_cam_world * T_old_new->inverse();
+        frame = probe;
+        local_map_.set_reference(around.reference());
+        world_ = map_.keyframe(around.reference()).world;
+      }
+    }
+    T_old_new_ = T_old_new;
+    from_last_.match.swap(no_match_);
+  }
+  // Where the camera of a frame is by two transformations.
+  static bool agree(const cfp::SE3<double>& a, const cfp::SE3<double>& b, const Frame& frame) {
+    const cfp::SE3<double> difference = (a * frame.T_cam_world.inverse()).inverse() * (b * frame.T_cam_world.inverse());
+    return difference.translation.norm() < 0.05 && cfp::so3_log<double>(difference.rotation).norm() < 0.03;
   }
 
   void extend_map(Frame& frame, FrameRecord& record) {
@@ -267,7 +361,7 @@ class Tracking {
 
   void make_keyframe(Frame& frame, FrameRecord& record) {
     take_bundle(true);
-    const int keyframe = mapping_.insert(map_, frame, view_);
+    const int keyframe = mapping_.insert(map_, frame, world_, view_);
     local_map_.set_reference(keyframe);
     frame.map_point = map_.keyframe(keyframe).frame.map_point;
     frame.map_point_probability = map_.keyframe(keyframe).frame.map_point_probability;
@@ -310,9 +404,17 @@ class Tracking {
   bool relocalised_ = false, gap_ = false;  // in this frame, before it
   RefinedPose pose_;                        // of this frame
   cfp::FrameInterval interval_;
-  std::optional<BelievedPose> believed_;  // the last of all frames
-  int probation_ = 0;                     // frames left
-  std::size_t first_on_probation_ = 0;    // of poses_
+  cfp::DetectorHealth<float> detector_;
+  bool detector_ok_ = true;
+  cfp_examples::Detections detections_;
+  std::optional<BelievedPose> believed_;       // the last of all frames
+  int world_ = 0;                              // of the keyframes to come
+  double seen_s_ = 0;                          // when that was
+  std::optional<cfp::SE3<double>> T_old_new_;  // of the last look for older maps
+  int frames_since_join_ = 0;
+  std::vector<std::int32_t> no_match_;
+  int probation_ = 0;                   // frames left
+  std::size_t first_on_probation_ = 0;  // of poses_
   int frames_since_keyframe_ = 0;
   std::vector<RelativePose> poses_;
   std::vector<float> weights_;

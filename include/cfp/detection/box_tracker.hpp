@@ -50,8 +50,8 @@ class BoxTracker {
   }
 
   /// A frame on which the detector did not run: nothing was missed, so tracks of one detection live on, but confirmed
-  /// tracks are output as compensated and age towards max_coast all the same. For a detector that runs on every n-th
-  /// frame only.
+  /// tracks are output as compensated and age towards max_coast (or max_idle) all the same. For a detector that runs on
+  /// every n-th frame only.
   BoxTrackerResult<Scalar> coast(Scalar dt_s, const Matrix3<Scalar>* image_motion = nullptr) {
     BoxTrackerResult<Scalar> result = advance(dt_s, image_motion);
     output(result, false);
@@ -161,11 +161,12 @@ class BoxTracker {
   void output(BoxTrackerResult<Scalar>& result, bool detector_ran) {
     output_.clear();
     std::size_t kept = 0;
+    const int longest = detector_ran ? options_.max_coast : (std::max)(options_.max_coast, options_.max_idle);
     for (Track& track : tracks_) {
       const bool confirmed = track.hits >= options_.confirm_hits;
       if (track.compensated()) {
         const bool trusted = confirmed && track.missed <= options_.coast_per_hit * track.hits;
-        if (track.missed > options_.max_coast || (detector_ran && !trusted) || !clip_to_image(track.box)) continue;
+        if (track.missed > longest || (detector_ran && !trusted) || !clip_to_image(track.box)) continue;
       }
       const bool shown = !track.compensated() || confirmed;
       if (shown) {

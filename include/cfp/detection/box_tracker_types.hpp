@@ -46,8 +46,9 @@ struct BoxTrackerOptions {
   double min_score = -1e300;  ///< detections below are ignored
   /// detections below extend a track but start none (and are not output when they extend none)
   double birth_threshold = -1e300;
-  int confirm_hits = 2;        ///< detections before a track may be compensated, >= 1
-  int max_coast = 6;           ///< missed frames in a row that are compensated, >= 0 (the paper's figure shows six)
+  int confirm_hits = 2;  ///< detections before a track may be compensated, >= 1
+  int max_coast = 6;     ///< missed frames in a row that are compensated, >= 0 (the paper's figure shows six)
+  int max_idle = 0;      ///< the same while the detector does not run; counts where it is more than max_coast, >= 0
   double coast_per_hit = 1.0;  ///< ... and at most this many per detection so far, > 0 (1: no longer than it was seen)
   double min_visible = 0.25;  ///< a compensated box with a smaller share of its area in the image is dropped, in [0, 1]
   double max_gap_s = 2.0;     ///< after a longer dt the frames are not adjacent: all tracks are dropped, s, > 0
@@ -61,6 +62,7 @@ struct BoxTrackerOptions {
   if (!is_finite(o.min_score)) return "min_score";
   if (!is_finite(o.birth_threshold)) return "birth_threshold";
   if (!(o.confirm_hits >= 1)) return "confirm_hits";
+  if (!(o.max_idle >= 0)) return "max_idle";
   if (!(o.max_coast >= 0)) return "max_coast";
   if (!(o.coast_per_hit > 0)) return "coast_per_hit";
   if (!(o.min_visible >= 0 && o.min_visible <= 1)) return "min_visible";

@@ -61,8 +61,9 @@ struct PoseAssessment {
 };
 
 /// The last pose that was believed, as seen from this one.
+template <typename Scalar>
 struct PoseStep {
-  SE3<double> T_cur_last;
+  SE3<Scalar> T_cur_last;
   double dt_s = 0;  ///< time between them, > 0
 };
 
@@ -70,7 +71,7 @@ inline namespace CFP_ISA {
 
 /// The enumerator's name, for reports.
 [[nodiscard]] constexpr const char* to_string(PoseHealth status) noexcept {
-  constexpr const char* names[] = {"ok",        "not solved", "too few inliers", "few observations agree", "crowded",
+  constexpr const char* names[] = {"ok",        "no pose", "too few inliers", "few observations agree", "crowded",
                                    "uncertain", "jump"};
   return status <= PoseHealth::jump ? names[static_cast<int>(status)] : "unknown";
 }
@@ -91,21 +92,25 @@ inline namespace CFP_ISA {
 }
 
 /// Whether the camera can have made this step. A time that is not positive and finite allows the slack alone.
-[[nodiscard]] inline bool is_jump(const PoseStep& step, const PoseHealthOptions& options) noexcept {
+template <typename Scalar>
+[[nodiscard]] bool is_jump(const PoseStep<Scalar>& step, const PoseHealthOptions& options) noexcept {
   const double dt = step.dt_s > 0 && is_finite(step.dt_s) ? step.dt_s : 0;
-  return !(step.T_cur_last.translation.norm() <= options.slack_m + options.max_speed_m_s * dt) ||
-         !(so3_log<double>(step.T_cur_last.rotation).norm() <= options.slack_rad + options.max_turn_rad_s * dt);
+  return !(static_cast<double>(step.T_cur_last.translation.norm()) <= options.slack_m + options.max_speed_m_s * dt) ||
+         !(static_cast<double>(so3_log<Scalar>(step.T_cur_last.rotation).norm()) <=
+           options.slack_rad + options.max_turn_rad_s * dt);
 }
 
 /// Standard deviations of the camera's centre, in its own axes, and of its rotation, from the information of
 /// refine_pose. False, and the two untouched, when the information has no inverse.
-[[nodiscard]] inline bool pose_sigmas(const Eigen::Matrix<double, 6, 6>& information, double& position_sigma_m,
-                                      double& rotation_sigma_rad) noexcept {
+template <typename Derived>
+[[nodiscard]] bool pose_sigmas(const Eigen::MatrixBase<Derived>& information, double& position_sigma_m,
+                               double& rotation_sigma_rad) noexcept {
+  const Eigen::Matrix<double, 6, 6> H = information;
   double variance[2] = {0, 0};
   for (int i = 0; i < 6; ++i) {
     Eigen::Matrix<double, 6, 1> unit = Eigen::Matrix<double, 6, 1>::Zero(), column;
     unit[i] = -1;
-    if (!solve_normal_equations<6>(information, unit, 0, 1e-12, column)) return false;
+    if (!solve_normal_equations<6>(H, unit, 0, 1e-12, column)) return false;
     variance[i / 3] += column[i];
   }
   position_sigma_m = std::sqrt(variance[0]);
@@ -118,7 +123,7 @@ inline namespace CFP_ISA {
 template <typename Scalar>
 [[nodiscard]] PoseAssessment assess_pose(const PoseResult& pose, PointSpan<Scalar, 2> pixels,
                                          span<const non_deduced<Scalar>> weights, span<const char> inlier_mask,
-                                         const std::optional<PoseStep>& step,
+                                         const std::optional<PoseStep<double>>& step,
                                          const PoseHealthOptions& options) noexcept {
   CFP_ASSERT(inlier_mask.size() == pixels.size() && (weights.empty() || weights.size() == pixels.size()));
   constexpr int columns = 8, rows = 6;
