@@ -20,8 +20,9 @@ inline Table calibration_table(const std::vector<RunSummary>& runs, const std::s
   table.title = "Static probabilities against labels";
   table.protocol = protocol;
   table.header = {"variant", "probability", "AUC", "Brier", "ECE", "static", "samples per run"};
-  constexpr std::array<CalibrationSummary RunSummary::*, 4> fields{&RunSummary::first_stage, &RunSummary::second_stage,
-                                                                   &RunSummary::map_point, &RunSummary::object};
+  constexpr std::array<CalibrationSummary RunSummary::*, 5> fields{&RunSummary::first_stage, &RunSummary::second_stage,
+                                                                   &RunSummary::map_point, &RunSummary::weight,
+                                                                   &RunSummary::object};
   for (const std::string& variant : variants_of(runs)) {
     for (std::size_t k = 0; k < fields.size(); ++k) {
       const auto spread = [&](auto&& value) {

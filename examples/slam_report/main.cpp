@@ -49,6 +49,11 @@ void print_summary(const RunRecord& run) {
   const auto tracking = static_cast<std::size_t>(cfp_slam::Module::tracking);
   std::printf("; lost %zu, relocalised %zu, skipped %zu; tracking %.1f ms (95 %%: %.1f)\n", s.lost, s.relocalised,
               s.skipped, s.median_ms[tracking], s.p95_ms[tracking]);
+  if (s.weight.samples > 0)
+    std::printf(
+        "%11s AUC of K %.3f, M %.3f, the weight %.3f; in boxes %.1f %% of the static at 0, %.1f %% of the moving "
+        "above 0.5\n",
+        "", s.second_stage.auc, s.map_point.auc, s.weight.auc, 100 * s.weight.static_lost, 100 * s.weight.moving_kept);
 }
 
 struct Arguments {

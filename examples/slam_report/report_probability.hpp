@@ -91,7 +91,7 @@ inline std::string reliability_plot(const Series& series) {
   table.header = {"", "AUC", "Brier", "ECE", "static", "samples"};
   std::string key;
   const auto samples = labelled(*series.run);
-  constexpr std::array<std::size_t, 4> styles{3, 1, 2, 4};
+  constexpr std::array<std::size_t, 5> styles{3, 1, 2, 5, 4};
   for (std::size_t k = 0; k < samples.size(); ++k) {
     const CalibrationSummary c = summarize(*samples[k]);
     if (c.samples == 0) continue;

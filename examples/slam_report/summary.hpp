@@ -19,6 +19,8 @@ namespace cfp_slam {
 struct CalibrationSummary {
   std::size_t samples = 0;
   double static_fraction = not_known, auc = not_known, brier = not_known, ece = not_known;
+  // Of the static ones, the share below 0.01, which is as good as left out; of the others, the share above 0.5.
+  double static_lost = not_known, moving_kept = not_known;
 };
 
 // Errors are not_known when the run has no truth or no result.
@@ -35,13 +37,13 @@ struct RunSummary {
   double time_fraction = not_known, largest_gap_s = not_known;
   // Over the frames in which the module ran.
   std::array<double, module_count> median_ms{}, p95_ms{}, mean_ms{};
-  CalibrationSummary first_stage, second_stage, map_point, object;
+  CalibrationSummary first_stage, second_stage, map_point, weight, object;
 };
 
-inline constexpr std::array<const char*, 4> probability_names{"K, first stage", "K, second stage", "M of the map point",
-                                                              "O of the box"};
-inline std::array<const LabelledSamples*, 4> labelled(const RunRecord& run) {
-  return {&run.first_stage, &run.second_stage, &run.map_point, &run.object};
+inline constexpr std::array<const char*, 5> probability_names{"K, first stage", "K, second stage", "M of the map point",
+                                                              "weight in the pose", "O of the box"};
+inline std::array<const LabelledSamples*, 5> labelled(const RunRecord& run) {
+  return {&run.first_stage, &run.second_stage, &run.map_point, &run.weight, &run.object};
 }
 
 inline CalibrationSummary summarize(const LabelledSamples& samples) {
@@ -55,6 +57,14 @@ inline CalibrationSummary summarize(const LabelledSamples& samples) {
   out.brier = result.brier;
   out.ece = result.expected_calibration_error;
   if (result.status == cfp::Status::ok) out.auc = result.auc;
+  std::array<double, 2> count{}, wrong{};  // of what moves, of what is static
+  for (std::size_t i = 0; i < samples.probability.size(); ++i) {
+    const bool is_static = samples.is_static[i] != 0;
+    ++count[is_static ? 1 : 0];
+    wrong[is_static ? 1 : 0] += is_static ? samples.probability[i] < 0.01F : samples.probability[i] > 0.5F;
+  }
+  out.moving_kept = wrong[0] / count[0];
+  out.static_lost = wrong[1] / count[1];
   return out;
 }
 
@@ -134,6 +144,7 @@ inline RunSummary summarize(const RunRecord& run) {
   s.first_stage = summarize(run.first_stage);
   s.second_stage = summarize(run.second_stage);
   s.map_point = summarize(run.map_point);
+  s.weight = summarize(run.weight);
   s.object = summarize(run.object);
   return s;
 }

@@ -56,6 +56,7 @@ inline void add_samples(const RunFrame& frame, const cv::Mat& labels, RunRecord&
     add_sample(run.first_stage, keypoint.coarse, label == PixelLabel::still);
     add_sample(run.second_stage, keypoint.fine, label == PixelLabel::still);
     add_sample(run.map_point, keypoint.map_point, label == PixelLabel::still);
+    add_sample(run.weight, keypoint.weight, label == PixelLabel::still);
   }
 }
 

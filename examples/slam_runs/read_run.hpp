@@ -129,10 +129,10 @@ inline RunRecord read_run(const std::filesystem::path& folder) {
                           v[7] != 0,
                           static_cast<std::size_t>(v[9])});
   });
-  detail::for_each_row(keypoints, 8, [&](int line, const std::vector<double>& v) {
+  detail::for_each_row(keypoints, 9, [&](int line, const std::vector<double>& v) {
     detail::frame_at(run, keypoints, line, v[0])
         .box_keypoints.push_back(
-            {float(v[1]), float(v[2]), float(v[3]), v[4] != 0, float(v[5]), float(v[6]), float(v[7])});
+            {float(v[1]), float(v[2]), float(v[3]), v[4] != 0, float(v[5]), float(v[6]), float(v[7]), float(v[8])});
   });
 
   const cfp_examples::Sequence sequence(run.recording);

@@ -17,6 +17,7 @@ struct BoxKeypoint {
   float x = 0, y = 0, size = 0;
   bool foreground = false;
   float coarse = -1, fine = -1, map_point = -1;  // K of the two stages, M
+  float weight = -1;                             // in the frame's pose
   [[nodiscard]] float static_probability() const { return fine >= 0 ? fine : coarse; }
 };
 
@@ -48,11 +49,11 @@ struct RunRecord {
   std::vector<RunFrame> frames;
   std::size_t keyframes = 0, map_points = 0;
   std::vector<AnnotatedFrame> pictures;
-  std::vector<std::string> notes;                                // what of the recording could not be read
-  LabelledSamples first_stage, second_stage, map_point, object;  // in-box keypoints; their map points; boxes
-  std::vector<cfp::StampedPose<double>> truth;                   // empty: none known
-  cfp::AbsoluteErrorResult absolute;                             // rigid alignment
-  cfp::RelativeErrorResult relative;                             // fixed delta of 1 s, as the paper evidently has it
+  std::vector<std::string> notes;                                        // what of the recording could not be read
+  LabelledSamples first_stage, second_stage, map_point, weight, object;  // in-box keypoints, their map points; boxes
+  std::vector<cfp::StampedPose<double>> truth;                           // empty: none known
+  cfp::AbsoluteErrorResult absolute;                                     // rigid alignment
+  cfp::RelativeErrorResult relative;  // fixed delta of 1 s, as the paper evidently has it
 
   // Poses of the tracked and relocalised frames, in the order of time.
   [[nodiscard]] std::vector<cfp::StampedPose<double>> trajectory() const {

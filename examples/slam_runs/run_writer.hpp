@@ -72,7 +72,7 @@ class RunWriter final : public Observer {
       : progress_(std::move(progress)),
         frames_(open_text(folder / "frames.txt", frame_columns().c_str())),
         boxes_(open_text(folder / "boxes.txt", "frame id x1 y1 x2 y2 compensated object_known O flow_pairs")),
-        keypoints_(open_text(folder / "keypoints.txt", "frame x y size foreground K_coarse K_fine M")) {}
+        keypoints_(open_text(folder / "keypoints.txt", "frame x y size foreground K_coarse K_fine M weight")) {}
 
   void begin(Module module) override { clock_.begin(module); }
   void end(Module module) override { clock_.end(module); }
@@ -83,13 +83,14 @@ class RunWriter final : public Observer {
       for (std::size_t i = 0; i < frame.size(); ++i) {
         const bool foreground = state.label[i] == cfp::KeypointLabel::foreground;
         if (foreground || state.label[i] == cfp::KeypointLabel::background)
-          inside_.push_back({i, frame.keypoints[i], foreground, result.static_probability[i], -1, -1});
+          inside_.push_back({i, frame.keypoints[i], foreground, result.static_probability[i], -1, -1, -1});
       }
       return;
     }
     for (Inside& k : inside_) {
       k.fine = result.static_probability[k.index];
       k.map_point = frame.map_point_probability[k.index];
+      k.weight = result.weight[k.index];
     }
   }
 
@@ -101,7 +102,7 @@ class RunWriter final : public Observer {
     }
     for (const Inside& k : inside_) {
       keypoints_ << frame_ << ' ' << k.keypoint.pt.x << ' ' << k.keypoint.pt.y << ' ' << k.keypoint.size << ' '
-                 << k.foreground << ' ' << k.coarse << ' ' << k.fine << ' ' << k.map_point << '\n';
+                 << k.foreground << ' ' << k.coarse << ' ' << k.fine << ' ' << k.map_point << ' ' << k.weight << '\n';
     }
     inside_.clear();
     listen(record, said_);
@@ -124,7 +125,7 @@ class RunWriter final : public Observer {
     std::size_t index;
     cv::KeyPoint keypoint;
     bool foreground;
-    float coarse, fine, map_point;  // K, K, M; negative: none
+    float coarse, fine, map_point, weight;  // K, K, M; negative: none
   };
 
   static std::string frame_columns() {

@@ -33,11 +33,12 @@ void write_run(const TemporaryFolder& folder, const std::string& image) {
   frame.map_point_probability = {-1, 0.7F, 0.1F};
   cfp::FrameState<float> state;
   state.label = {cfp::KeypointLabel::outside, cfp::KeypointLabel::background, cfp::KeypointLabel::foreground};
-  const std::vector<float> k{1, 0.3F, 0.4F}, fine{1, 0.6F, 1.0F / 3};
+  const std::vector<float> k{1, 0.3F, 0.4F}, fine{1, 0.6F, 1.0F / 3}, weight{1, 0.5F, 0.25F};
   cfp::StageResult<float> result;
   result.static_probability = k;
   writer.weighted(result, state, frame);
   result.static_probability = fine;
+  result.weight = weight;
   result.report.stage = cfp::Stage::fine;
   writer.weighted(result, state, frame);
   FrameRecord record;
@@ -86,6 +87,7 @@ TEST_CASE("The report reads what the loop wrote, however long the names", "[slam
   REQUIRE(first.box_keypoints.size() == 2);  // none outside
   CHECK((first.box_keypoints[0].coarse == 0.3F && !first.box_keypoints[0].foreground));
   CHECK((first.box_keypoints[1].fine == 1.0F / 3 && first.box_keypoints[1].map_point == 0.1F));
+  CHECK((first.box_keypoints[0].weight == 0.5F && first.box_keypoints[1].weight == 0.25F));
   CHECK((first.box_keypoints[1].size == 62 && first.box_keypoints[1].foreground));
   CHECK(run.frames[1].note == "too few: 3 # of 4");
   CHECK(run.frames[1].outcome == Outcome::lost);
@@ -109,7 +111,8 @@ TEST_CASE("A file that is cut off or damaged is refused with its name", "[slam]"
   refused("trajectory.txt", "");
   refused("trajectory.txt", "1 2 3\n");
   refused("trajectory.txt", "1305031109.175304 1 2 3 0 0 0 1\n");
-  for (const char* line : {"0 1 2 3", "3 1 2 3 4 5 6 7", "-1 1 2 3 4 5 6 7", "nan 1 2 3 4 5 6 7", "0 1 2 3 4 5 6 x"})
+  for (const char* line :
+       {"0 1 2 3", "3 1 2 3 4 5 6 7 8", "-1 1 2 3 4 5 6 7 8", "nan 1 2 3 4 5 6 7 8", "0 1 2 3 4 5 6 7 x"})
     refused("keypoints.txt", line);
   refused("boxes.txt", "9 1 1 2 3 4 0 1 0.5 0\n");
 }
