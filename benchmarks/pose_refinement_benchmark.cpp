@@ -248,7 +248,7 @@ void contaminated(int people) {
     const cfp_test::DynamicScene<double> scene = cfp_test::make_dynamic_scene<double>(options, seed);
     const std::size_t n = scene.keypoints.size();
     std::vector<std::array<double, 3>> points(n);  // the map: keypoints of the previous frame at their measured depths
-    std::vector<double> labels(n), m(n, 1.0);
+    std::vector<double> labels(n);
     for (std::size_t i = 0; i < n; ++i) {
       cfp::Vector3<double> ray = cfp::Vector3<double>::Zero();
       (void)scene.camera.unproject({scene.previous_keypoints[i][0], scene.previous_keypoints[i][1]}, ray);
@@ -276,7 +276,7 @@ void contaminated(int people) {
     frame.depths = scene.depths;
     frame.flow = {scene.previous_keypoints, scene.keypoints};
     const cfp::PoseResult first = solve(probability.coarse(frame).weight);
-    const auto fine = probability.fine({first.T_cam_world, static_cast<std::size_t>(first.inliers)}, scene.match, m);
+    const auto fine = probability.fine({first.T_cam_world, static_cast<std::size_t>(first.inliers)}, scene.match);
     const cfp::SE3<double> answers[3] = {solve(labels).T_cam_world, solve(fine.weight).T_cam_world,
                                          solve({}).T_cam_world};
     for (std::size_t k = 0; k < 3; ++k)

@@ -90,7 +90,7 @@ int main() {
   // Level 1: two calls per frame, in your own order of things.
   // [stages]
   cfp::StaticProbability probability(camera);  // one per camera
-  std::vector<float> m(n, 1.0F);               // M of the map point that each keypoint observes
+  std::vector<float> m(n, -1.0F);              // M of the map point that each keypoint observes; negative: none
   for (const Image& image : images) {
     cfp::Frame<float> frame;  // views of your arrays; all but the keypoints may be missing
     frame.timestamp_s = image.timestamp_s;
@@ -100,8 +100,10 @@ int main() {
     frame.flow = {image.flow_from, image.flow_to};
     const auto coarse = probability.coarse(frame);             // boxes, objects, depth
     const auto pose = optimise(image, coarse.weight);          // yours
-    const auto fine = probability.fine(pose, image.match, m);  // the constraints of that pose; map points learn
+    const auto fine = probability.fine(pose, image.match, m);  // the constraints of that pose
     optimise(image, fine.weight);                              // yours again
+    probability.update_map_points(m);                          // M learns; new map points start with what is known
+    for (std::size_t i = 0; i < n; ++i) m[i] = m[i] < 0 ? probability.static_probability(i, -1) : m[i];
   }
   // [stages]
   print(probability.state());

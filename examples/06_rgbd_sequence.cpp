@@ -4,7 +4,7 @@
 // poses. There is no map: this is odometry from frame to frame, made to show the calls, not to be a SLAM system.
 //   06_rgbd_sequence TUM_FOLDER OUT_FOLDER [VARIANT]
 // TUM_FOLDER holds rgb.txt, depth.txt, camera.txt and detections.txt, optionally groundtruth.txt; VARIANT is cfp
-// (default), cfp-minus, no-mdc, no-dbscan, no-ksp, only-boxes or plain.
+// (default), cfp-minus, no-mdc, no-dbscan, no-ksp, no-posterior, only-boxes or plain.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -190,7 +190,7 @@ void run(const std::filesystem::path& folder, const std::filesystem::path& out, 
     cfp::sample_depth(depth, cfp::view(current.keypoints), 1 / tum.depth_units_per_metre, current.depths);
     const std::vector<std::int32_t> matches = match(previous, current);
     for (const std::int32_t j : matches)
-      current.map_points.push_back(j == cfp::no_match ? 1.0F : previous.map_points[static_cast<std::size_t>(j)]);
+      current.map_points.push_back(j == cfp::no_match ? -1.0F : previous.map_points[static_cast<std::size_t>(j)]);
     std::vector<cv::Point2f> flow_from, flow_to;
     if (!previous.gray.empty()) track(previous, current, flow_from, flow_to);
     std::vector<cfp::Detection<float>> detections;
@@ -217,6 +217,9 @@ void run(const std::filesystem::path& folder, const std::filesystem::path& out, 
       stage = probability.fine(pose, matches, current.map_points);
       if (const cfp::PoseEstimate refined = solve(stage.weight); refined.inliers > 0) pose = refined;
     }
+    probability.update_map_points(current.map_points);
+    for (std::size_t i = 0; i < current.map_points.size(); ++i)
+      if (current.map_points[i] < 0) current.map_points[i] = probability.static_probability(i, -1);
     // [driver]
 
     const cfp::FrameReport& report = stage.report;
@@ -257,8 +260,10 @@ void run(const std::filesystem::path& folder, const std::filesystem::path& out, 
 
 int main(int argc, char** argv) {
   if (argc < 3) {
-    std::fprintf(stderr, "usage: %s TUM_FOLDER OUT_FOLDER [cfp|cfp-minus|no-mdc|no-dbscan|no-ksp|only-boxes|plain]\n",
-                 argv[0]);
+    std::fprintf(
+        stderr,
+        "usage: %s TUM_FOLDER OUT_FOLDER [cfp|cfp-minus|no-mdc|no-dbscan|no-ksp|no-posterior|only-boxes|plain]\n",
+        argv[0]);
     return 2;
   }
   try {

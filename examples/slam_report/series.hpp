@@ -19,8 +19,8 @@
 
 namespace cfp_slam {
 
-inline constexpr std::array<const char*, 7> variant_names{"plain",     "cfp",    "cfp-minus", "no-mdc",
-                                                          "no-dbscan", "no-ksp", "only-boxes"};
+inline constexpr std::array<const char*, 8> variant_names{"plain",     "cfp",    "cfp-minus",    "no-mdc",
+                                                          "no-dbscan", "no-ksp", "no-posterior", "only-boxes"};
 
 // By sequence, variant and seed.
 inline void sort_runs(std::vector<RunRecord>& runs) {

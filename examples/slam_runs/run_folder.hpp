@@ -36,7 +36,7 @@ struct RunSettings {
   }
 };
 
-inline const std::string all_variants = "plain,only-boxes,no-ksp,no-dbscan,no-mdc,cfp-minus,cfp";
+inline const std::string all_variants = "plain,only-boxes,no-ksp,no-posterior,no-dbscan,no-mdc,cfp-minus,cfp";
 
 inline cfp::Variant variant_of(const std::string& name) {
   for (int v = 0; v <= static_cast<int>(cfp::Variant::plain); ++v) {

@@ -83,12 +83,12 @@ class RunWriter final : public Observer {
       for (std::size_t i = 0; i < frame.size(); ++i) {
         const bool foreground = state.label[i] == cfp::KeypointLabel::foreground;
         if (foreground || state.label[i] == cfp::KeypointLabel::background)
-          inside_.push_back({i, frame.keypoints[i], foreground, result.static_probability[i], -1, -1, -1});
+          inside_.push_back({i, frame.keypoints[i], foreground, state.static_probability[i], -1, -1, -1});
       }
       return;
     }
     for (Inside& k : inside_) {
-      k.fine = result.static_probability[k.index];
+      k.fine = state.static_probability[k.index];
       k.map_point = frame.map_point_probability[k.index];
       k.weight = result.weight[k.index];
     }

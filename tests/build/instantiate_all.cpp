@@ -148,10 +148,12 @@ static void instantiate_probability() noexcept {
   use(&cfp::is_high_dynamic<Scalar>);
   use(&cfp::background_factor<Scalar>);
   use(&cfp::first_stage_probability<Scalar>);
+  use<Scalar (*)(Scalar, bool, Scalar) noexcept>(&cfp::first_stage_evidence<Scalar>);
   use<Scalar (*)(Scalar, Scalar, const cfp::MapPointOptions&) noexcept>(&cfp::updated_map_point<Scalar>);
   use(&cfp::is_deletable<Scalar>);
   use(&cfp::is_mismatch<Scalar>);
   use(&cfp::observation_weight<Scalar>);
+  use(&cfp::posterior_probability<Scalar>);
   use(&cfp::object_score<Scalar>);
   use(&cfp::object_probability<std::vector<Scalar>>);
 }

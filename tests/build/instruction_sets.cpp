@@ -116,7 +116,8 @@ void frames(const Inputs<Scalar>& in, Results& results) {
     frame.flow = {scene.previous_keypoints, scene.keypoints};
     results.add_all("coarse weight", probability.coarse(frame).weight, 1e-3);
     const cfp::PoseEstimate pose{scene.T_cur_prev, 300};
-    results.add_all("fine weight", probability.fine(pose, scene.match, span<Scalar>(m)).weight, 1e-3);
+    results.add_all("fine weight", probability.fine(pose, scene.match, span<const Scalar>(m)).weight, 1e-3);
+    probability.update_map_points(m);
     results.add_all("map point", m, 1e-3);
   }
 }

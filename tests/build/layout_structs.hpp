@@ -120,7 +120,7 @@
   CFP_LAYOUT(cfp::Evidence<double>, available)                           \
   CFP_LAYOUT(cfp::SecondStageKeypoint<float>, box_associated)            \
   CFP_LAYOUT(cfp::SecondStageKeypoint<double>, box_associated)           \
-  CFP_LAYOUT(cfp::MapPointOptions, weight)                               \
+  CFP_LAYOUT(cfp::MapPointOptions, background_prior)                     \
   CFP_LAYOUT(cfp::ObjectProbabilityOptions, unknown_object_probability)  \
   CFP_LAYOUT(cfp::ObjectProbability, status)                             \
   CFP_LAYOUT(cfp::P3PProblem<float>, rays)                               \

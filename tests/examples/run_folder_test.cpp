@@ -35,9 +35,9 @@ void write_run(const TemporaryFolder& folder, const std::string& image) {
   state.label = {cfp::KeypointLabel::outside, cfp::KeypointLabel::background, cfp::KeypointLabel::foreground};
   const std::vector<float> k{1, 0.3F, 0.4F}, fine{1, 0.6F, 1.0F / 3}, weight{1, 0.5F, 0.25F};
   cfp::StageResult<float> result;
-  result.static_probability = k;
+  state.static_probability = k;
   writer.weighted(result, state, frame);
-  result.static_probability = fine;
+  state.static_probability = fine;
   result.weight = weight;
   result.report.stage = cfp::Stage::fine;
   writer.weighted(result, state, frame);

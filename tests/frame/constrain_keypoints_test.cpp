@@ -56,12 +56,14 @@ TEMPLATE_TEST_CASE("K after the second stage separates what moves in a box from 
 }
 
 TEST_CASE("Every K, M and weight equals the scalar formulas applied one keypoint at a time", "[frame]") {
+  const auto rule = GENERATE(cfp::WeightRule::posterior, cfp::WeightRule::product);
   FineRun<double> run(make_dynamic_scene<double>({}, 11));
   run.state.boxes[1].associated = false;
   for (std::size_t i = 0; i < run.m.size(); i += 3) run.m[i] = 0.4;
   for (std::size_t i = 0; i < run.m.size(); i += 7) run.m[i] = -1;
   const std::vector<double> first_k = run.state.static_probability, first_m = run.m;
-  const cfp::FrameOptions options;
+  cfp::FrameOptions options;
+  options.map_point.weight = rule;
   const cfp::FrameReport result = run.fine(options);
 
   const auto& scene = run.scene;
@@ -96,13 +98,17 @@ TEST_CASE("Every K, M and weight equals the scalar formulas applied one keypoint
       p.foreground = run.state.label[i] == KeypointLabel::foreground;
       p.matched = scene.match[i] >= 0;
       p.box_associated = run.state.boxes[b].associated;
-      k = cfp::second_stage_probability(p, 0.9);
+      const bool nowhere = p.foreground && !p.box_associated;
+      const bool silent = rule == cfp::WeightRule::posterior && !p.matched && !nowhere;
+      k = silent ? 0.5 : cfp::second_stage_probability(p, 0.9);
     }
     INFO("keypoint " << i);
     CHECK_THAT(run.state.static_probability[i], WithinAbs(k, 1e-9));
     const double m = first_m[i] >= 0 ? cfp::updated_map_point(k, first_m[i], options.map_point) : first_m[i];
     CHECK_THAT(run.m[i], WithinAbs(m, 1e-9));
-    const double weight = m < 0 ? k : (cfp::is_mismatch(k, m, options.map_point) ? 0 : k * m);
+    if (rule == cfp::WeightRule::posterior) continue;  // tests/frame/weigh_keypoints_test.cpp
+    const double before = first_m[i];
+    const double weight = before < 0 ? k : (cfp::is_mismatch(k, before, options.map_point) ? 0 : k * before);
     CHECK_THAT(run.state.weight[i], WithinAbs(weight, 1e-9));
   }
 }
@@ -127,9 +133,14 @@ TEST_CASE("Too little translation leaves the projection constraint alone", "[fra
 TEST_CASE("Without enough keypoints outside the boxes the first stage's K stays", "[frame]") {
   DynamicSceneOptions options;
   options.wall_points = 5;
+  const auto rule = GENERATE(cfp::WeightRule::posterior, cfp::WeightRule::product);
+  cfp::FrameOptions frame_options;
+  frame_options.map_point.weight = rule;
   FineRun<double> run(make_dynamic_scene<double>(options, 13));
+  // Nor has anyone else been shown to be static.
+  if (rule == cfp::WeightRule::posterior) run.m.assign(run.m.size(), -1.0);
   const std::vector<double> before = run.state.static_probability;
-  const cfp::FrameReport result = run.fine({});
+  const cfp::FrameReport result = run.fine(frame_options);
   CHECK(result.projection.status == cfp::Status::not_enough_data);
   CHECK(result.constrained == 0);
   CHECK(run.state.static_probability == before);
@@ -140,32 +151,14 @@ TEST_CASE("Disabled, the second stage keeps K and still updates M and the weight
   const std::vector<double> before = run.state.static_probability;
   cfp::FrameOptions options;
   options.fine.enabled = false;
+  options.map_point.weight = cfp::WeightRule::product;
   run.fine(options);
   CHECK(run.state.static_probability == before);
   for (std::size_t i = 0; i < run.state.static_probability.size(); ++i)
     CHECK(run.m[i] == cfp::updated_map_point(before[i], 1.0, options.map_point));
 }
 
-TEST_CASE("The posterior is K with M of before as its prior, where a match says anything", "[frame]") {
-  FineRun<double> run(make_dynamic_scene<double>({}, 14));
-  for (std::size_t i = 0; i < run.m.size(); ++i) run.m[i] = i % 5 == 0 ? -1 : (run.scene.is_static[i] ? 0.9 : 0.1);
-  const std::vector<double> m = run.m;
-  const cfp::FrameOptions options;
-  run.fine(options);
-  std::size_t changed = 0;
-  for (std::size_t i = 0; i < m.size(); ++i) {
-    const double k = run.state.static_probability[i], posterior = run.state.posterior[i];
-    const bool applies = run.state.label[i] != KeypointLabel::outside && run.scene.match[i] >= 0 && m[i] >= 0;
-    CHECK(posterior == (applies ? cfp::posterior_probability(k, m[i], options.map_point) : k));
-    changed += posterior != k ? 1U : 0U;
-    // Apart from the bound on evidence, M of 0.9 raises K and M of 0.1 lowers it.
-    if (applies && run.scene.is_static[i]) CHECK(posterior >= (std::min)(k, 0.99));
-    if (applies && !run.scene.is_static[i]) CHECK(posterior <= (std::max)(k, 0.02));
-  }
-  CHECK(changed > 50);
-}
-
-TEST_CASE("In the posterior, a match that no constraint can judge keeps M", "[frame]") {
+TEST_CASE("A keypoint that no constraint can judge keeps what was known of it", "[frame]") {
   FineRun<double> run(make_dynamic_scene<double>({}, 15));
   cfp::FrameOptions options;
   options.fine.min_translation_m = 1e6;  // no epipolar constraint
@@ -181,9 +174,35 @@ TEST_CASE("In the posterior, a match that no constraint can judge keeps M", "[fr
   run.fine(options);
   REQUIRE(silent > 20);
   for (std::size_t i = 0; i < run.m.size(); ++i) {
-    if (run.state.label[i] == KeypointLabel::outside || run.scene.match[i] < 0 || i % 2 != 0) continue;
+    if (run.state.label[i] == KeypointLabel::outside || (run.scene.match[i] >= 0 && i % 2 != 0)) continue;
     const bool came_from_nowhere = run.state.box[i] == 1 && run.state.label[i] == KeypointLabel::foreground;
-    CHECK(run.state.posterior[i] == Approx(came_from_nowhere ? 0 : 0.7));
+    CHECK(run.state.static_probability[i] == (came_from_nowhere ? 0 : 0.5));
+    if (!came_from_nowhere) CHECK(run.m[i] == Approx(0.7));
+  }
+}
+
+TEST_CASE("With too few keypoints outside the boxes the constraints are fitted to what is likely static", "[frame]") {
+  DynamicSceneOptions scene;
+  scene.wall_points = 120;
+  scene.match_share = 1;
+  for (const cfp::WeightRule rule : {cfp::WeightRule::product, cfp::WeightRule::posterior}) {
+    cfp::FrameOptions options;
+    options.map_point.weight = rule;
+    FineRun<double> run(make_dynamic_scene<double>(scene, 21));
+    // All but five of the points outside have no match; people have no history, the wall has.
+    int outside = 0;
+    for (std::size_t i = 0; i < run.m.size(); ++i) {
+      if (run.label(i) == KeypointLabel::outside && ++outside > 5) run.scene.match[i] = -1;
+      run.m[i] = run.scene.is_person[i] ? -1 : 0.9;
+    }
+    const cfp::FrameReport report = run.fine(options);
+    if (rule == cfp::WeightRule::product) {
+      CHECK(report.projection.status == cfp::Status::not_enough_data);
+      continue;
+    }
+    CHECK(report.projection.status == cfp::Status::ok);
+    CHECK(report.projection.threshold_px < 3);  // people moved by some 15 px
+    CHECK(ranked_rightly(run) > 0.9);
   }
 }
 

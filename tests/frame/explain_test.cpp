@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "support/catch.hpp"
 #include "support/frame_runs.hpp"
@@ -35,10 +36,11 @@ TEST_CASE("The explanation's numbers are the frame's, in both stages and for eit
       CHECK(e.stage == cfp::Stage::coarse);
       coarse.push_back(e.coarse_probability);
     }
+    const std::vector<Scalar> m = run.m;  // of before the frame
     run.fine(options);
     std::size_t moving = 0;
     for (std::size_t i = 0; i < run.m.size(); ++i) {
-      const auto e = cfp::explain(i, run.m[i], options, run.state);
+      const auto e = cfp::explain(i, m[i], options, run.state);
       CHECK(e.coarse_probability == coarse[i]);
       CHECK(e.static_probability == double(run.state.static_probability[i]));
       CHECK(e.weight == double(run.state.weight[i]));
@@ -101,6 +103,7 @@ TEST_CASE("Nothing that was not asked is told", "[frame]") {
   options.coarse.use_object_probability = false;
   options.fine.enabled = false;
   options.coarse.soft_background = false;
+  options.map_point.weight = cfp::WeightRule::product;
   run.coarse(options);
   run.fine(options);
   for (std::size_t i = 0; i < run.m.size(); ++i) {

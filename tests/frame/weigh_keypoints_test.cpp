@@ -1,6 +1,8 @@
 #include "cfp/frame/weigh_keypoints.hpp"
 
+#include <algorithm>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "support/catch.hpp"
@@ -24,7 +26,7 @@ TEST_CASE("A keypoint without a pixel says nothing of its map point", "[frame]")
   CHECK(run.m[1] != 0.8);
 }
 
-TEST_CASE("Without a map point the weight is K, in both stages and by every rule", "[frame]") {
+TEST_CASE("Without a map point the weight is K, in both stages and by every printed rule", "[frame]") {
   for (const cfp::WeightRule rule : {cfp::WeightRule::product, cfp::WeightRule::minimum}) {
     cfp::FrameOptions options;
     options.map_point.weight = rule;
@@ -41,40 +43,148 @@ TEST_CASE("Without a map point the weight is K, in both stages and by every rule
 }
 
 TEST_CASE("One keypoint's weight is the frame's, in both stages and with every fallback", "[frame]") {
-  for (const std::size_t wall_points : {700U, 30U, 4U}) {
+  using Case = std::pair<cfp::WeightRule, std::size_t>;
+  for (const Case& each :
+       {Case{cfp::WeightRule::product, 700}, Case{cfp::WeightRule::product, 30}, Case{cfp::WeightRule::product, 4},
+        Case{cfp::WeightRule::posterior, 700}, Case{cfp::WeightRule::posterior, 4}}) {
+    const cfp::WeightRule rule = each.first;
+    const std::size_t wall_points = each.second;
     cfp_test::DynamicSceneOptions scene;
     scene.wall_points = wall_points;
     FrameRun<double> run(make_dynamic_scene<double>(scene, 73));
     cfp::FrameOptions options;
+    options.map_point.weight = rule;
     options.health.min_effective_points = 12;
     for (std::size_t i = 0; i < run.m.size(); ++i) run.m[i] = i % 3 == 0 ? -1 : (i % 3 == 1 ? 1 : 0.6);
     run.coarse(options);
     cfp::weigh_keypoints(run.m, options, run.state);
+    const std::vector<double> m = run.m;  // of before the frame
     const auto check = [&] {
       INFO("wall points " << wall_points << ", fallback " << static_cast<int>(run.state.report.health.fallback));
       for (std::size_t i = 0; i < run.m.size(); ++i)
-        CHECK(cfp::keypoint_weight(i, run.m[i], options, run.state) == run.state.weight[i]);
+        CHECK(cfp::keypoint_weight(i, m[i], options, run.state) == run.state.weight[i]);
     };
     check();
     run.fine(options);
     check();
-    if (wall_points == 4) CHECK(run.state.report.health.fallback == cfp::WeightFallback::all);
+    if (wall_points == 4 && rule == cfp::WeightRule::product)
+      CHECK(run.state.report.health.fallback == cfp::WeightFallback::all);
     if (wall_points == 700) CHECK(run.state.report.health.fallback == cfp::WeightFallback::none);
   }
 }
 
-TEST_CASE("The mismatch rule belongs to the fine stage", "[frame]") {
-  FrameRun<double> run(make_dynamic_scene<double>({}, 74));
-  const cfp::FrameOptions options;
+TEST_CASE("The mismatch rule belongs to the fine stage and to the printed weights", "[frame]") {
+  for (const cfp::WeightRule rule : {cfp::WeightRule::product, cfp::WeightRule::posterior}) {
+    const bool printed = rule == cfp::WeightRule::product;
+    FrameRun<double> run(make_dynamic_scene<double>({}, 74));
+    cfp::FrameOptions options;
+    options.map_point.weight = rule;
+    run.coarse(options);
+    const auto outside = static_cast<std::size_t>(
+        std::find(run.state.label.begin(), run.state.label.end(), cfp::KeypointLabel::outside) -
+        run.state.label.begin());
+    CHECK(cfp::model_weight(outside, 0.3, options, run.state) == 0.3);
+    run.fine(options);
+    CHECK(cfp::model_weight(outside, 0.3, options, run.state) == (printed ? 0 : 0.3));
+    run.m[outside] = 0.1;
+    cfp::weigh_keypoints(run.m, options, run.state);
+    CHECK((run.state.report.mismatched > 0) == printed);
+  }
+}
+
+TEST_CASE("By Bayes' rule the weight is M outside boxes, and in one what all that is known says", "[frame]") {
+  FrameRun<double> run(make_dynamic_scene<double>({}, 75));
+  cfp::FrameOptions options;
+  for (std::size_t i = 0; i < run.m.size(); ++i) run.m[i] = i % 3 == 0 ? -1 : (i % 3 == 1 ? 1 : 0.6);
+  const std::vector<double> m = run.m;
   run.coarse(options);
-  const auto background = static_cast<std::size_t>(
-      std::find(run.state.label.begin(), run.state.label.end(), cfp::KeypointLabel::outside) - run.state.label.begin());
-  CHECK(cfp::model_weight(background, 0.3, options, run.state) == 0.3);
+  run.state.objects[1].static_probability = 0.97;  // shown to be static, which raises no point that has a history
+  const auto check = [&](bool fine) {
+    for (std::size_t i = 0; i < m.size(); ++i) {
+      const double k = run.state.static_probability[i];
+      double expected = m[i] < 0 ? 1 : m[i];
+      if (run.state.box[i] != cfp::no_box) {
+        const bool foreground = run.label(i) == cfp::KeypointLabel::foreground;
+        const double o = run.state.objects[static_cast<std::size_t>(run.state.box[i])].static_probability;
+        const double e = cfp::first_stage_evidence(o, foreground, options.object_threshold);
+        const double prior = foreground ? options.map_point.foreground_prior : options.map_point.background_prior;
+        const double raised = cfp::posterior_probability(0.5, e > 0.5 ? e : 0.5, prior, options.map_point);
+        expected =
+            cfp::posterior_probability(fine ? k : 0.5, e < 0.5 ? e : 0.5, m[i] < 0 ? raised : m[i], options.map_point);
+      }
+      CHECK_THAT(run.state.weight[i], WithinAbs(expected, 1e-12));
+    }
+  };
+  cfp::weigh_keypoints(m, options, run.state);
+  check(false);
   run.fine(options);
-  CHECK(cfp::model_weight(background, 0.3, options, run.state) == 0);
-  run.m[background] = 0.1;
+  check(true);
+}
+
+TEST_CASE("M learns after the weights and from K alone, so that nothing counts twice", "[frame]") {
+  FrameRun<double> run(make_dynamic_scene<double>({}, 76));
+  const cfp::FrameOptions options;
+  for (std::size_t i = 0; i < run.m.size(); ++i) run.m[i] = i % 4 == 0 ? -1 : 0.7;
+  const std::vector<double> before = run.m;
+  run.coarse(options);
+  std::vector<double> learnt = before;
+  cfp::update_map_points(options, run.state, learnt);
+  CHECK(learnt == before);  // the first stage teaches nothing: the same object would, frame after frame
+  run.fine(options);
+  std::size_t silent = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    CHECK(run.state.weight[i] == cfp::model_weight(i, before[i], options, run.state));
+    CHECK(run.m[i] == (before[i] < 0 ? -1 : cfp::updated_map_point(run.k(i), before[i], options.map_point)));
+    if (run.state.box[i] == cfp::no_box || run.state.match[i] != cfp::no_match) continue;
+    CHECK(run.k(i) == 0.5);
+    CHECK_THAT(run.m[i], WithinAbs(before[i], 1e-12));
+    ++silent;
+  }
+  CHECK(silent > 20);
+}
+
+TEST_CASE("A map point confirmed over many frames survives one box, a new one on a person earns its weight",
+          "[frame]") {
+  const cfp::FrameOptions options;
+  FrameRun<double> run(make_dynamic_scene<double>({}, 77));
+  run.coarse(options);
+  for (cfp::ObjectProbability& object : run.state.objects) object.static_probability = 0.5;  // unknown
+  run.fine(options);
+  const auto on_person = static_cast<std::size_t>(
+      std::find(run.state.label.begin(), run.state.label.end(), cfp::KeypointLabel::foreground) -
+      run.state.label.begin());
+  run.state.static_probability[on_person] = 0;  // a static point, for once beyond D_Th
+  CHECK(cfp::model_weight(on_person, 1.0, options, run.state) > 0.4);
+  double m = 1;
+  int frames = 0;
+  for (; !cfp::is_deletable(m, options.map_point); ++frames)
+    m = cfp::updated_map_point(on_person, m, options, run.state);
+  CHECK(frames > 4);  // and goes when it keeps on
+  m = cfp::unknown_map_point(on_person, options, run.state);
+  CHECK(m < 0.1);
+  run.state.static_probability[on_person] = 0.99;
+  for (frames = 0; cfp::model_weight(on_person, m, options, run.state) < 0.5; ++frames)
+    m = cfp::updated_map_point(on_person, m, options, run.state);
+  CHECK((frames > 1 && frames < 10));
+}
+
+TEST_CASE("What came from nowhere has no weight once the constraints were asked", "[frame]") {
+  const cfp::FrameOptions options;
+  FrameRun<double> run(make_dynamic_scene<double>({}, 78));
+  run.coarse(options);
+  run.state.boxes[0].associated = false;
   cfp::weigh_keypoints(run.m, options, run.state);
-  CHECK(run.state.report.mismatched > 0);
+  const auto weight_of = [&](cfp::KeypointLabel label) {
+    double most = 0;
+    for (std::size_t i = 0; i < run.m.size(); ++i) {
+      if (run.state.box[i] == 0 && run.label(i) == label) most = std::max(most, run.state.weight[i]);
+    }
+    return most;
+  };
+  CHECK(weight_of(cfp::KeypointLabel::foreground) > 0);
+  run.fine(options);
+  CHECK(weight_of(cfp::KeypointLabel::foreground) == 0);
+  CHECK(weight_of(cfp::KeypointLabel::background) > 0.9);
 }
 
 TEST_CASE("What a host asks of a K and of a weight", "[frame]") {

@@ -67,7 +67,7 @@ void formulas(FuzzInput& in) {
   for (int k = 0; k < 20; ++k) {
     m = cfp::updated_map_point(number(0, 1), m, options);
     CFP_PROMISE(is_probability(m));
-    CFP_PROMISE(is_probability(cfp::posterior_probability(number(0, 1), m, options)));
+    CFP_PROMISE(is_probability(cfp::posterior_probability(number(0, 1), number(0, 1), m, options)));
     CFP_PROMISE(is_probability(cfp::observation_weight(number(0, 1), m, options.weight)));
   }
 }

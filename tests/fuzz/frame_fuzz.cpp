@@ -104,8 +104,9 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
         a.match.push_back(static_cast<std::int32_t>(in.count(previous)) - 1);
       if (a.match.size() != n) a.match.clear();
       const bool learns = in.flag();
-      check(
-          probability.fine({motion(in), in.count(300)}, a.match, learns ? cfp::span<float>(a.m) : cfp::span<float>()));
+      check(probability.fine({motion(in), in.count(300)}, a.match,
+                             learns ? cfp::span<const float>(a.m) : cfp::span<const float>()));
+      if (learns) probability.update_map_points(a.m);
     }
     previous = n;
     if (in.byte() == 0) probability.reset();

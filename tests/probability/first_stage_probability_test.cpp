@@ -45,3 +45,21 @@ TEMPLATE_TEST_CASE("The first stage keeps its range for hostile input", "[probab
   }
   CHECK(cfp::is_high_dynamic(Limits::quiet_NaN(), TestType(0.9)));
 }
+
+TEMPLATE_TEST_CASE("What the first stage says of a map point is O's odds against those of the threshold",
+                   "[probability]", float, double) {
+  using S = TestType;
+  const auto evidence = [](double o) { return static_cast<double>(cfp::first_stage_evidence(S(o), true, S(0.9))); };
+  CHECK_THAT(evidence(0.9), WithinAbs(0.5, 1e-6));  // at the threshold: nothing
+  CHECK_THAT(evidence(0.5), WithinAbs(0.1, 1e-6));  // odds 1 against 9
+  CHECK(evidence(0) == 0);
+  CHECK(evidence(1) == 1);
+  CHECK(evidence(std::numeric_limits<double>::quiet_NaN()) == 0);
+  CHECK(evidence(-1) == 0);
+  CHECK(evidence(2) == 1);
+  for (double o = 0; o < 1; o += 1e-3) {
+    CHECK(evidence(o + 1e-3) > evidence(o));
+    CHECK(evidence(o + 1e-3) - evidence(o) < 0.01);
+    CHECK(cfp::first_stage_evidence(S(o), false, S(0.9)) == S(0.5));
+  }
+}

@@ -75,29 +75,50 @@ TEMPLATE_TEST_CASE("Map points and weights keep their range for hostile input", 
   }
 }
 
-TEMPLATE_TEST_CASE("K with M as its prior is Bayes' rule on the odds", "[probability]", float, double) {
+TEMPLATE_TEST_CASE("The posterior is Bayes' rule on the odds of M, E and K", "[probability]", float, double) {
   using S = TestType;
-  const cfp::MapPointOptions options;
-  const auto posterior = [&](double k, double m) {
-    return static_cast<double>(cfp::posterior_probability(S(k), S(m), options));
+  cfp::MapPointOptions options;
+  const auto posterior = [&](double k, double e, double m) {
+    return static_cast<double>(cfp::posterior_probability(S(k), S(e), S(m), options));
   };
-  for (double k = 0.05; k < 1; k += 0.05) {
-    for (double m = 0.05; m < 1; m += 0.05) {
-      const double odds = k / (1 - k) * (m / (1 - m));
-      CHECK(posterior(k, m) == Approx(odds / (1 + odds)).epsilon(1e-5));
+  for (const double power : {0.5, 1.0}) {
+    options.constraint_power = power;
+    for (double k = 0.05; k < 1; k += 0.05) {
+      for (double e = 0.05; e < 1; e += 0.15) {
+        for (double m = 0.05; m < 1; m += 0.15) {
+          const double odds = std::pow(k / (1 - k), power) * (e / (1 - e)) * (m / (1 - m));
+          CHECK(posterior(k, e, m) == Approx(odds / (1 + odds)).epsilon(1e-5));
+        }
+      }
+      CHECK(posterior(0.5, 0.5, k) == Approx(k).epsilon(1e-5));  // nothing else is known
+      CHECK(posterior(0.5, k, 0.5) == Approx(k).epsilon(1e-5));
     }
-    CHECK(posterior(k, 0.5) == Approx(k).epsilon(1e-5));
-    CHECK(posterior(0, k) == 0);  // a rule, no measurement
   }
-  CHECK(posterior(1, 0) == Approx(0.5).epsilon(1e-5));  // both at the bound
-  CHECK(posterior(std::numeric_limits<double>::quiet_NaN(), 0.5) == 0);
-  for (const double bad :
-       {-1.0, 2.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
-    CHECK(posterior(bad, 0.3) >= 0);
-    CHECK(posterior(bad, 0.3) <= 1);
-    CHECK(posterior(0.3, bad) >= 0);
-    CHECK(posterior(0.3, bad) <= 1);
+  CHECK(posterior(1, 0.5, 0) == Approx(0.5).epsilon(1e-5));  // both at the bound
+}
+
+TEST_CASE("The posterior is continuous, monotone and inside its range, and no evidence silences the rest",
+          "[probability]") {
+  const cfp::MapPointOptions options;
+  const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+  const auto posterior = [&](double k, double e, double m) { return cfp::posterior_probability(k, e, m, options); };
+  for (const double m : {0.0, 0.02, 0.4, 0.98, 1.0}) {
+    for (const double e : {0.0, 0.3, 0.5, 1.0}) {
+      for (double k = 0; k < 1; k += 1e-3) {
+        CHECK(posterior(k + 1e-3, e, m) >= posterior(k, e, m));
+        CHECK(posterior(k + 1e-3, e, m) - posterior(k, e, m) < 0.02);
+        CHECK(posterior(e, k + 1e-3, m) >= posterior(e, k, m));
+        CHECK(posterior(e, m, k + 1e-3) >= posterior(e, m, k));
+      }
+      CHECK(posterior(std::numeric_limits<double>::denorm_min(), e, m) == posterior(0, e, m));
+    }
   }
+  CHECK(posterior(0, 0.5, 1) > 0.5);  // a map point confirmed over many frames survives one
+  for (const double bad : {-1.0, 2.0, nan, infinity, -infinity}) {
+    for (const double p : {posterior(bad, 0.4, 0.3), posterior(0.3, bad, 0.4), posterior(0.3, 0.4, bad)})
+      CHECK((p > 0 && p < 1));
+  }
+  CHECK(posterior(nan, nan, nan) == posterior(0, 0, 0));
 }
 
 TEST_CASE("Map-point options outside their range are named", "[probability]") {
@@ -114,6 +135,17 @@ TEST_CASE("Map-point options outside their range are named", "[probability]") {
   options = {};
   options.mismatch_threshold = 0;
   CHECK(cfp::invalid_field(options).string() == "mismatch_threshold");
+  for (const double bad : {0.0, -1.0, 1.5, std::numeric_limits<double>::quiet_NaN()}) {
+    options = {};
+    options.constraint_power = bad;
+    CHECK(cfp::invalid_field(options).string() == "constraint_power");
+    options = {};
+    options.foreground_prior = bad;
+    CHECK(cfp::invalid_field(options).string() == "foreground_prior");
+    options = {};
+    options.background_prior = bad;
+    CHECK(cfp::invalid_field(options).string() == "background_prior");
+  }
 }
 
 TEST_CASE("A map point that was never in doubt keeps M = 1 under every policy", "[probability]") {
@@ -145,6 +177,6 @@ TEMPLATE_TEST_CASE("M falls under doubt at the smallest evidence limit, and smal
 TEST_CASE("Every function of K and M takes K first", "[probability]") {
   const cfp::MapPointOptions options = with(cfp::MapPointPolicy::copy);
   CHECK(cfp::updated_map_point(0.2, 0.9, options) == 0.2);
-  CHECK(cfp::posterior_probability(0.0, 0.9, options) == 0);
-  CHECK(cfp::posterior_probability(0.9, 0.0, options) > 0);
+  // K counts by the root of its odds, M in full.
+  CHECK(cfp::posterior_probability(0.2, 0.5, 0.9, options) > cfp::posterior_probability(0.9, 0.5, 0.2, options));
 }

@@ -198,7 +198,16 @@ TEST_CASE("Properties of the map-point update", "[properties]") {
       RC_ASSERT(cfp::updated_map_point(k2, m2, options) >= cfp::updated_map_point(k, m, options) - 1e-12);
     });
   }
-  rc::prop("Every weight rule lies between 0 and 1 and grows with both", [] {
+  rc::prop("The posterior lies between 0 and 1 and grows with K, E and M", [] {
+    const cfp::MapPointOptions options;
+    const double p = cfp::posterior_probability(*any_double(), *any_double(), *any_double(), options);
+    RC_ASSERT(p > 0 && p < 1);
+    const double m = *probability(), k = *probability(), e = *probability();
+    const double m2 = m + (1 - m) * *probability(), k2 = k + (1 - k) * *probability(),
+                 e2 = e + (1 - e) * *probability();
+    RC_ASSERT(cfp::posterior_probability(k2, e2, m2, options) >= cfp::posterior_probability(k, e, m, options) - 1e-12);
+  });
+  rc::prop("Every printed weight rule lies between 0 and 1 and grows with both", [] {
     const double m = *probability(), k = *probability();
     const double m2 = m + (1 - m) * *probability(), k2 = k + (1 - k) * *probability();
     for (const auto rule : {cfp::WeightRule::product, cfp::WeightRule::minimum}) {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -43,6 +44,7 @@ struct FrameRun {
     cfp::begin_frame(current, state);
     for (std::size_t b = 0; b < scene.boxes.size(); ++b) {
       cfp::TrackedBox<Scalar> box;
+      box.id = static_cast<std::int64_t>(b);
       box.box = scene.boxes[b];
       box.detection = static_cast<int>(b);
       box.associated = true;
@@ -62,8 +64,8 @@ struct FrameRun {
     state.current.keypoints = scene.keypoints;
     cfp::match_in_boxes(pose.T_cur_prev, scene.match, camera, options, state);
     cfp::constrain_keypoints(pose, m, camera, options, state);
-    cfp::update_map_points(options, state, m);
     cfp::weigh_keypoints(m, options, state);
+    cfp::update_map_points(options, state, m);
     return state.report;
   }
 

@@ -69,6 +69,7 @@ class Tracking {
     for (std::size_t j = 0; j < mLastFrame.mvKeysUn.size(); ++j) {
       if (mLastFrame.mvpMapPoints[j] || mLastFrame.mvDepth[j] <= 0) continue;
       mlpTemporalPoints.emplace_back(UnprojectStereo(mLastFrame, j, Twc), mLastFrame.Row(j));
+      if (mpWeights) mlpTemporalPoints.back().mStaticProbability = mLastFrame.mvStaticProbability[j];  // cfp: M = K
       mLastFrame.mvpMapPoints[j] = &mlpTemporalPoints.back();
     }
   }
@@ -126,6 +127,7 @@ class Tracking {
       if (!mCurrentFrame.mvpMapPoints[i] || mCurrentFrame.mvbOutlier[i]) continue;
       if (!mpWeights || mpWeights->CountsAsInlier(mCurrentFrame, i)) ++mnMatchesInliers;  // cfp
     }
+    if (mpWeights) mpWeights->Learn(mCurrentFrame);  // cfp: M of all that it saw
     return mnMatchesInliers >= 30;
   }
 

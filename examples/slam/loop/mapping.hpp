@@ -7,21 +7,24 @@
 #include <vector>
 
 #include "cfp/frame/static_probability.hpp"
-#include "last_frame_matching.hpp"
 #include "map.hpp"
 #include "options.hpp"
 
 namespace cfp_slam {
 
-// M of what the frame sees: from the fine stage where the last frame saw it, too, from K alone for what the local map
-// added. Points that have become dynamic go. The map learns nothing of a frame whose pose may be wrong.
-inline void update_points(Map& map, Frame& frame, const LastFrameMatches& last,
-                          const cfp::StaticProbability<Camera>& probability, bool learn) {
+// M of what the frame sees learns from it; a keypoint that saw nothing known starts at its K. Points that have become
+// dynamic go. The map learns nothing of a frame whose pose may be wrong, and what was known to move stays so while no
+// detector says where it is.
+inline void update_points(Map& map, Frame& frame, const cfp::StaticProbability<Camera>& probability, bool learn,
+                          bool detector_ok) {
   for (std::size_t i = 0; i < frame.size(); ++i) {
     float& m = frame.map_point_probability[i];
-    if (!map.is_alive(frame.map_point[i])) {
+    const bool mapped = map.is_alive(frame.map_point[i]);
+    if (mapped) m = map.point(frame.map_point[i]).static_probability;
+    const float learnt = m >= 0 ? probability.updated_map_point(i, m) : frame.static_probability[i];
+    m = !detector_ok && m >= 0 && m < 0.5F ? std::min(m, learnt) : learnt;
+    if (!mapped) {
       frame.map_point[i] = no_point;
-      if (!(m >= 0)) m = frame.static_probability[i];
       continue;
     }
     MapPoint& point = map.point(frame.map_point[i]);
@@ -30,7 +33,6 @@ inline void update_points(Map& map, Frame& frame, const LastFrameMatches& last,
       continue;
     }
     ++point.found;
-    if (!last.matched(i) || !(m >= 0)) m = probability.updated_map_point(i, point.static_probability);
     point.static_probability = m;
     if (cfp::is_deletable(m, probability.options().map_point)) {
       map.erase_point(frame.map_point[i]);

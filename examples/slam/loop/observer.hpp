@@ -14,7 +14,7 @@ class Observer {
   // one module.
   virtual void begin(Module) {}
   virtual void end(Module) {}
-  // A stage (report.stage) has given its weights; after the fine one the frame has its M.
+  // A stage (report.stage) has given its weights; the frame has M of before.
   virtual void weighted(const cfp::StageResult<float>&, const cfp::FrameState<float>&, const Frame&) {}
   virtual void finished(const FrameRecord&) {}
 };

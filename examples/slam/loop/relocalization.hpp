@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "cfp/core/span.hpp"
+#include "cfp/frame/static_probability.hpp"
 #include "cfp/robust/pnp_ransac.hpp"
 #include "matching.hpp"
 
@@ -18,17 +18,16 @@ class Relocalization {
  public:
   explicit Relocalization(std::uint64_t seed) { options_.seed = seed; }
 
-  // On success the pose, and the frame's map points set to the consensus; false: frame untouched. weight: of the
-  // keypoints.
-  bool operator()(Frame& frame, const Map& map, const std::vector<int>& local_points, cfp::span<const float> weight,
-                  const cfp::PinholeCamera<float>& camera) {
-    if (try_points(frame, map, local_points, weight, camera)) return true;
-    return from_keyframes(frame, map, 8, -1, weight, camera);
+  // On success the pose, and the frame's map points set to the consensus; false: frame untouched.
+  bool operator()(Frame& frame, const Map& map, const std::vector<int>& local_points,
+                  const cfp::StaticProbability<Camera>& probability, const cfp::PinholeCamera<float>& camera) {
+    if (try_points(frame, map, local_points, probability, camera)) return true;
+    return from_keyframes(frame, map, 8, -1, probability, camera);
   }
 
   // The same from so many keyframes, going on where the last call ended, but none of world `not_of`.
-  bool from_keyframes(Frame& frame, const Map& map, int most, int not_of, cfp::span<const float> weight,
-                      const cfp::PinholeCamera<float>& camera) {
+  bool from_keyframes(Frame& frame, const Map& map, int most, int not_of,
+                      const cfp::StaticProbability<Camera>& probability, const cfp::PinholeCamera<float>& camera) {
     // The newest first, a few in each lost frame, so that a lost frame costs no more than a bounded time.
     int tries = 0;
     for (std::size_t looked = 0; looked < map.keyframes.size() && tries < most; ++looked) {
@@ -39,7 +38,7 @@ class Relocalization {
       for (const int p : map.keyframes[map.keyframes.size() - 1 - back].frame.map_point) {
         if (map.is_alive(p)) candidates_.push_back(p);
       }
-      if (try_points(frame, map, candidates_, weight, camera)) {
+      if (try_points(frame, map, candidates_, probability, camera)) {
         next_ = 0;
         return true;
       }
@@ -50,8 +49,8 @@ class Relocalization {
  private:
   static constexpr std::size_t min_inliers = 15;
 
-  bool try_points(Frame& frame, const Map& map, const std::vector<int>& points, cfp::span<const float> weight,
-                  const cfp::PinholeCamera<float>& camera) {
+  bool try_points(Frame& frame, const Map& map, const std::vector<int>& points,
+                  const cfp::StaticProbability<Camera>& probability, const cfp::PinholeCamera<float>& camera) {
     match_descriptors(frame, map, points, near_descriptor, 0.8F, matches_);
     if (matches_.size() < min_inliers) return false;
     world_.clear();
@@ -62,7 +61,7 @@ class Relocalization {
       world_.push_back({static_cast<float>(point.position.x()), static_cast<float>(point.position.y()),
                         static_cast<float>(point.position.z())});
       pixels_.push_back(frame.pixels[m.keypoint]);
-      weights_.push_back(weight[m.keypoint] * point.static_probability);
+      weights_.push_back(probability.weight(m.keypoint, point.static_probability));
     }
     inlier_.resize(matches_.size());
     options_.min_inliers = min_inliers;

@@ -17,7 +17,6 @@ Options fitted(Options options, const FrameSource& source, const cfp_examples::D
   probability.tracker.image_height = source.calibration.height;
   if (probability.tracker.max_coast > 0) probability.tracker.max_idle = options.max_idle;
   probability.coarse.flow.ransac.seed = options.seed;
-  probability.fine.map_point_prior = true;                      // this loop keeps M
   probability.classes = {{detector.class_of("person"), true}};  // -1: nothing that it finds can move
   cfp::validate(probability);
   if (options.variant == cfp::Variant::plain) options.unproven_share = 1e9;  // no handling of what moves at all

@@ -149,7 +149,8 @@ class Tracking {
       observer_.weighted(stage, probability_.state(), frame);
     }
     record.health = stage.report.health;
-    frame.static_probability.assign(stage.static_probability.begin(), stage.static_probability.end());
+    for (std::size_t i = 0; i < frame.size(); ++i)
+      frame.static_probability[i] = probability_.static_probability(i, frame.map_point_probability[i]);
     if (frame.has_pose) second_pose(frame, stage.weight);
   }
 
@@ -190,16 +191,9 @@ class Tracking {
     return cfp::span<const cfp::Detection<float>>(detections_);
   }
 
-  // What was known to move stays so while no detector says where it is.
-  cfp::StageResult<float> fine(Frame& frame, const cfp::PoseEstimate& pose) {
+  cfp::StageResult<float> fine(const Frame& frame, const cfp::PoseEstimate& pose) {
     const Part part(observer_, Module::fine);
-    const std::vector<float> before = frame.map_point_probability;
-    cfp::StageResult<float> result = probability_.fine(pose, from_last_.match, frame.map_point_probability);
-    for (std::size_t i = 0; i < frame.size() && !detector_ok_; ++i) {
-      if (before[i] >= 0 && before[i] < 0.5F)
-        frame.map_point_probability[i] = std::min(before[i], frame.map_point_probability[i]);
-    }
-    return result;
+    return probability_.fine(pose, from_last_.match, frame.map_point_probability);
   }
 
   void note_boxes(FrameRecord& record) const {
@@ -221,7 +215,7 @@ class Tracking {
     if (last_.has_pose && !gap_)
       pose_ = refine(frame, weight, from_last_.expected_proven, false, options_.first_health);
     if (!pose_.health.ok()) {
-      relocalised_ = relocalize_(frame, map_, local_map_.points(), weight, view_.camera);
+      relocalised_ = relocalize_(frame, map_, local_map_.points(), probability_, view_.camera);
       if (relocalised_) {
         match_last(frame, frame.T_cam_world);
         pose_ = refine(frame, weight, from_last_.expected_proven, false, options_.first_health);
@@ -267,9 +261,8 @@ class Tracking {
                      const cfp::PoseHealthOptions& health) {
     weights_.assign(weight.begin(), weight.end());
     for (std::size_t i = 0; i < frame.size(); ++i) {
-      if (!from_last_.matched(i) && map_.is_alive(frame.map_point[i]))
-        weights_[i] = cfp::observation_weight(weight[i], map_.point(frame.map_point[i]).static_probability,
-                                              options_.probability.map_point.weight);
+      if (map_.is_alive(frame.map_point[i]))
+        weights_[i] = probability_.weight(i, map_.point(frame.map_point[i]).static_probability);
     }
     return refine_pose_(frame, from_last_, map_, weights_, view_, expected, prune, health,
                         relocalised_ ? std::nullopt : believed_);
@@ -323,7 +316,7 @@ class Tracking {
     weights_.assign(frame.static_probability.begin(), frame.static_probability.end());
     const std::vector<float> weight = weights_;
     std::optional<cfp::SE3<double>> T_old_new;
-    if (relocalize_.from_keyframes(probe, map_, 3, world, weight, view_.camera)) {
+    if (relocalize_.from_keyframes(probe, map_, 3, world, probability_, view_.camera)) {
       LocalMap around(options_.features);
       around.search(probe, grid_, map_, view_, true);
       relocalised_ = true;  // the step to this pose is none of the camera's
@@ -352,7 +345,7 @@ class Tracking {
   void extend_map(Frame& frame, FrameRecord& record) {
     const bool on_probation = relocalised_ || probation_ > 0;
     record.outcome = on_probation ? Outcome::relocalised : Outcome::tracked;
-    update_points(map_, frame, from_last_, probability_, !on_probation);
+    update_points(map_, frame, probability_, !on_probation, detector_ok_);
     ++frames_since_keyframe_;
     if (!on_probation &&
         mapping_.wants_keyframe(map_, frame, local_map_.reference(), pose_.inliers, frames_since_keyframe_))

@@ -12,11 +12,11 @@
 #include "cfp/core/span.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
+#include "cfp/frame/weigh_keypoints.hpp"
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/reprojection.hpp"
 #include "cfp/geometry/undistort.hpp"
 #include "cfp/probability/distance_sigmoid.hpp"
-#include "cfp/probability/map_point.hpp"
 #include "cfp/probability/second_stage_probability.hpp"
 
 namespace cfp {
@@ -52,18 +52,28 @@ void pose_epipolar_distances(const SE3<double>& T_cur_prev, const Camera& camera
   epipolar_distances(F, previous, current, span<Scalar>(scratch.epipolar));
 }
 
-/// One constraint, fitted to the distances of the keypoints outside all boxes.
+/// One constraint, fitted to the distances of the keypoints outside all boxes. Too few of those: to what is more likely
+/// static than not as well, by the coarse stage's weights (not in the paper, whose stage then gives up).
 template <typename Scalar>
-[[nodiscard]] ConstraintModel<Scalar> fit_outside(const std::vector<Scalar>& distances,
-                                                  const ConstraintOptions& options, FrameState<Scalar>& state) {
+[[nodiscard]] ConstraintModel<Scalar> fit_to_static(const std::vector<Scalar>& distances,
+                                                    span<const Scalar> map_point_probability,
+                                                    const ConstraintOptions& constraint, const FrameOptions& options,
+                                                    FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
-  scratch.samples.clear();
   scratch.samples.reserve(distances.size());
-  for (std::size_t i = 0; i < distances.size(); ++i) {
-    if (state.label[i] == KeypointLabel::outside) scratch.samples.push_back(distances[i]);
-  }
   scratch.scratch.resize(distances.size());
-  return fit_constraint(scratch.samples, options, scratch.scratch);
+  const auto fit = [&](bool inside) {
+    scratch.samples.clear();
+    for (std::size_t i = 0; i < distances.size(); ++i) {
+      if (state.label[i] == KeypointLabel::outside ||
+          (inside && model_weight(i, map_point_probability[i], options, state) >= Scalar(0.5)))
+        scratch.samples.push_back(distances[i]);
+    }
+    return fit_constraint(scratch.samples, constraint, scratch.scratch);
+  };
+  const ConstraintModel<Scalar> outside = fit(false);
+  const bool enough = outside.status != Status::not_enough_data || options.map_point.weight != WeightRule::posterior;
+  return enough ? outside : fit(true);
 }
 
 /// Median of the valid depths among the matches, 0 without any; for the parallax form of t_Th.
@@ -91,18 +101,19 @@ template <typename Scalar>
 
 inline namespace CFP_ISA {
 
-/// Sets K of every keypoint in a box, and its posterior. In order: the distances d^T (reprojection_distances) and d^F
+/// Sets K of every keypoint in a box. In order: the distances d^T (reprojection_distances) and d^F
 /// (epipolar_distances under F = K^-T [t]x R K^-1 with the camera matrix K, skipped for |t| <= t_Th) of all matches; a
 /// sigmoid for each from the keypoints outside all boxes; second_stage_probability for those inside. M is that of
-/// before this frame, negative where there is no map point. When neither sigmoid has enough samples, the coarse K
-/// stays; a pose that is not finite has that effect. O(keypoints).
+/// before this frame, negative where there is no map point. With WeightRule::posterior a keypoint that neither
+/// constraint judges, for want of a match, a depth or a translation, gets 1/2: its weight is what was known before.
+/// When neither sigmoid has enough samples, the coarse K stays; a pose that is not finite has that effect.
+/// O(keypoints).
 template <typename Scalar, typename Camera>
 void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar>> map_point_probability,
                          const Camera& camera, const FrameOptions& options, FrameState<Scalar>& state) {
   CFP_ASSERT(map_point_probability.size() == state.size());
   const std::size_t n = state.size();
   FrameScratch<Scalar>& scratch = state.scratch;
-  state.posterior = state.static_probability;
   state.report.stage = Stage::fine;
   state.report.constrained = 0;
   if (!options.fine.enabled) return;
@@ -113,12 +124,13 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
   reprojection_distances(PointSpan<Scalar, 2>(scratch.points), span<const Scalar>(scratch.depths),
                          PointSpan<Scalar, 2>(state.current.keypoints), pose.T_cur_prev.template cast<Scalar>(), camera,
                          span<Scalar>(scratch.projection));
-  const ConstraintModel<Scalar> projection = detail::fit_outside(scratch.projection, options.fine.projection, state);
+  const ConstraintModel<Scalar> projection =
+      detail::fit_to_static(scratch.projection, map_point_probability, options.fine.projection, options, state);
   ConstraintModel<Scalar> epipolar;
   const bool moved = detail::has_enough_translation(pose.T_cur_prev, options.fine, scratch);
   if (moved) {
     detail::pose_epipolar_distances(pose.T_cur_prev, camera, state);
-    epipolar = detail::fit_outside(scratch.epipolar, options.fine.epipolar, state);
+    epipolar = detail::fit_to_static(scratch.epipolar, map_point_probability, options.fine.epipolar, options, state);
   }
   const Scalar cs = statistical_confidence(pose.inliers, static_cast<Scalar>(options.fine.min_pose_inliers));
   const Scalar ct = cs * projection.calculation_confidence, cf = cs * epipolar.calculation_confidence;
@@ -130,6 +142,7 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
              has_epipolar = epipolar.status != Status::not_enough_data;
   if (!has_projection && !has_epipolar) return;
   state.evidence.resize(n);
+  const bool posterior = options.map_point.weight == WeightRule::posterior;
   for (std::size_t i = 0; i < n; ++i) {
     if (state.box[i] == no_box) continue;
     const std::size_t b = static_cast<std::size_t>(state.box[i]);
@@ -144,14 +157,9 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
     keypoint.foreground = state.label[i] == KeypointLabel::foreground;
     keypoint.matched = is_finite(scratch.points[i][0]) && is_finite(scratch.points[i][1]);
     keypoint.box_associated = state.boxes[b].associated;
-    const Scalar k = second_stage_probability(keypoint, static_cast<Scalar>(options.object_threshold));
-    state.static_probability[i] = k;
-    // Where neither constraint had anything to say, K stands for a lack of evidence; only an object that came from
-    // nowhere is a rule.
-    const bool silent = !keypoint.projection.available && !keypoint.epipolar.available &&
-                        (keypoint.box_associated || !keypoint.foreground);
-    state.posterior[i] =
-        keypoint.matched && m >= Scalar(0) ? posterior_probability(silent ? Scalar(0.5) : k, m, options.map_point) : k;
+    const bool silent = posterior && !is_judged(keypoint) && !came_from_nowhere(i, state);
+    state.static_probability[i] =
+        silent ? Scalar(0.5) : second_stage_probability(keypoint, static_cast<Scalar>(options.object_threshold));
     ++state.report.constrained;
   }
 }

@@ -17,7 +17,7 @@ namespace cfp {
 
 /// The rule that set a weight.
 enum class WeightReason : std::uint8_t {
-  keypoint_alone,  ///< no map point: K
+  keypoint_alone,  ///< no map point: K, or by Bayes' rule what is known of a new one
   map_point,       ///< K and M, by MapPointOptions::weight
   mismatch,        ///< K and M too far apart: 0
   fallback         ///< too few effective observations in the frame: raised to 1
@@ -70,8 +70,8 @@ template <typename Scalar>
                                          const FrameState<Scalar>& state) noexcept {
   if (!(m >= Scalar(0))) return WeightReason::keypoint_alone;
   if (is_raised(state.label[i], state.report.health.fallback)) return WeightReason::fallback;
-  const bool mismatch =
-      state.report.stage == Stage::fine && is_mismatch(state.static_probability[i], m, options.map_point);
+  const bool mismatch = options.map_point.weight != WeightRule::posterior && state.report.stage == Stage::fine &&
+                        is_mismatch(state.static_probability[i], m, options.map_point);
   return mismatch && model_weight(i, m, options, state) == Scalar(0) ? WeightReason::mismatch : WeightReason::map_point;
 }
 

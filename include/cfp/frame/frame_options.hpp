@@ -44,12 +44,6 @@ struct FineOptions {
   double min_translation_m = 0.005;
   /// The same test on |t| over the median depth of the matched keypoints, >= 0; 0: off. Either test skips.
   double min_parallax = 0;
-  /// Not in the paper, whose K forgets everything between frames: by construction of D_Th, every fifth static point
-  /// then fails either constraint. true: the K that is returned is posterior_probability of K with M before this frame
-  /// as its prior, for matched keypoints in boxes, and M where neither constraint is available. The update of M and the
-  /// weights go on with K itself, so that no evidence counts twice. For hosts that keep M from frame to frame; where M
-  /// is 1 for want of a history, it would drown the geometry.
-  bool map_point_prior = false;
   ConstraintOptions projection;
   ConstraintOptions epipolar;
   DescriptorMatchOptions matching;  ///< of the keypoints in boxes that the host left unmatched
@@ -70,13 +64,14 @@ struct FrameOptions {
 
 /// The systems of the paper's Table IV, and plain SLAM.
 enum class Variant : std::uint8_t {
-  cfp,         ///< CFP-SLAM: everything
-  cfp_minus,   ///< CFP-SLAM-: without the object stage, every object is high dynamic
-  no_mdc,      ///< W/O-MDC: without missed-detection compensation
-  no_dbscan,   ///< W/O-DBS: without depth clustering, all in a box is foreground
-  no_ksp,      ///< W/O-KSP: foreground keypoints are removed, all others count fully
-  only_boxes,  ///< Only-YOLO: all keypoints in detected boxes are removed
-  plain        ///< no dynamic handling at all
+  cfp,           ///< CFP-SLAM: everything
+  cfp_minus,     ///< CFP-SLAM-: without the object stage, every object is high dynamic
+  no_mdc,        ///< W/O-MDC: without missed-detection compensation
+  no_dbscan,     ///< W/O-DBS: without depth clustering, all in a box is foreground
+  no_ksp,        ///< W/O-KSP: foreground keypoints are removed, all others count fully
+  no_posterior,  ///< not in the paper: K and M multiplied as weight, by its words
+  only_boxes,    ///< Only-YOLO: all keypoints in detected boxes are removed
+  plain          ///< no dynamic handling at all
 };
 
 inline namespace CFP_ISA {
@@ -117,19 +112,22 @@ inline namespace CFP_ISA {
 
 /// The enumerator's name as the example programs spell it.
 [[nodiscard]] constexpr const char* to_string(Variant variant) noexcept {
-  constexpr const char* names[] = {"cfp", "cfp-minus", "no-mdc", "no-dbscan", "no-ksp", "only-boxes", "plain"};
+  constexpr const char* names[] = {"cfp",    "cfp-minus",    "no-mdc",     "no-dbscan",
+                                   "no-ksp", "no-posterior", "only-boxes", "plain"};
   return variant <= Variant::plain ? names[static_cast<int>(variant)] : "unknown";
 }
 
 /// The options of a variant: `base` with that variant's parts switched off, nothing else changed. A variant without the
 /// object stage rests on unknown objects being high dynamic, and lowers unknown_object_probability to O_Th if need be.
 [[nodiscard]] inline FrameOptions variant_options(Variant variant, FrameOptions base = {}) {
-  if (variant == Variant::cfp_minus || variant == Variant::no_ksp || variant == Variant::only_boxes) {
+  const bool removes = variant == Variant::no_ksp || variant == Variant::only_boxes;
+  if (variant == Variant::cfp_minus || removes) {
     double& unknown = base.coarse.object.unknown_object_probability;
     unknown = (std::min)(unknown, base.object_threshold);
     base.coarse.use_object_probability = false;
-    base.fine.enabled = base.fine.enabled && variant == Variant::cfp_minus;
+    base.fine.enabled = base.fine.enabled && !removes;
   }
+  if (removes || variant == Variant::no_posterior) base.map_point.weight = WeightRule::product;
   if (variant == Variant::no_mdc || variant == Variant::only_boxes) base.tracker.max_coast = 0;
   if (variant == Variant::no_dbscan || variant == Variant::only_boxes) base.coarse.use_depth_foreground = false;
   if (variant == Variant::no_ksp) base.coarse.soft_background = false;

@@ -106,8 +106,7 @@ struct FrameState {
   std::vector<std::int32_t> match;                    ///< per keypoint: index in the frame before, or no_match
   std::vector<SecondStageKeypoint<Scalar>> evidence;  ///< per keypoint in a box: what the fine stage knew of it
   std::vector<Scalar> static_probability;             ///< per keypoint: K
-  std::vector<Scalar> posterior;  ///< per keypoint: K with M of before as its prior, from the fine stage
-  std::vector<Scalar> weight;     ///< per keypoint: what the pose is to use
+  std::vector<Scalar> weight;                         ///< per keypoint: what the pose is to use
   FrameReport report;
   FrameScratch<Scalar> scratch;
 
@@ -146,7 +145,6 @@ void begin_frame(const Frame<Scalar>& frame, FrameState<Scalar>& state) {
     state.static_probability[i] = valid ? Scalar(1) : Scalar(0);
     state.label[i] = valid ? KeypointLabel::outside : KeypointLabel::invalid;
   }
-  state.posterior = state.static_probability;
   state.weight = state.static_probability;
   state.boxes.clear();
   state.objects.clear();

@@ -100,7 +100,6 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
   report.foreground = count(KeypointLabel::foreground);
   report.background = count(KeypointLabel::background);
   report.invalid = count(KeypointLabel::invalid);
-  state.posterior = state.static_probability;
 }
 
 }  // namespace CFP_ISA

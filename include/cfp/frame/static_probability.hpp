@@ -6,9 +6,10 @@
 ///   pose = optimise(coarse.weight);                              // the host's own
 ///   const auto fine = probability.fine({pose, inliers}, match, m);  // stage 2: the constraints of that pose
 ///   pose = optimise(fine.weight);
+///   probability.update_map_points(m);                            // M of all that the frame saw
 ///
 /// Who wants another order calls the steps themselves: begin_frame, track_boxes, estimate_objects, label_keypoints,
-/// match_in_boxes, constrain_keypoints, update_map_points, weigh_keypoints.
+/// match_in_boxes, constrain_keypoints, weigh_keypoints, update_map_points.
 #pragma once
 
 #include <cstddef>
@@ -53,50 +54,56 @@ class StaticProbability {
   }
 
   /// Stage 1, once per frame, first of all. Without frame.map_point_probability every keypoint counts as an observation
-  /// of a sure map point; see `weights` for matches that are made later.
+  /// of a map point of which nothing is known; see `weights` for matches that are made later.
   StageResult<Scalar> coarse(const Frame<Scalar>& frame) {
     begin_frame(frame, state_);
     track_boxes(frame, options_, tracker_, state_);
     estimate_objects(frame, camera_, options_, state_);
     remember_objects(options_, state_);
     label_keypoints(frame, options_, state_);
-    weigh_keypoints(or_sure(frame.map_point_probability), options_, state_);
-    return result(state_.static_probability);
+    return result(frame.map_point_probability);
   }
 
   /// Stage 2, at most once per frame, with the pose that stage 1's weights led to; left out when there is none. match:
   /// per keypoint the index among the keypoints of the frame of the `coarse` call before, or no_match; may be empty.
-  /// map_point_probability, in and out: M per keypoint, negative where there is no map point; it learns from this
-  /// frame. In the frame after a reset nothing is matched: K and M stay, and the weights are stage 1's.
+  /// map_point_probability: M per keypoint, negative where there is no map point; empty for a host that keeps none. In
+  /// the frame after a reset nothing is matched: K stays, and the weights are stage 1's.
   StageResult<Scalar> fine(const PoseEstimate& pose, span<const std::int32_t> match,
-                           span<Scalar> map_point_probability = {}) {
-    const span<Scalar> m = or_sure(map_point_probability);
+                           span<const Scalar> map_point_probability = {}) {
     match_in_boxes(pose.T_cur_prev, match, camera_, options_, state_);
-    if (state_.previous.known && !(match.empty() && state_.current.descriptors.empty())) {
-      constrain_keypoints(pose, m, camera_, options_, state_);
-      update_map_points(options_, state_, m);
-    }
-    weigh_keypoints(m, options_, state_);
-    return result(options_.fine.map_point_prior ? state_.posterior : state_.static_probability);
+    if (state_.previous.known && !(match.empty() && state_.current.descriptors.empty()))
+      constrain_keypoints(pose, or_unknown(map_point_probability), camera_, options_, state_);
+    return result(map_point_probability);
   }
 
-  /// The weights of the stage that ran last, for matches made since (motion model, then local map): M per keypoint,
-  /// negative where there is no map point.
-  span<const Scalar> weights(span<const Scalar> map_point_probability) {
-    weigh_keypoints(map_point_probability, options_, state_);
-    return state_.weight;
-  }
+  /// The weights of the stage that ran last, for matches made since (motion model, then local map): M per keypoint as
+  /// it was before this frame, negative where there is no map point.
+  span<const Scalar> weights(span<const Scalar> map_point_probability) { return result(map_point_probability).weight; }
   /// The same for one keypoint that joins later. M negative: it has no map point.
   [[nodiscard]] Scalar weight(std::size_t keypoint, Scalar map_point_probability) const noexcept {
     return keypoint_weight(keypoint, map_point_probability, options_, state_);
   }
-  /// M after this frame, of a map point that joined after `fine`.
+
+  /// What is known of one keypoint with a map point of probability M: by Bayes' rule its weight before any fallback, by
+  /// the printed rules K.
+  [[nodiscard]] Scalar static_probability(std::size_t keypoint, Scalar map_point_probability) const noexcept {
+    return options_.map_point.weight == WeightRule::posterior
+               ? model_weight(keypoint, map_point_probability, options_, state_)
+               : state_.static_probability[keypoint];
+  }
+
+  /// The last call of a frame, with all matches that it had: M per keypoint learns from the constraints; it stays when
+  /// `fine` was not called. The frame's weights have M of before as their prior, so that nothing counts twice.
+  void update_map_points(span<Scalar> map_point_probability) noexcept {
+    cfp::update_map_points(options_, state_, map_point_probability);
+  }
+  /// The same for one keypoint.
   [[nodiscard]] Scalar updated_map_point(std::size_t keypoint, Scalar map_point_probability) const noexcept {
     return cfp::updated_map_point(keypoint, map_point_probability, options_, state_);
   }
-  /// Whether the host may make a map point of this keypoint.
+  /// Whether the host may make a map point of this keypoint; its M is then static_probability(keypoint, -1).
   [[nodiscard]] bool may_create_map_point(std::size_t keypoint) const noexcept {
-    return cfp::may_create_map_point(state_.static_probability[keypoint], options_);
+    return cfp::may_create_map_point(static_probability(keypoint, Scalar(-1)), options_);
   }
 
   /// Forgets tracks and frames: after a jump in time or of the camera.
@@ -112,22 +119,23 @@ class StaticProbability {
   [[nodiscard]] const FrameState<Scalar>& state() const noexcept { return state_; }
 
  private:
-  /// M of every keypoint, 1 for a host that keeps none.
-  template <typename Element>
-  span<Element> or_sure(span<Element> map_point_probability) {
+  /// M of every keypoint; for a host that keeps none the one that changes no weight.
+  span<const Scalar> or_unknown(span<const Scalar> map_point_probability) {
     if (!map_point_probability.empty()) return map_point_probability;
-    sure_.assign(state_.size(), Scalar(1));
-    return sure_;
+    unknown_.resize(state_.size());
+    for (std::size_t i = 0; i < state_.size(); ++i) unknown_[i] = unknown_map_point(i, options_, state_);
+    return unknown_;
   }
-  StageResult<Scalar> result(const std::vector<Scalar>& static_probability) const noexcept {
-    return {state_.weight, static_probability, state_.report};
+  StageResult<Scalar> result(span<const Scalar> map_point_probability) {
+    weigh_keypoints(or_unknown(map_point_probability), options_, state_);
+    return {state_.weight, state_.static_probability, state_.report};
   }
 
   Camera camera_;
   FrameOptions options_;
   BoxTracker<Scalar> tracker_;
   FrameState<Scalar> state_;
-  std::vector<Scalar> sure_;
+  std::vector<Scalar> unknown_;
 };
 
 }  // namespace CFP_ISA

@@ -3,35 +3,73 @@
 /// observation. The rules stand here once, for whole frames and for single keypoints alike.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 
 #include "cfp/core/span.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
+#include "cfp/probability/first_stage_probability.hpp"
 #include "cfp/probability/map_point.hpp"
 
 namespace cfp {
 inline namespace CFP_ISA {
 
-/// M of the map point that keypoint i observes, after this frame. No map point (M negative or NaN) stays none, and a
-/// keypoint without a pixel says nothing.
+/// Whether a keypoint is on an object that was not there in the frame before: its matches are false, whatever they say.
 template <typename Scalar>
-[[nodiscard]] Scalar updated_map_point(std::size_t i, non_deduced<Scalar> map_point_probability,
-                                       const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
-  if (!(map_point_probability >= Scalar(0)) || state.label[i] == KeypointLabel::invalid) return map_point_probability;
-  return updated_map_point(state.static_probability[i], map_point_probability, options.map_point);
+[[nodiscard]] bool came_from_nowhere(std::size_t i, const FrameState<Scalar>& state) noexcept {
+  return state.label[i] == KeypointLabel::foreground && !state.boxes[static_cast<std::size_t>(state.box[i])].associated;
 }
 
-/// The weight of keypoint i for a map point of probability M, before any fallback: K without a map point (M negative or
-/// NaN), K and M by MapPointOptions::weight with one. In the fine stage a mismatch (K and M too far apart) gets 0; in
-/// the coarse stage K is too rough for that, and a foreground point's 0 says nothing of its match.
+/// E of keypoint i, which must be in a box: first_stage_evidence of its object.
+template <typename Scalar>
+[[nodiscard]] Scalar first_stage_evidence(std::size_t i, const FrameOptions& options,
+                                          const FrameState<Scalar>& state) noexcept {
+  const double o = state.objects[static_cast<std::size_t>(state.box[i])].static_probability;
+  const bool foreground = state.label[i] == KeypointLabel::foreground;
+  return static_cast<Scalar>(first_stage_evidence(o, foreground, options.object_threshold));
+}
+
+/// M of a map point of which nothing is known when keypoint i observes it: 1 outside all boxes and by the printed
+/// rules, else the prior of its label, which an object that has been shown static raises.
+template <typename Scalar>
+[[nodiscard]] Scalar unknown_map_point(std::size_t i, const FrameOptions& options,
+                                       const FrameState<Scalar>& state) noexcept {
+  const MapPointOptions& o = options.map_point;
+  if (o.weight != WeightRule::posterior || state.box[i] == no_box) return Scalar(1);
+  const bool foreground = state.label[i] == KeypointLabel::foreground;
+  const Scalar e = (std::max)(first_stage_evidence(i, options, state), Scalar(0.5));
+  return posterior_probability(Scalar(0.5), e, Scalar(foreground ? o.foreground_prior : o.background_prior), o);
+}
+
+/// The weight by Bayes' rule, before any fallback. Outside all boxes it is M. In one, the object can only lower it,
+/// because parts of people at rest move; K counts once the constraints were asked, and what came from nowhere is then
+/// left out.
+template <typename Scalar>
+[[nodiscard]] Scalar posterior_weight(std::size_t i, non_deduced<Scalar> map_point_probability,
+                                      const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
+  const Scalar m =
+      map_point_probability >= Scalar(0) ? Scalar(map_point_probability) : unknown_map_point(i, options, state);
+  if (state.box[i] == no_box) return state.label[i] == KeypointLabel::invalid ? Scalar(0) : clamp_probability(m);
+  if (state.report.stage == Stage::fine && came_from_nowhere(i, state)) return Scalar(0);
+  const Scalar e = (std::min)(first_stage_evidence(i, options, state), Scalar(0.5));
+  const Scalar k = state.report.constrained > 0 ? state.static_probability[i] : Scalar(0.5);
+  return posterior_probability(k, e, m, options.map_point);
+}
+
+/// The weight of keypoint i for a map point of probability M (negative or NaN: none), before any fallback:
+/// posterior_weight or, by the printed rules, K without a map point, K and M with one. In the fine stage a mismatch (K
+/// and M too far apart) gets 0; in the coarse stage K is too rough for that, and a foreground point's 0 says nothing of
+/// its match.
 template <typename Scalar>
 [[nodiscard]] Scalar model_weight(std::size_t i, non_deduced<Scalar> map_point_probability, const FrameOptions& options,
                                   const FrameState<Scalar>& state) noexcept {
+  const MapPointOptions& o = options.map_point;
+  if (o.weight == WeightRule::posterior) return posterior_weight(i, map_point_probability, options, state);
   const Scalar k = state.static_probability[i];
   if (!(map_point_probability >= Scalar(0))) return k;
-  if (state.report.stage == Stage::fine && is_mismatch(k, map_point_probability, options.map_point)) return Scalar(0);
-  return observation_weight(k, map_point_probability, options.map_point.weight);
+  if (state.report.stage == Stage::fine && is_mismatch(k, map_point_probability, o)) return Scalar(0);
+  return observation_weight(k, map_point_probability, o.weight);
 }
 
 /// The weight of keypoint i for a map point of probability M, the frame's fallback included.
@@ -43,7 +81,20 @@ template <typename Scalar>
              : model_weight(i, map_point_probability, options, state);
 }
 
-/// M of every map point after this frame, in place.
+/// M of the map point that keypoint i observes, after this frame: it learns from K, once the constraints were asked. No
+/// map point (M negative or NaN) stays none, and a keypoint without a pixel says nothing.
+template <typename Scalar>
+[[nodiscard]] Scalar updated_map_point(std::size_t i, non_deduced<Scalar> map_point_probability,
+                                       const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
+  if (!(map_point_probability >= Scalar(0)) || state.label[i] == KeypointLabel::invalid) return map_point_probability;
+  const bool silent =
+      options.map_point.weight == WeightRule::posterior && state.box[i] != no_box && state.report.constrained == 0;
+  if (state.report.stage != Stage::fine || silent) return clamp_probability(map_point_probability);
+  return updated_map_point(state.static_probability[i], map_point_probability, options.map_point);
+}
+
+/// M of every map point after this frame, in place: the last step of a frame, since its weights have M of before as
+/// their prior.
 template <typename Scalar>
 void update_map_points(const FrameOptions& options, FrameState<Scalar>& state,
                        span<non_deduced<Scalar>> map_point_probability) noexcept {
@@ -65,7 +116,7 @@ void weigh_keypoints(span<const non_deduced<Scalar>> map_point_probability, cons
   for (std::size_t i = 0; i < state.size(); ++i) {
     const Scalar m = map_point_probability[i];
     state.weight[i] = model_weight(i, m, options, state);
-    if (state.report.stage == Stage::fine && m >= Scalar(0) &&
+    if (options.map_point.weight != WeightRule::posterior && state.report.stage == Stage::fine && m >= Scalar(0) &&
         is_mismatch(state.static_probability[i], m, options.map_point))
       ++state.report.mismatched;
   }

@@ -39,5 +39,17 @@ template <typename Scalar>
   return clamp_probability(o * background_factor(o, o, object_threshold));
 }
 
+/// E, what the first stage says of a keypoint whose map point's M is the prior: on the object, O's odds against those
+/// of O_Th, so that an object at O_Th says nothing (1/2); behind it 1/2. In [0, 1], continuous and increasing in O. NaN
+/// counts as O = 0. Not in the paper.
+template <typename Scalar>
+[[nodiscard]] constexpr Scalar first_stage_evidence(Scalar object_probability, bool foreground,
+                                                    Scalar object_threshold) noexcept {
+  if (!foreground) return Scalar(0.5);
+  const Scalar o = clamp_probability(object_probability);
+  const Scalar is_static = o * (Scalar(1) - object_threshold), moves = (Scalar(1) - o) * object_threshold;
+  return is_static / (is_static + moves);
+}
+
 }  // namespace CFP_ISA
 }  // namespace cfp

@@ -3,11 +3,13 @@
 /// (paper section IV-D). The paper only says "is updated"; the policies are ours.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
+#include "cfp/math/logistic.hpp"
 
 namespace cfp {
 
@@ -17,18 +19,30 @@ enum class MapPointPolicy : std::uint8_t {
   copy  ///< K, the simplest reading of the paper: a static in-box point has P(K < 0.3) ~ 0.25 in each frame
 };
 
-enum class WeightRule : std::uint8_t { product, minimum };
+/// What makes the weight of an observation.
+enum class WeightRule : std::uint8_t {
+  posterior,  ///< Bayes' rule: M of before, with what this frame says of object and keypoint. Not in the paper
+  product,    ///< K M, and 0 where the two are mismatched (paper: "as weights")
+  minimum     ///< min(K, M), else the same
+};
 
 struct MapPointOptions {
   /// At the same number of frames until a moving point is deleted, log_odds deletes 5 to 15 times fewer static points
   /// than the exponential mean, and its M is nearer to the truth (benchmarks/studies/map_point_study).
   MapPointPolicy policy = MapPointPolicy::log_odds;
   double rate = 0.2;                ///< weight of the new K against M, in (0, 1]; the same study
-  double evidence_limit = 0.02;     ///< log_odds only: K and M are kept in [limit, 1 - limit], in [1e-4, 0.5)
+  double evidence_limit = 0.02;     ///< log_odds, posterior: K and M are kept in [limit, 1 - limit], in [1e-4, 0.5)
   double deletion_threshold = 0.3;  ///< a map point with M below it is to be deleted (paper), in [0, 1]
-  /// |K - M| above it: keypoint and map point are mismatched (no value in the paper), in (0, 1]
+  /// |K - M| above it: keypoint and map point are mismatched (no value in the paper), in (0, 1]; printed weights only.
   double mismatch_threshold = 0.5;
-  WeightRule weight = WeightRule::product;  ///< how K and M give one weight (paper: "as weights")
+  WeightRule weight = WeightRule::posterior;
+  /// posterior only: power of K's odds in the weight, in (0, 1]. By construction of D_Th every fifth static point is
+  /// beyond it, so that a small K is weaker evidence than its odds.
+  double constraint_power = 0.5;
+  /// posterior only: M of which nothing is known yet, on an object that may move and behind one, in (0, 1). Depth tells
+  /// the two apart well; a point on a person has to earn its weight.
+  double foreground_prior = 0.02;
+  double background_prior = 0.9;
 };
 
 inline namespace CFP_ISA {
@@ -39,6 +53,9 @@ inline namespace CFP_ISA {
   if (!(o.evidence_limit >= 1e-4 && o.evidence_limit < 0.5)) return "evidence_limit";
   if (!(o.deletion_threshold >= 0 && o.deletion_threshold <= 1)) return "deletion_threshold";
   if (!(o.mismatch_threshold > 0 && o.mismatch_threshold <= 1)) return "mismatch_threshold";
+  if (!(o.constraint_power > 0 && o.constraint_power <= 1)) return "constraint_power";
+  if (!detail::inside_unit_interval(o.foreground_prior)) return "foreground_prior";
+  if (!detail::inside_unit_interval(o.background_prior)) return "background_prior";
   return {};
 }
 
@@ -47,18 +64,20 @@ inline namespace CFP_ISA {
 namespace detail {
 inline namespace CFP_ISA {
 
+/// log(p / (1 - p)) of p kept in [limit, 1 - limit].
+template <typename Scalar>
+[[nodiscard]] Scalar bounded_log_odds(Scalar p, Scalar limit) noexcept {
+  using std::log;
+  const Scalar bounded = (std::min)((std::max)(p, limit), Scalar(1) - limit);
+  return log(bounded / (Scalar(1) - bounded));
+}
+
 template <typename Scalar>
 [[nodiscard]] Scalar log_odds_update(Scalar k, Scalar m, Scalar rate, Scalar limit) noexcept {
-  using std::exp;
-  using std::log;
-  const auto bounded = [limit](Scalar p) {
-    return p < limit ? limit : (p > Scalar(1) - limit ? Scalar(1) - limit : p);
-  };
-  const auto logit = [](Scalar p) { return log(p / (Scalar(1) - p)); };
-  const Scalar updated = bounded(Scalar(1) / (Scalar(1) + exp(-(logit(bounded(m)) + rate * logit(bounded(k))))));
+  const Scalar updated = logistic(bounded_log_odds(m, limit) + rate * bounded_log_odds(k, limit));
   // A K beyond the bound never lowers M: a point that was never in doubt keeps the weight 1 that it has without this
   // library.
-  return k > Scalar(1) - limit && updated < m ? m : updated;
+  return k > Scalar(1) - limit && updated < m ? m : (std::min)((std::max)(updated, limit), Scalar(1) - limit);
 }
 
 }  // namespace CFP_ISA
@@ -84,20 +103,18 @@ template <typename Scalar>
   return m;
 }
 
-/// Bayes' rule with M as the prior of a keypoint and K as what this frame's geometry says: odds = odds(K) odds(M), both
-/// kept in [evidence_limit, 1 - evidence_limit]. In [0, 1], increasing in both; M = 1/2 gives K. K = 0 stays 0: that is
-/// a rule (a false match, for example), not a measurement. NaN counts as 0. Not in the paper.
+/// Bayes' rule with M of before as the prior of a keypoint: odds = odds(M) odds(E) odds(K)^constraint_power, where E is
+/// what the first stage says of its object and K what the constraints say of the keypoint; each kept in
+/// [evidence_limit, 1 - evidence_limit], so that none can silence the others. In (0, 1), continuous and non-decreasing
+/// in all three; 1/2 says nothing. NaN counts as 0. Not in the paper.
 template <typename Scalar>
-[[nodiscard]] constexpr Scalar posterior_probability(Scalar keypoint_probability, Scalar map_point_probability,
-                                                     const MapPointOptions& options) noexcept {
-  const Scalar limit = static_cast<Scalar>(options.evidence_limit);
-  const auto bounded = [limit](Scalar p) {
-    return p < limit ? limit : (p > Scalar(1) - limit ? Scalar(1) - limit : p);
+[[nodiscard]] Scalar posterior_probability(Scalar keypoint_probability, Scalar object_evidence,
+                                           Scalar map_point_probability, const MapPointOptions& options) noexcept {
+  const auto evidence = [limit = Scalar(options.evidence_limit)](Scalar p) {
+    return detail::bounded_log_odds(clamp_probability(p), limit);
   };
-  const Scalar raw = clamp_probability(keypoint_probability);
-  if (!(raw > Scalar(0))) return Scalar(0);
-  const Scalar k = bounded(raw), m = bounded(clamp_probability(map_point_probability));
-  return k * m / (k * m + (Scalar(1) - k) * (Scalar(1) - m));
+  return logistic(evidence(map_point_probability) + evidence(object_evidence) +
+                  Scalar(options.constraint_power) * evidence(keypoint_probability));
 }
 
 /// M < 0.3: the host should delete the map point.
@@ -114,20 +131,14 @@ template <typename Scalar>
   return !(difference <= Scalar(options.mismatch_threshold) && -difference <= Scalar(options.mismatch_threshold));
 }
 
-/// The weight of the observation in the first-stage pose: K M or min(K, M); in [0, 1], NaN counts as 0. The
+/// The weight that K and M give an observation by the printed rules: K M, or min(K, M); in [0, 1], NaN counts as 0. The
 /// mismatch rule is not part of it: in the first stage K is coarse, a foreground point's 0 says nothing of its match.
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar observation_weight(Scalar keypoint_probability, Scalar map_point_probability,
                                                   WeightRule rule) noexcept {
   const Scalar k = clamp_probability(keypoint_probability);
   const Scalar m = clamp_probability(map_point_probability);
-  switch (rule) {
-    case WeightRule::product:
-      return k * m;
-    case WeightRule::minimum:
-      return k < m ? k : m;
-  }
-  return Scalar(0);
+  return rule == WeightRule::minimum ? (k < m ? k : m) : k * m;
 }
 
 }  // namespace CFP_ISA

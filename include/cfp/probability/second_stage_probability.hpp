@@ -72,13 +72,18 @@ enum class SecondStageRule : std::uint8_t {
 
 inline namespace CFP_ISA {
 
+/// Whether a constraint has something to say: a match without any (no depth and too little translation) is as none.
+template <typename Scalar>
+[[nodiscard]] constexpr bool is_judged(const SecondStageKeypoint<Scalar>& keypoint) noexcept {
+  return keypoint.matched && (keypoint.projection.available || keypoint.epipolar.available);
+}
+
 /// The rule that holds for a keypoint.
 template <typename Scalar>
 [[nodiscard]] constexpr SecondStageRule second_stage_rule(const SecondStageKeypoint<Scalar>& keypoint,
                                                           Scalar object_threshold) noexcept {
   if (keypoint.foreground && !keypoint.box_associated) return SecondStageRule::new_object;
-  const bool usable = keypoint.matched && (keypoint.projection.available || keypoint.epipolar.available);
-  if (!usable)
+  if (!is_judged(keypoint))
     return keypoint.foreground ? SecondStageRule::unmatched_foreground : SecondStageRule::unmatched_background;
   return is_high_dynamic(keypoint.object_probability, object_threshold) ? SecondStageRule::high_dynamic
                                                                         : SecondStageRule::low_dynamic;
