@@ -65,6 +65,11 @@ cfp::PoseEstimate optimise(const Image& image, cfp::span<const float> weight) {
   return {image.T_cur_prev, inliers};
 }
 
+/// Every keypoint without a map point gets one.
+void make_map_points(const cfp::StaticProbability<cfp::PinholeCamera<float>>& probability, std::vector<float>& m) {
+  for (std::size_t i = 0; i < m.size(); ++i) m[i] = m[i] < 0 ? probability.static_probability(i, -1) : m[i];
+}
+
 void print(const cfp::FrameState<float>& state) {
   double person = 0, wall = 0, walls = 0;
   for (std::size_t i = 0; i < state.size(); ++i) {
@@ -98,12 +103,10 @@ int main() {
     frame.depths = image.depths;
     frame.detections = image.detections;
     frame.flow = {image.flow_from, image.flow_to};
-    const auto coarse = probability.coarse(frame);             // boxes, objects, depth
-    const auto pose = optimise(image, coarse.weight);          // yours
-    const auto fine = probability.fine(pose, image.match, m);  // the constraints of that pose
-    optimise(image, fine.weight);                              // yours again
-    probability.update_map_points(m);                          // M learns; new map points start with what is known
-    for (std::size_t i = 0; i < n; ++i) m[i] = m[i] < 0 ? probability.static_probability(i, -1) : m[i];
+    const auto pose = optimise(image, probability.coarse(frame).weight);  // boxes, objects, depth; then yours
+    optimise(image, probability.fine(pose, image.match, m).weight);       // the constraints of that pose; yours again
+    probability.update_map_points(m);                                     // M learns
+    make_map_points(probability, m);                                      // yours: M begins with what is known
   }
   // [stages]
   print(probability.state());
