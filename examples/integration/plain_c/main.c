@@ -34,12 +34,12 @@ int main(void) {
   float person, wall;
   int i;
   scene_make(&previous, &current);
-  for (i = 0; i < scene_points; ++i) {
-    match[i] = i;
-    map_point[i] = 1.0F;
-  }
   frame = frame_of(&previous, 0.0);
   cfp_weights_coarse(weights, &frame, weight);
+  for (i = 0; i < scene_points; ++i) {
+    match[i] = i;
+    map_point[i] = weight[i]; /* M of a new map point: what is known of its keypoint */
+  }
   frame = frame_of(&current, 1.0 / 30.0);
   frame.flow_pairs = scene_points;
   frame.flow_previous = previous.xy;

@@ -44,11 +44,12 @@ int main() {
     last.landmarks_.push_back(std::make_shared<stella_vslam::data::landmark>(stella_vslam::Vec3_t(
         (before.xy[2 * i] - scene_cx) * z / scene_fx, (before.xy[2 * i + 1] - scene_cy) * z / scene_fy, z)));
   }
-  current.landmarks_ = last.landmarks_;  // as the matcher finds them
-  current.pose_cw_(0, 3) = -0.03;        // as the pose optimiser finds it
+  current.pose_cw_(0, 3) = -0.03;  // as the pose optimiser finds it
 
   std::vector<cfp::Detection<float>> detections = Detections(before);
   weights.new_frame(last, &detections, {});
+  for (std::size_t i = 0; i < scene_points; ++i) last.landmarks_[i]->static_probability_ = weights.initial(i);
+  current.landmarks_ = last.landmarks_;  // as the matcher finds them
   detections = Detections(now);
   using Pixels = cfp::PointSpan<float, 2>;
   const std::size_t step = 2 * sizeof(float);
