@@ -48,9 +48,10 @@ inline void number_blocks(BlockEnvelope& envelope) {
 /// 1 / d).
 template <int N>
 [[nodiscard]] bool invert_triangle(Eigen::Matrix<double, N, N>& A) noexcept {
-  double T[N][N];
+  constexpr std::size_t n = static_cast<std::size_t>(N);
+  double T[n][n];
   for (int i = 0; i < N; ++i) {
-    double l[N], rest = A(i, i);
+    double l[n], rest = A(i, i);
     for (int j = 0; j < i; ++j) {
       l[j] = 0;
       for (int k = 0; k <= j; ++k) l[j] += T[j][k] * A(i, k);
