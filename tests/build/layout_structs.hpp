@@ -68,7 +68,7 @@
   CFP_LAYOUT(cfp::StampedPose<double>, T_world_cam)                      \
   CFP_LAYOUT(cfp::AssociationOptions, offset_s)                          \
   CFP_LAYOUT(cfp::TimeMatch, second)                                     \
-  CFP_LAYOUT(cfp::AssociationWorkspace, heap)                            \
+  CFP_LAYOUT(cfp::AssociationWorkspace, second_taken)                            \
   CFP_LAYOUT(cfp::TrajectoryCoverage, largest_stamp_difference_s)        \
   CFP_LAYOUT(cfp::AbsoluteErrorOptions, expected_poses)                  \
   CFP_LAYOUT(cfp::AbsoluteErrorResult, status)                           \
