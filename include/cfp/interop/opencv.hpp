@@ -181,7 +181,7 @@ template <typename Scalar>
     return Status::invalid_input;
   double values[9] = {detail::real_element(camera_matrix, 0, 0), detail::real_element(camera_matrix, 1, 1),
                       detail::real_element(camera_matrix, 0, 2), detail::real_element(camera_matrix, 1, 2)};
-  if (!distortion.empty()) {
+  if (distortion.data != nullptr) {  // empty() is a call of the library
     const int count = distortion.rows * distortion.cols;
     if (!detail::is_real_matrix(distortion) || (distortion.rows != 1 && distortion.cols != 1))
       return Status::invalid_input;
