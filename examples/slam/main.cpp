@@ -78,6 +78,10 @@ cfp_slam::RunSettings settings_of(const fs::path& recording, const Arguments& a)
   return settings;
 }
 
+std::size_t frames_of(const cfp_examples::Sequence& sequence, const cfp_slam::RunSettings& settings) {
+  return settings.frames > 0 ? std::min(settings.frames, sequence.size()) : sequence.size();
+}
+
 std::unique_ptr<cfp_examples::Detector> detector_of(const cfp_slam::RunSettings& settings) {
   cfp_examples::DetectorOptions options;
   options.min_score = settings.min_score;
@@ -89,7 +93,7 @@ void run_recording(const fs::path& recording, const Arguments& a) {
   for (const std::string& note : sequence.notes()) std::fprintf(stderr, "%s\n", note.c_str());
   cfp_slam::RunSettings settings = settings_of(recording, a);
   const auto detector = detector_of(settings);
-  const std::size_t frames = settings.frames > 0 ? std::min(settings.frames, sequence.size()) : sequence.size();
+  const std::size_t frames = frames_of(sequence, settings);
   for (settings.seed = a.settings.seed; settings.seed < a.settings.seed + a.seeds; ++settings.seed) {
     for (const std::string& variant : a.variants) {
       settings.variant = variant;
@@ -107,7 +111,7 @@ void run_recording(const fs::path& recording, const Arguments& a) {
 void stress_recording(const fs::path& recording, const Arguments& a) {
   const cfp_examples::Sequence sequence(recording);
   const cfp_slam::RunSettings settings = settings_of(recording, a);
-  const std::size_t frames = settings.frames > 0 ? std::min(settings.frames, sequence.size()) : sequence.size();
+  const std::size_t frames = frames_of(sequence, settings);
   if (sequence.truth().empty() || frames < 30)
     throw std::runtime_error(recording.string() + ": a stress test needs a truth and 30 frames");
   const double seconds = sequence.time_s(frames - 1) - sequence.time_s(0);

@@ -28,7 +28,7 @@ class Tracking {
  public:
   // The observer must stay.
   Tracking(const Camera& camera, const View& view, const Options& options, Observer& observer)
-      : options_(options),
+      : options_(sized(options, view)),
         view_(view),
         observer_(observer),
         probability_(camera, options.probability),
@@ -37,11 +37,7 @@ class Tracking {
         local_map_(options.features),
         mapping_(options),
         interval_(options.interval),
-        detector_(sized(options.detector_health, view)) {
-    options_.detector_health = sized(options_.detector_health, view);
-    for (cfp::PoseHealthOptions* health : {&options_.first_health, &options_.health, &options_.relocalised_health})
-      *health = sized(*health, view);
-  }
+        detector_(options_.detector_health) {}
 
   // `record` comes with time and image; the rest is filled in.
   void track(FrameFeatures&& features, FrameRecord& record) {
@@ -109,11 +105,12 @@ class Tracking {
     cfp::SE3<double> T_cam_reference;
   };
 
-  template <typename HealthOptions>
-  static HealthOptions sized(HealthOptions health, const View& view) {
-    health.image_width = view.width;
-    health.image_height = view.height;
-    return health;
+  static Options sized(Options options, const View& view) {
+    const auto set = [&](auto&... health) {
+      ((health.image_width = view.width, health.image_height = view.height), ...);
+    };
+    set(options.first_health, options.health, options.relocalised_health, options.detector_health);
+    return options;
   }
   static void note(FrameRecord& record, const std::string& what) {
     record.note += (record.note.empty() ? "" : "; ") + what;
@@ -313,14 +310,13 @@ class Tracking {
     Frame probe = frame;
     from_last_.match.swap(no_match_);
     from_last_.match.assign(frame.size(), cfp::no_match);
-    weights_.assign(frame.static_probability.begin(), frame.static_probability.end());
-    const std::vector<float> weight = weights_;
     std::optional<cfp::SE3<double>> T_old_new;
     if (relocalize_.from_keyframes(probe, map_, 3, world, probability_, view_.camera)) {
       LocalMap around(options_.features);
       around.search(probe, grid_, map_, view_, true);
       relocalised_ = true;  // the step to this pose is none of the camera's
-      if (refine(probe, weight, around.expected_proven(), true, options_.relocalised_health).health.ok())
+      if (refine(probe, frame.static_probability, around.expected_proven(), true, options_.relocalised_health)
+              .health.ok())
         T_old_new = probe.T_cam_world.inverse() * frame.T_cam_world;
       relocalised_ = false;
       if (T_old_new && T_old_new_ && agree(*T_old_new, *T_old_new_, frame)) {

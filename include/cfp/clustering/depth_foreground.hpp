@@ -75,15 +75,8 @@ enum class ForegroundStatus : std::uint8_t {
 };
 
 [[nodiscard]] constexpr const char* to_string(ForegroundStatus status) noexcept {
-  switch (status) {
-    case ForegroundStatus::ok:
-      return "ok";
-    case ForegroundStatus::too_few_points:
-      return "too few points";
-    case ForegroundStatus::no_cluster:
-      return "no cluster";
-  }
-  return "unknown";
+  constexpr const char* names[] = {"ok", "too few points", "no cluster"};
+  return status <= ForegroundStatus::no_cluster ? names[static_cast<int>(status)] : "unknown";
 }
 
 struct ForegroundResult {

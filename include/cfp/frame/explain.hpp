@@ -70,9 +70,7 @@ template <typename Scalar>
                                          const FrameState<Scalar>& state) noexcept {
   if (!(m >= Scalar(0))) return WeightReason::keypoint_alone;
   if (is_raised(state.label[i], state.report.health.fallback)) return WeightReason::fallback;
-  const bool mismatch = options.map_point.weight != WeightRule::posterior && state.report.stage == Stage::fine &&
-                        is_mismatch(state.static_probability[i], m, options.map_point);
-  return mismatch && model_weight(i, m, options, state) == Scalar(0) ? WeightReason::mismatch : WeightReason::map_point;
+  return is_mismatched(i, m, options, state) ? WeightReason::mismatch : WeightReason::map_point;
 }
 
 /// Three decimals.
@@ -120,11 +118,8 @@ template <typename Scalar>
       const SecondStageKeypoint<Scalar>& known = state.evidence[i];
       e.stage = Stage::fine;
       e.rule = second_stage_rule(known, static_cast<Scalar>(options.object_threshold));
-      if (known.projection.available)
-        e.projection =
-            detail::explain_constraint(known.projection, state.scratch.projection[i], state.report.projection);
-      if (known.epipolar.available)
-        e.epipolar = detail::explain_constraint(known.epipolar, state.scratch.epipolar[i], state.report.epipolar);
+      e.projection = detail::explain_constraint(known.projection, state.scratch.projection[i], state.report.projection);
+      e.epipolar = detail::explain_constraint(known.epipolar, state.scratch.epipolar[i], state.report.epipolar);
     }
   }
   e.static_probability = static_cast<double>(state.static_probability[i]);

@@ -57,10 +57,18 @@ template <typename Scalar>
   return posterior_probability(k, e, m, options.map_point);
 }
 
+/// Whether the printed weights leave the observation out because K and M are too far apart. In the coarse stage K is
+/// too rough for that, and a foreground point's 0 says nothing of its match.
+template <typename Scalar>
+[[nodiscard]] bool is_mismatched(std::size_t i, non_deduced<Scalar> map_point_probability, const FrameOptions& options,
+                                 const FrameState<Scalar>& state) noexcept {
+  return options.map_point.weight != WeightRule::posterior && state.report.stage == Stage::fine &&
+         map_point_probability >= Scalar(0) &&
+         is_mismatch(state.static_probability[i], map_point_probability, options.map_point);
+}
+
 /// The weight of keypoint i for a map point of probability M (negative or NaN: none), before any fallback:
-/// posterior_weight or, by the printed rules, K without a map point, K and M with one. In the fine stage a mismatch (K
-/// and M too far apart) gets 0; in the coarse stage K is too rough for that, and a foreground point's 0 says nothing of
-/// its match.
+/// posterior_weight or, by the printed rules, K without a map point, K and M with one, 0 for a mismatch.
 template <typename Scalar>
 [[nodiscard]] Scalar model_weight(std::size_t i, non_deduced<Scalar> map_point_probability, const FrameOptions& options,
                                   const FrameState<Scalar>& state) noexcept {
@@ -68,7 +76,7 @@ template <typename Scalar>
   if (o.weight == WeightRule::posterior) return posterior_weight(i, map_point_probability, options, state);
   const Scalar k = state.static_probability[i];
   if (!(map_point_probability >= Scalar(0))) return k;
-  if (state.report.stage == Stage::fine && is_mismatch(k, map_point_probability, o)) return Scalar(0);
+  if (is_mismatched(i, map_point_probability, options, state)) return Scalar(0);
   return observation_weight(k, map_point_probability, o.weight);
 }
 
@@ -116,9 +124,7 @@ void weigh_keypoints(span<const non_deduced<Scalar>> map_point_probability, cons
   for (std::size_t i = 0; i < state.size(); ++i) {
     const Scalar m = map_point_probability[i];
     state.weight[i] = model_weight(i, m, options, state);
-    if (options.map_point.weight != WeightRule::posterior && state.report.stage == Stage::fine && m >= Scalar(0) &&
-        is_mismatch(state.static_probability[i], m, options.map_point))
-      ++state.report.mismatched;
+    if (is_mismatched(i, m, options, state)) ++state.report.mismatched;
   }
   state.report.health = apply_fallback(span<const KeypointLabel>(state.label), map_point_probability,
                                        span<Scalar>(state.weight), options.health);
