@@ -25,6 +25,7 @@ struct RunSettings {
   std::size_t frames = 0;  // 0: all
   int features = 1000;
   double min_score = 0;
+  bool decisions = false;  // everything about every keypoint is written; no figure depends on it
 
   [[nodiscard]] std::string text() const {
     std::ostringstream out;
@@ -67,7 +68,8 @@ inline std::filesystem::path run_folder(const std::filesystem::path& out, const 
 
 // Whether the folder holds a whole run with these settings.
 inline bool is_done(const std::filesystem::path& folder, const RunSettings& settings) {
-  return file_text(folder / "run.txt").rfind(settings.text(), 0) == 0;
+  return file_text(folder / "run.txt").rfind(settings.text(), 0) == 0 &&
+         (!settings.decisions || std::filesystem::exists(folder / "decisions.txt"));
 }
 
 // The loop's options of a run.
@@ -87,8 +89,8 @@ inline std::string run_into(const std::filesystem::path& folder, const cfp_examp
                             cfp_examples::Detector& detector, const RunSettings& settings, bool threads,
                             const std::function<void(std::size_t)>& progress) {
   std::filesystem::create_directories(folder);
-  std::filesystem::remove(folder / "run.txt");
-  RunWriter writer(folder, progress);
+  for (const char* old : {"run.txt", "decisions.txt"}) std::filesystem::remove(folder / old);
+  RunWriter writer(folder, progress, settings.decisions);
   const RunResult result = run_slam(sequence, detector, options_of(settings, threads), writer);
   writer.close();
   {

@@ -1,11 +1,12 @@
-// An observer of the loop that writes what it sees as text files: frames.txt, boxes.txt, keypoints.txt (README.md tells
-// every column).
+// An observer of the loop that writes what it sees as text files: frames.txt, boxes.txt, keypoints.txt and, when asked,
+// decisions.txt (README.md tells every column).
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -20,6 +21,7 @@
 
 #include "../slam/loop/observer.hpp"
 #include "../support/tum.hpp"
+#include "decisions.hpp"
 
 namespace cfp_slam {
 
@@ -67,12 +69,14 @@ inline std::string text_of(const Said& said) {
 
 class RunWriter final : public Observer {
  public:
-  // progress is called with the number of frames done.
-  RunWriter(const std::filesystem::path& folder, std::function<void(std::size_t)> progress)
+  // progress is called with the number of frames done. decisions: everything about every keypoint is written, too.
+  RunWriter(const std::filesystem::path& folder, std::function<void(std::size_t)> progress, bool decisions = false)
       : progress_(std::move(progress)),
         frames_(open_text(folder / "frames.txt", frame_columns().c_str())),
         boxes_(open_text(folder / "boxes.txt", "frame id x1 y1 x2 y2 compensated object_known O flow_pairs")),
-        keypoints_(open_text(folder / "keypoints.txt", "frame x y size foreground K_coarse K_fine M weight")) {}
+        keypoints_(open_text(folder / "keypoints.txt", "frame x y size foreground K_coarse K_fine M weight")) {
+    if (decisions) decisions_ = open_text(folder / "decisions.txt", decision_columns().c_str());
+  }
 
   void begin(Module module) override { clock_.begin(module); }
   void end(Module module) override { clock_.end(module); }
@@ -94,8 +98,29 @@ class RunWriter final : public Observer {
     }
   }
 
+  void decided(const cfp::StaticProbability<Camera>& probability, const Frame& frame, const Map& map) override {
+    if (!decisions_.is_open()) return;
+    const auto camera = probability.camera().pinhole().cast<double>();
+    for (std::size_t i = 0; i < frame.size(); ++i) {
+      const bool mapped = map.is_alive(frame.map_point[i]);
+      const cv::KeyPoint& seen = frame.keypoints[i];
+      const float m = mapped ? map.point(frame.map_point[i]).static_probability : frame.map_point_probability[i];
+      Decision d{frame_, seen.pt.x, seen.pt.y, seen.size, no_point, -1, {}};
+      d.why = cfp::explain(i, m, probability.options(), probability.state());
+      if (mapped && frame.has_pose) {
+        d.map_point = frame.map_point[i];
+        cfp::Vector2<double> pixel;
+        if (camera.project(frame.T_cam_world * map.point(d.map_point).position, pixel))
+          d.residual_px = std::hypot(float(pixel.x()) - frame.pixels[i][0], float(pixel.y()) - frame.pixels[i][1]);
+      }
+      decided_ += decision_line(d) + '\n';
+    }
+  }
+
   void finished(const FrameRecord& record) override {
     write_frame(record);
+    decisions_ << decided_;
+    decided_.clear();
     for (const BoxRecord& b : record.boxes) {
       boxes_ << frame_ << ' ' << b.id << ' ' << b.box.x1 << ' ' << b.box.y1 << ' ' << b.box.x2 << ' ' << b.box.y2 << ' '
              << b.compensated << ' ' << b.object_known << ' ' << b.object_probability << ' ' << b.flow_pairs << '\n';
@@ -114,9 +139,10 @@ class RunWriter final : public Observer {
 
   // Throws when something could not be written.
   void close() {
-    for (std::ofstream* file : {&frames_, &boxes_, &keypoints_}) {
+    for (std::ofstream* file : {&frames_, &boxes_, &keypoints_, &decisions_}) {
+      const bool written = file->is_open();
       file->close();
-      if (!*file) throw std::runtime_error("cannot write all figures of the run");
+      if (written && !*file) throw std::runtime_error("cannot write all figures of the run");
     }
   }
 
@@ -152,7 +178,8 @@ class RunWriter final : public Observer {
 
   std::function<void(std::size_t)> progress_;
   Clock clock_;
-  std::ofstream frames_, boxes_, keypoints_;
+  std::ofstream frames_, boxes_, keypoints_, decisions_;
+  std::string decided_;         // lines of the frame under way
   std::vector<Inside> inside_;  // the keypoints in boxes of the frame under way
   std::size_t frame_ = 0;
   Said said_;

@@ -79,6 +79,47 @@ TEST_CASE("A sequence with walking people: every frame is tracked, to a centimet
   CHECK(r.second_stage.probability.size() == r.first_stage.probability.size());
 }
 
+TEST_CASE("Why every keypoint of every frame has its weight is on file when asked for", "[slam]") {
+  const cfp_test::TemporaryFolder out;
+  FileDetector detector((rendered() / "detections.txt").string(), {});
+  RunSettings settings;
+  settings.recording = rendered().string();
+  settings.frames = 20;
+  settings.decisions = true;
+  CHECK_FALSE(is_done(out.path, settings));
+  run_into(out.path, Sequence(rendered()), detector, settings, false, [](std::size_t) {});
+  CHECK(is_done(out.path, settings));
+  const RunRecord r = read_run(out.path);
+  std::vector<std::size_t> keypoints(r.frames.size()), in_boxes(r.frames.size());
+  std::size_t near = 0, seen = 0, heavy = 0;
+  for_each_decision(out.path / "decisions.txt", [&](const Decision& d) {
+    REQUIRE(d.frame < r.frames.size());
+    CHECK(d.why.keypoint == keypoints[d.frame]++);
+    CHECK((d.why.weight >= 0 && d.why.weight <= 1));
+    if (d.why.box != cfp::no_box) {
+      const BoxKeypoint& same = r.frames[d.frame].box_keypoints.at(in_boxes[d.frame]++);
+      CHECK((same.x == d.x && same.y == d.y && same.coarse == float(d.why.coarse_probability)));
+      if (same.fine >= 0) CHECK(same.fine == float(d.why.static_probability));
+      CHECK(r.frames[d.frame].boxes.at(std::size_t(d.why.box)).id == d.why.track);
+    }
+    if (d.map_point == no_point) return;
+    CHECK(d.why.map_point_probability >= 0);
+    ++seen;
+    near += d.residual_px >= 0 && d.residual_px < 3 * d.size / 31 ? 1 : 0;
+    heavy += d.why.weight > 0.5 ? 1 : 0;
+  });
+  for (std::size_t k = 0; k < r.frames.size(); ++k) {
+    CHECK(keypoints[k] == r.frames[k].keypoints);
+    CHECK(in_boxes[k] == r.frames[k].box_keypoints.size());
+  }
+  CHECK(seen > 20 * 100);
+  CHECK(double(near) > 0.95 * double(seen));
+  CHECK(double(heavy) > 0.7 * double(seen));
+  settings.decisions = false;
+  run_into(out.path, Sequence(rendered()), detector, settings, false, [](std::size_t) {});
+  CHECK_FALSE(std::filesystem::exists(out.path / "decisions.txt"));
+}
+
 TEST_CASE("Threads change the time, not a bit of the trajectory", "[slam]") {
   std::vector<cfp::StampedPose<double>> trajectories[2];
   for (const bool threads : {false, true}) {

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "../../examples/ba_files.hpp"
+#include "../../examples/slam_runs/decisions.hpp"
 #include "../../examples/slam_runs/read_run.hpp"
 #include "../../examples/support/detections_file.hpp"
 #include "../../examples/support/tum.hpp"
@@ -25,7 +26,7 @@ const std::filesystem::path& file_of(const cfp_fuzz::FuzzInput& in) {
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   cfp_fuzz::FuzzInput in(data, size);
-  const int reader = in.byte() % 7;
+  const int reader = in.byte() % 8;
   try {
     switch (reader) {
       case 0:
@@ -47,6 +48,11 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
         break;
       case 5:
         ba_files::read_libmv(file_of(in).string());
+        break;
+      case 6:
+        cfp_slam::for_each_decision(file_of(in), [](const cfp_slam::Decision& d) {
+          CFP_PROMISE(cfp_slam::decision_line(d).size() > 2 && !cfp::to_text(d.why).empty());
+        });
         break;
       default:
         cfp_slam::detail::read_settings(file_of(in));

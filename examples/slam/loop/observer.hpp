@@ -2,7 +2,7 @@
 #pragma once
 
 #include "cfp/frame/static_probability.hpp"
-#include "frame.hpp"
+#include "map.hpp"
 #include "record.hpp"
 
 namespace cfp_slam {
@@ -16,6 +16,8 @@ class Observer {
   virtual void end(Module) {}
   // A stage (report.stage) has given its weights; the frame has M of before.
   virtual void weighted(const cfp::StageResult<float>&, const cfp::FrameState<float>&, const Frame&) {}
+  // The frame has its last pose, if any, and the map points that it rests on; nothing has learnt of it yet.
+  virtual void decided(const cfp::StaticProbability<Camera>&, const Frame&, const Map&) {}
   virtual void finished(const FrameRecord&) {}
 };
 

@@ -149,6 +149,7 @@ class Tracking {
     for (std::size_t i = 0; i < frame.size(); ++i)
       frame.static_probability[i] = probability_.static_probability(i, frame.map_point_probability[i]);
     if (frame.has_pose) second_pose(frame, stage.weight);
+    observer_.decided(probability_, frame, map_);
   }
 
   // Over a gap the last frame says nothing of where its points are now.
