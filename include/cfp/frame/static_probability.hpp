@@ -10,6 +10,9 @@
 ///
 /// Who wants another order calls the steps themselves: begin_frame, track_boxes, estimate_objects, label_keypoints,
 /// match_in_boxes, constrain_keypoints, weigh_keypoints, update_map_points.
+///
+/// A unit that calls `coarse` compiles all engines. A host whose units are compiled often keeps them in one file:
+/// `extern template class cfp::StaticProbability<Camera>;` in its own header, `template class` without extern there.
 #pragma once
 
 #include <cstddef>
@@ -55,26 +58,14 @@ class StaticProbability {
 
   /// Stage 1, once per frame, first of all. Without frame.map_point_probability every keypoint counts as an observation
   /// of a map point of which nothing is known; see `weights` for matches that are made later.
-  StageResult<Scalar> coarse(const Frame<Scalar>& frame) {
-    begin_frame(frame, state_);
-    track_boxes(frame, options_, tracker_, state_);
-    estimate_objects(frame, camera_, options_, state_);
-    remember_objects(options_, state_);
-    label_keypoints(frame, options_, state_);
-    return result(frame.map_point_probability);
-  }
+  StageResult<Scalar> coarse(const Frame<Scalar>& frame);
 
   /// Stage 2, at most once per frame, with the pose that stage 1's weights led to; left out when there is none. match:
   /// per keypoint the index among the keypoints of the frame of the `coarse` call before, or no_match; may be empty.
   /// map_point_probability: M per keypoint, negative where there is no map point; empty for a host that keeps none. In
   /// the frame after a reset nothing is matched: K stays, and the weights are stage 1's.
   StageResult<Scalar> fine(const PoseEstimate& pose, span<const std::int32_t> match,
-                           span<const Scalar> map_point_probability = {}) {
-    match_in_boxes(pose.T_cur_prev, match, camera_, options_, state_);
-    if (state_.previous.known && !(match.empty() && state_.current.descriptors.empty()))
-      constrain_keypoints(pose, or_unknown(map_point_probability), camera_, options_, state_);
-    return result(map_point_probability);
-  }
+                           span<const Scalar> map_point_probability = {});
 
   /// The weights of the stage that ran last, for matches made since (motion model, then local map): M per keypoint as
   /// it was before this frame, negative where there is no map point.
@@ -120,16 +111,8 @@ class StaticProbability {
 
  private:
   /// M of every keypoint; for a host that keeps none the one that changes no weight.
-  span<const Scalar> or_unknown(span<const Scalar> map_point_probability) {
-    if (!map_point_probability.empty()) return map_point_probability;
-    unknown_.resize(state_.size());
-    for (std::size_t i = 0; i < state_.size(); ++i) unknown_[i] = unknown_map_point(i, options_, state_);
-    return unknown_;
-  }
-  StageResult<Scalar> result(span<const Scalar> map_point_probability) {
-    weigh_keypoints(or_unknown(map_point_probability), options_, state_);
-    return {state_.weight, state_.static_probability, state_.report};
-  }
+  span<const Scalar> or_unknown(span<const Scalar> map_point_probability);
+  StageResult<Scalar> result(span<const Scalar> map_point_probability);
 
   Camera camera_;
   FrameOptions options_;
@@ -137,6 +120,43 @@ class StaticProbability {
   FrameState<Scalar> state_;
   std::vector<Scalar> unknown_;
 };
+
+// Outside of the class, so that `extern template class` keeps the engines behind them out of a unit.
+
+template <typename Camera>
+StageResult<typename Camera::ScalarType> StaticProbability<Camera>::coarse(const Frame<Scalar>& frame) {
+  begin_frame(frame, state_);
+  track_boxes(frame, options_, tracker_, state_);
+  estimate_objects(frame, camera_, options_, state_);
+  remember_objects(options_, state_);
+  label_keypoints(frame, options_, state_);
+  return result(frame.map_point_probability);
+}
+
+template <typename Camera>
+StageResult<typename Camera::ScalarType> StaticProbability<Camera>::fine(const PoseEstimate& pose,
+                                                                         span<const std::int32_t> match,
+                                                                         span<const Scalar> map_point_probability) {
+  match_in_boxes(pose.T_cur_prev, match, camera_, options_, state_);
+  if (state_.previous.known && !(match.empty() && state_.current.descriptors.empty()))
+    constrain_keypoints(pose, or_unknown(map_point_probability), camera_, options_, state_);
+  return result(map_point_probability);
+}
+
+template <typename Camera>
+span<const typename Camera::ScalarType> StaticProbability<Camera>::or_unknown(
+    span<const Scalar> map_point_probability) {
+  if (!map_point_probability.empty()) return map_point_probability;
+  unknown_.resize(state_.size());
+  for (std::size_t i = 0; i < state_.size(); ++i) unknown_[i] = unknown_map_point(i, options_, state_);
+  return unknown_;
+}
+
+template <typename Camera>
+StageResult<typename Camera::ScalarType> StaticProbability<Camera>::result(span<const Scalar> map_point_probability) {
+  weigh_keypoints(or_unknown(map_point_probability), options_, state_);
+  return {state_.weight, state_.static_probability, state_.report};
+}
 
 }  // namespace CFP_ISA
 }  // namespace cfp
