@@ -9,6 +9,7 @@
 
 #include "cfp/frame/static_probability.hpp"
 #include "support/dynamic_scene.hpp"
+#include "support/frame_engines.hpp"
 
 namespace cfp_test {
 
