@@ -210,7 +210,7 @@ def page(rows, versions, machine, environment, include, seconds):
         "A ratio is *peer over cfp* of neighbouring runs of one process (scikit-learn and scipy: of one turn), above 1 where cfp is faster; two goals are base and native.\n", peer_table(rows),
         "## Beside the paper's timing table\n", "Table V is from another machine (an i7 with an RTX 3060); its Tracking, 42.7 ms, is all of a frame in the main thread. YOLO (12.44 ms) is outside of cfp.\n", paper_table(rows)]
     if include:
-        parts += ["## Including a header\n", f"Nothing called, `-O2`; the dearest of {len(include)}.\n", include_table(include)]
+        parts += ["## Including a header\n", f"Nothing called but in a host's units, `-O2`; the dearest of {len(include)}.\n", include_table(include)]
     parts += ["## Limits\n", "* One machine, one compiler; another process on it moves single ratios by a tenth.\n"
               "* Peers that are binaries (OpenCV, Ceres) are the distribution's: baseline code with what they choose at run time, in both builds. Header-only peers are compiled with the build's flags.\n"
               "* Growth with the size of the data can be read from rows of several sizes in `tables.md`.\n"]

@@ -10,6 +10,9 @@
 #include "cfp/interop/opencv_flow.hpp"
 #include "static_weights.hpp"
 
+// Compiled in engines.cc alone: Tracking.cc includes this header, and is compiled often.
+extern template class cfp::StaticProbability<cfp::RadialTangentialCamera<float>>;
+
 namespace cfp_integration {
 
 // Objects are detected in the image as the lens gives it, so the keypoints are those before undistortion (mvKeys, not
