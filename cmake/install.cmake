@@ -4,7 +4,7 @@ include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
 set(cfp_package_dir "${CMAKE_INSTALL_DATADIR}/cmake/cfp")
-install(DIRECTORY include/cfp DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" FILES_MATCHING PATTERN "*.hpp")
+install(DIRECTORY include/cfp include/cfp_testing DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" FILES_MATCHING PATTERN "*.hpp")
 install(FILES LICENSE DESTINATION "${CMAKE_INSTALL_DATADIR}/licenses/cfp")
 install(TARGETS cfp EXPORT cfp_targets INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
 install(EXPORT cfp_targets NAMESPACE cfp:: FILE cfpTargets.cmake DESTINATION "${cfp_package_dir}")

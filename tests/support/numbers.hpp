@@ -1,23 +1,13 @@
 // What hostile input looks like, and how two numbers are compared.
 #pragma once
 
-#include <array>
 #include <cmath>
-#include <limits>
+
+#include "cfp_testing/numbers.hpp"
 
 namespace cfp_test {
 
-/// NaN, infinities, zeros, denormals, the extremes of the type and, last, ordinary numbers.
-template <typename Scalar>
-constexpr std::array<Scalar, 16> hostile_numbers() {
-  using limits = std::numeric_limits<Scalar>;
-  return {limits::quiet_NaN(), limits::infinity(),   -limits::infinity(),
-          (limits::max)(),     limits::lowest(),     (limits::min)(),
-          -(limits::min)(),    limits::denorm_min(), -limits::denorm_min(),
-          Scalar(0),           Scalar(-0.0),         limits::epsilon(),
-          Scalar(1),           Scalar(-1),           Scalar(0.5),
-          Scalar(640)};
-}
+using cfp_testing::hostile_numbers;
 
 /// |a - b| over the larger of the two magnitudes; 0 for equal numbers (also infinite ones).
 template <typename Scalar>
