@@ -49,7 +49,7 @@ void add_run_options(CLI::App& run, Arguments& a) {
   run.add_option("--variant", a.variants, cfp_slam::all_variants + ", or all; several with commas")->delimiter(',');
   run.add_option("--seeds", a.seeds, "runs of each variant, with so many seeds from --seed on");
   run.add_flag("--decisions", a.settings.decisions,
-               "writes why each keypoint of each frame has its weight (90 kB each)");
+               "writes why each keypoint of each frame has its weight (100 kB each)");
   run.add_flag("--resume", a.resume, "leaves out runs that are there, whole and with the same settings");
 }
 

@@ -13,6 +13,7 @@
 
 #include "../slam_runs/read_run.hpp"
 #include "annotate.hpp"
+#include "explained.hpp"
 #include "picture.hpp"
 #include "profile.hpp"
 #include "report.hpp"
@@ -59,6 +60,7 @@ void print_summary(const RunRecord& run) {
 struct Arguments {
   fs::path out, picture, pictures_folder;
   std::size_t pictures = 8;
+  std::vector<std::size_t> explained;
   double target_fps = 30;
   bool profile = false;
 };
@@ -78,6 +80,7 @@ void report(const Arguments& a) {
   std::vector<RunRecord> runs;
   for_each_run(a.out, [&](const fs::path& folder, RunRecord&& run) {
     cfp_slam::add_pictures(run, run.recording, a.pictures);
+    cfp_slam::add_explained(run, folder, a.explained);
     if (!a.pictures_folder.empty()) write_pictures(a.pictures_folder / run.sequence / folder.filename(), run);
     runs.push_back(std::move(run));
   });
@@ -115,6 +118,9 @@ int main(int argc, char** argv) {
   CLI::App& report_command = *app.add_subcommand("report", "errors, and trajectories, probabilities and times as HTML");
   out(report_command);
   report_command.add_option("--pictures", a.pictures, "annotated frames of each run in the report");
+  report_command
+      .add_option("--explain", a.explained, "frames whose keypoints tell why, of runs with --decisions; default: one")
+      ->delimiter(',');
   report_command.add_option("--pictures-to", a.pictures_folder, "writes every annotated frame below this folder");
   report_command.add_option("--picture", a.picture, "writes trajectories and a frame of the first recording as SVG");
   report_command.add_flag("--profile", a.profile, "prints where a frame's time goes and what to turn down");

@@ -1,4 +1,5 @@
-// The frame of every page: one file, no script, nothing fetched; light and dark by the reader's own setting.
+// The frame of every page: one file, nothing fetched, all of it readable without a script; light and dark by the
+// reader's own setting.
 #pragma once
 
 #include <cstddef>
@@ -32,6 +33,14 @@ figure{margin:0;padding:.7rem;background:var(--card);border:1px solid var(--line
 figcaption{margin:.35rem 0 0}
 figure>strong{display:block;margin-bottom:.2rem;font-size:.95rem}
 figure img{display:block;width:100%;height:auto;border-radius:4px}
+.explained{display:grid;grid-template-columns:minmax(0,5fr) minmax(0,4fr);gap:1rem;margin-bottom:1rem}
+.explained svg{display:block;width:100%;height:auto;border-radius:4px;cursor:crosshair;touch-action:manipulation}
+.explained pre{margin:0;padding:.6rem .8rem;min-height:15.5em;background:var(--ground);border:1px solid var(--line);border-radius:6px;font:13px/1.5 ui-monospace,"DejaVu Sans Mono",monospace;white-space:pre-wrap;overflow-wrap:anywhere}
+.explained button{font:inherit;font-size:.87rem;padding:.15rem .7rem;border:1px solid var(--line);border-radius:6px;background:var(--ground);color:var(--ink);cursor:pointer}
+.explained circle{--k:hsl(calc(120*var(--w)),100%,50%);stroke:#0008;stroke-width:.7;fill:var(--k)}
+.explained .behind{fill:#0000;stroke:var(--k);stroke-width:1.6}.explained .outside{r:1.8px}
+.explained .ring{fill:none;stroke:#fff;stroke-width:2.5;filter:drop-shadow(0 0 1px #000)}
+@media(max-width:800px){.explained{grid-template-columns:minmax(0,1fr)}}
 details{margin:1rem 0}summary{cursor:pointer;margin-bottom:.6rem;font-weight:600}
 .scroll{overflow-x:auto;margin:.4rem 0 1rem}
 table{border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:.9rem}

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "../slam_runs/run_record.hpp"
+#include "explained.hpp"
 #include "html.hpp"
 #include "page.hpp"
 #include "report_latency.hpp"
@@ -75,7 +76,7 @@ inline std::string sequence_section(const std::vector<const RunRecord*>& runs) {
   if (!with_truth) about += ", no true trajectory known: no errors";
   return "<section>\n<h2>" + escape(runs.front()->sequence.empty() ? "Sequence" : runs.front()->sequence) +
          "</h2>\n<p>" + escape(about) + "</p>\n" + legend_of(all, with_truth) + trajectory_section(all) +
-         probability_section(all) + gallery(all) + latency_section(all) + "</section>\n";
+         probability_section(all) + gallery(all) + explained_section(all) + latency_section(all) + "</section>\n";
 }
 
 // The page; runs of one sequence stand side by side, sequences in the order in which they come first.
@@ -95,6 +96,8 @@ inline std::string report_page(const std::vector<RunRecord>& runs) {
       "untick a variant in the "
       "legend to show or hide it.</p>\n";
   for (const auto& group : sequences) body += sequence_section(group);
+  if (std::any_of(runs.begin(), runs.end(), [](const RunRecord& run) { return !run.explained.empty(); }))
+    body += explained_script();
   if (runs.empty()) body += "<p>No runs.</p>\n";
   return page(runs.empty() ? "SLAM report" : "SLAM report: " + runs.front().sequence, body);
 }

@@ -9,6 +9,7 @@
 
 #include "../slam/loop/record.hpp"
 #include "cfp/evaluation/trajectory_error.hpp"
+#include "decisions.hpp"
 
 namespace cfp_slam {
 
@@ -41,6 +42,14 @@ struct AnnotatedFrame {
   std::vector<unsigned char> jpeg;
 };
 
+// A picture whose keypoints tell why they have their weights.
+struct ExplainedFrame {
+  std::size_t frame = 0;
+  int width = 0, height = 0;
+  std::vector<unsigned char> jpeg;
+  std::vector<Decision> decisions;
+};
+
 struct RunRecord {
   std::string recording;  // its folder
   std::string sequence, variant, detector;
@@ -49,6 +58,7 @@ struct RunRecord {
   std::vector<RunFrame> frames;
   std::size_t keyframes = 0, map_points = 0;
   std::vector<AnnotatedFrame> pictures;
+  std::vector<ExplainedFrame> explained;
   std::vector<std::string> notes;                                        // what of the recording could not be read
   LabelledSamples first_stage, second_stage, map_point, weight, object;  // in-box keypoints, their map points; boxes
   std::vector<cfp::StampedPose<double>> truth;                           // empty: none known

@@ -287,6 +287,27 @@ TEST_CASE("A detector that falls silent is noticed, and what it knew is carried 
   }
 }
 
+TEST_CASE("A detector that has nothing left to see is not called silent", "[slam]") {
+  struct Leaving final : cfp_examples::Detector {
+    Leaving() : Detector("leaving", {"person"}) {}
+    cfp_examples::Detections detect(const cv::Mat& bgr, double) override {
+      const float right = float(bgr.cols), x = 0.3F * right + 0.03F * right * static_cast<float>(frame_++);
+      if (frame_ > 16) return {};  // too wide for a box that leaves, and gone six frames later
+      return {{{x, 10, std::min(x + 0.25F * right, right), float(bgr.rows) - 10}, 0, 0.9F}};
+    }
+    int frame_ = 0;
+  } detector;
+  StressObserver observer;
+  Options options;
+  options.threads = false;
+  run_slam(Sequence(rendered()), detector, options, observer);
+  REQUIRE(observer.records.size() == frames);
+  for (std::size_t k = 30; k < frames; ++k) {
+    CAPTURE(k);
+    CHECK(observer.records[k].note.empty());
+  }
+}
+
 TEST_CASE("Damaged frames are skipped with their line; the others are tracked", "[slam]") {
   cfp_test::TemporaryFolder folder;
   changed(folder, [&](std::size_t k, const std::filesystem::path& image) {

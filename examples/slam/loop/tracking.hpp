@@ -176,10 +176,17 @@ class Tracking {
     return probability_.coarse(input);
   }
 
-  // Nothing, as if it had not run, of a detector that is silent or stuck: its boxes are carried on.
+  // Nothing, as if it had not run, of a detector that is silent or stuck: its boxes are carried on. Where they have
+  // left the view, nothing is left to be seen.
   std::optional<cfp::span<const cfp::Detection<float>>> believed_detections(const cfp_examples::Detections& detections,
                                                                             FrameRecord& record) {
-    const cfp::DetectorStatus status = detector_.update(cfp::span<const cfp::Detection<float>>(detections));
+    cfp::DetectorStatus status = detector_.update(cfp::span<const cfp::Detection<float>>(detections));
+    const auto& before = probability_.state();
+    const bool left = before.boxes.empty() && int(before.report.frames_since_detector) < options_.max_idle;
+    if (status == cfp::DetectorStatus::silent && left) {
+      detector_.reset();
+      status = cfp::DetectorStatus::ok;
+    }
     if (status != cfp::DetectorStatus::ok) note(record, std::string("detector ") + cfp::to_string(status));
     detector_ok_ = status == cfp::DetectorStatus::ok || status == cfp::DetectorStatus::absurd;
     if (!detector_ok_) return std::nullopt;
