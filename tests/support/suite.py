@@ -55,13 +55,17 @@ class Suite:
 
     def prepared(self):
         """Builds what all tests share."""
-        header = self.build / "all.hpp"
-        if (self.build / "allocation_counter.o").exists():
+        header, made_with = self.build / "all.hpp", self.build / "flags.txt"
+        flags = " ".join([*self.compiler, *self.flags])
+        if made_with.exists() and made_with.read_text() == flags:
             return self
+        for old in self.build.glob("*.o"):
+            old.unlink()
         header.write_text("".join(f"#include {h if h[0] == '<' else chr(34) + h + chr(34)}\n" for h in PRECOMPILED))
         self.run([*self.compiler, *self.flags, "-x", "c++-header", str(header), "-o", f"{header}.gch"], 300, check=True)
         for name in ("main", "allocation_counter"):
             self.run([*self.compiler, *self.flags, "-c", f"{TESTS}/support/{name}.cpp", "-o", f"{self.build}/{name}.o"], 300, check=True)
+        made_with.write_text(flags)
         return self
 
     def run(self, command, seconds, check=False):
@@ -144,7 +148,7 @@ def tests_of(header):
         steps = includes_of(test).get(path)
         if steps is None or "_ceres_" in test.name or (test.parent.name == "interop" and room != "interop"):
             continue
-        mirror, at_home = test.stem == f"{stem}_test", test.parent.name == room
+        mirror, at_home = test.stem.startswith(f"{stem}_"), test.parent.name == room
         ranked.append((not mirror, not at_home, steps, test.parent.name != "properties", test.stat().st_size, test))
     return [entry[-1] for entry in sorted(ranked)]
 
