@@ -3,9 +3,6 @@
 #pragma once
 
 #include <cstddef>
-#include <filesystem>
-#include <fstream>
-#include <stdexcept>
 #include <string>
 
 #include "html.hpp"
@@ -76,18 +73,6 @@ inline std::string page(const std::string& title, const std::string& body) {
          "initial-scale=1\">\n<title>" +
          escape(title) + "</title>\n<style>" + style_sheet() + "</style>\n</head>\n<body>\n" + body +
          "</body>\n</html>\n";
-}
-
-// Throws when the file cannot be written. A reader never sees half of it: it is renamed into place when complete.
-inline void write_text(const std::filesystem::path& file, const std::string& text) {
-  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path());
-  std::filesystem::path part = file;
-  part += ".part";
-  std::ofstream stream(part, std::ios::binary | std::ios::trunc);
-  stream << text;
-  stream.close();
-  if (!stream) throw std::runtime_error("cannot write " + file.string());
-  std::filesystem::rename(part, file);
 }
 
 }  // namespace cfp_slam

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "../slam_runs/run_record.hpp"
+#include "../support/write_text.hpp"
 #include "html.hpp"
 #include "page.hpp"
 #include "report_trajectory.hpp"
@@ -107,7 +108,7 @@ inline std::string summary_picture(const std::vector<RunRecord>& runs, std::size
 // Throws when the file cannot be written.
 inline void write_summary_picture(const std::filesystem::path& file, const std::vector<RunRecord>& runs,
                                   std::size_t largest_bytes = 150000) {
-  write_text(file, summary_picture(runs, largest_bytes));
+  cfp_examples::write_text(file, summary_picture(runs, largest_bytes));
 }
 
 }  // namespace cfp_slam

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "../slam_runs/run_record.hpp"
+#include "../support/write_text.hpp"
 #include "explained.hpp"
 #include "html.hpp"
 #include "page.hpp"
@@ -104,7 +105,7 @@ inline std::string report_page(const std::vector<RunRecord>& runs) {
 
 // Throws when the file cannot be written.
 inline void write_report(const std::filesystem::path& file, const std::vector<RunRecord>& runs) {
-  write_text(file, report_page(runs));
+  cfp_examples::write_text(file, report_page(runs));
 }
 
 }  // namespace cfp_slam

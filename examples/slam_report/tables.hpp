@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "../support/write_text.hpp"
 #include "calibration_table.hpp"
 #include "claims.hpp"
 #include "error_tables.hpp"
@@ -50,9 +51,9 @@ inline void write_tables(const std::filesystem::path& base, const std::vector<Ru
   std::filesystem::path markdown = base, html = base;
   markdown += ".md";
   html += ".html";
-  write_text(markdown, tables_markdown(runs, machine));
-  write_text(html, page("SLAM tables",
-                        "<h1>RGB-D SLAM with static probabilities: tables</h1>\n" + tables_html(runs, machine)));
+  cfp_examples::write_text(markdown, tables_markdown(runs, machine));
+  cfp_examples::write_text(html, page("SLAM tables", "<h1>RGB-D SLAM with static probabilities: tables</h1>\n" +
+                                                         tables_html(runs, machine)));
 }
 
 }  // namespace cfp_slam

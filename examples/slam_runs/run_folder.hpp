@@ -14,6 +14,7 @@
 
 #include "../slam/loop/run.hpp"
 #include "../support/tum.hpp"
+#include "../support/write_text.hpp"
 #include "run_writer.hpp"
 
 namespace cfp_slam {
@@ -58,8 +59,7 @@ inline std::filesystem::path run_folder(const std::filesystem::path& out, const 
     const std::string name = cfp_examples::folder_name(settings.recording) + (n > 1 ? "_" + std::to_string(n) : "");
     const std::filesystem::path folder = out / name;
     if (!std::filesystem::exists(folder / "recording.txt")) {
-      std::filesystem::create_directories(folder);
-      std::ofstream(folder / "recording.txt", std::ios::binary) << settings.recording;
+      cfp_examples::write_text(folder / "recording.txt", settings.recording);
     }
     if (file_text(folder / "recording.txt") == settings.recording)
       return folder / (settings.variant + "_" + std::to_string(settings.seed));
@@ -102,9 +102,8 @@ inline std::string run_into(const std::filesystem::path& folder, const cfp_examp
     }
     if (!out.flush()) throw std::runtime_error("cannot write " + (folder / "trajectory.txt").string());
   }
-  std::ofstream out(folder / "run.txt", std::ios::binary);
-  out << settings.text() << "keyframes " << result.keyframes << "\nmap_points " << result.map_points << '\n';
-  if (!out.flush()) throw std::runtime_error("cannot write " + (folder / "run.txt").string());
+  cfp_examples::write_text(folder / "run.txt", settings.text() + "keyframes " + std::to_string(result.keyframes) +
+                                                   "\nmap_points " + std::to_string(result.map_points) + '\n');
   return text_of(writer.said());
 }
 

@@ -71,7 +71,8 @@ class RunWriter final : public Observer {
  public:
   // progress is called with the number of frames done. decisions: everything about every keypoint is written, too.
   RunWriter(const std::filesystem::path& folder, std::function<void(std::size_t)> progress, bool decisions = false)
-      : progress_(std::move(progress)),
+      : folder_(folder),
+        progress_(std::move(progress)),
         frames_(open_text(folder / "frames.txt", frame_columns().c_str())),
         boxes_(open_text(folder / "boxes.txt", "frame id x1 y1 x2 y2 compensated object_known O flow_pairs")),
         keypoints_(open_text(folder / "keypoints.txt", "frame x y size foreground K_coarse K_fine M weight")) {
@@ -139,10 +140,14 @@ class RunWriter final : public Observer {
 
   // Throws when something could not be written.
   void close() {
-    for (std::ofstream* file : {&frames_, &boxes_, &keypoints_, &decisions_}) {
+    const std::pair<std::ofstream*, const char*> files[] = {{&frames_, "frames.txt"},
+                                                            {&boxes_, "boxes.txt"},
+                                                            {&keypoints_, "keypoints.txt"},
+                                                            {&decisions_, "decisions.txt"}};
+    for (const auto& [file, name] : files) {
       const bool written = file->is_open();
       file->close();
-      if (written && !*file) throw std::runtime_error("cannot write all figures of the run");
+      if (written && !*file) throw std::runtime_error("cannot write " + (folder_ / name).string());
     }
   }
 
@@ -176,6 +181,7 @@ class RunWriter final : public Observer {
     frames_ << (f.note.empty() ? "" : " # ") << f.note << '\n';
   }
 
+  std::filesystem::path folder_;
   std::function<void(std::size_t)> progress_;
   Clock clock_;
   std::ofstream frames_, boxes_, keypoints_, decisions_;
