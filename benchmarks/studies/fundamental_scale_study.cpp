@@ -54,7 +54,7 @@ class Experiment {
  public:
   void run(const Scene& scene, const std::vector<double>& scales, std::vector<double>& plain,
            std::vector<double>& explored) {
-    cfp::detail::load_pairs(cfp::PointPairs{scene.prev, scene.cur}, pairs_);
+    cfp::detail::load_pairs(cfp::PointPairs{scene.prev, scene.cur}, 2 * options_.threshold_px, pairs_);
     list_.reserve(pairs_.size);
     distances_sq_.resize(pairs_.capacity);
     cfp::detail::FundamentalSearch<double> search{pairs_, pairs_.factor * pairs_.factor, list_, distances_sq_,

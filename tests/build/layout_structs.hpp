@@ -82,7 +82,7 @@
   CFP_LAYOUT(cfp::FundamentalRansacOptions, seed)                        \
   CFP_LAYOUT_OPAQUE(cfp::FundamentalResult<float>)                       \
   CFP_LAYOUT_OPAQUE(cfp::FundamentalResult<double>)                      \
-  CFP_LAYOUT(cfp::FundamentalRansacWorkspace, distances_sq)                      \
+  CFP_LAYOUT(cfp::FundamentalRansacWorkspace, scratch)                   \
   CFP_LAYOUT(cfp::RadialTangentialCamera<float>, k3)                     \
   CFP_LAYOUT(cfp::RadialTangentialCamera<double>, k3)                    \
   CFP_LAYOUT_OPAQUE(cfp::MinimalSampler<7>)                              \

@@ -95,7 +95,7 @@ TEST_CASE("F is nearly as good as from the true inliers alone", "[robust]") {
           scene, fundamental_ransac(PointPairs{scene.prev, scene.cur}, FundamentalRansacOptions{}, workspace).F);
       const std::vector<double> labels(scene.is_inlier.begin(), scene.is_inlier.end());
       cfp::detail::PairArrays inliers;
-      cfp::detail::load_pairs(PointPairs{scene.prev, scene.cur, labels}, inliers);
+      cfp::detail::load_pairs(PointPairs{scene.prev, scene.cur, labels}, 1e-6, inliers);
       cfp::detail::FactoredF<double> F(cfp_test::scaled_fundamental(scene.F, inliers.scaling));
       cfp::detail::refine_fundamental(cfp::detail::exact_columns(inliers), 1e6, 30, 1e-10, F);
       ideal += cfp_test::median_sampson_of_truth<double>(
@@ -357,5 +357,89 @@ TEST_CASE("A slow camera before a far wall has an F where its noise allows, and 
         if (translation_m == 0.1 || (translation_m > 0 && noise_px <= 0.1)) CHECK(result.found());
       }
     }
+  }
+}
+
+TEST_CASE("A person who moves before a camera at rest or turning gives no F", "[robust]") {
+  FundamentalRansacWorkspace workspace;
+  cfp::Random random(47, "walker");
+  int found = 0, named = 0, all = 0;
+  for (const double noise_px : {0.0, 0.1, 0.5}) {
+    for (const double rotation_rad : {0.0, 0.035}) {
+      for (const double share : {0.1, 0.2, 0.3}) {
+        for (int trial = 0; trial < 5; ++trial) {
+          TwoViewOptions options = noisy(300, 0);
+          options.noise_px = noise_px;
+          options.translation_m = 0;
+          options.rotation_rad = rotation_rad;
+          auto scene = make_two_view_scene<double>(random, options);
+          const double left = random.uniform(0, 500);
+          std::size_t walkers = 0;
+          for (std::size_t i = 0; i < 300; ++i) {
+            if (scene.prev[i][0] < left || scene.prev[i][0] > left + 130 || static_cast<double>(walkers) >= share * 300)
+              continue;
+            ++walkers;
+            scene.cur[i][0] += 5, scene.cur[i][1] += 3;
+          }
+          const auto result = fundamental_ransac(PointPairs{scene.prev, scene.cur}, scene.camera,
+                                                 FundamentalRansacOptions{}, workspace);
+          ++all;
+          found += result.found() ? 1 : 0;
+          const RansacStatus right = rotation_rad > 0 ? RansacStatus::pure_rotation : RansacStatus::no_motion;
+          named += result.status == right ? 1 : 0;
+        }
+      }
+    }
+  }
+  CHECK(found <= 1);
+  CHECK(named >= all - 5);
+}
+
+TEST_CASE("Pairs that tell no F give none", "[robust]") {
+  FundamentalRansacWorkspace workspace;
+  cfp::Random random(48, "undetermined");
+  using Points = std::vector<std::array<double, 2>>;
+  const auto status = [&](const Points& prev, const Points& cur) {
+    return fundamental_ransac(PointPairs{prev, cur}, FundamentalRansacOptions{}, workspace).status;
+  };
+  const auto refuses = [&](const Points& prev, const Points& cur) {
+    const RansacStatus s = status(prev, cur);
+    return s != RansacStatus::ok && s != RansacStatus::iteration_limit;
+  };
+  int chance = 0;
+  for (int trial = 0; trial < 20; ++trial) {
+    const auto scene = make_two_view_scene<double>(random, noisy(300, 0));
+    Points shifted, copied_prev, copied_cur, anywhere, line_prev, line_cur;
+    const cfp::Vector3<double> at[2] = {{-0.3, 0.2, 2.5}, {0.4, -0.3, 3}},
+                               along[2] = {{0.9, 0.3, 0.4}, {-0.4, 0.7, -0.5}};
+    for (std::size_t i = 0; i < 300; ++i) {
+      shifted.push_back({scene.prev[i][0] + 5, scene.prev[i][1] - 3});
+      copied_prev.push_back(scene.prev[i % 10]), copied_cur.push_back({random.uniform(0, 640), random.uniform(0, 480)});
+      if (i >= 10) copied_cur[i] = copied_cur[i % 10];
+      anywhere.push_back({random.uniform(0, 640), random.uniform(0, 480)});
+      cfp::Vector2<double> u(0, 0), v(0, 0);
+      const cfp::Vector3<double> point = at[i % 2] + random.uniform(-0.8, 0.8) * along[i % 2];
+      REQUIRE((scene.camera.project(point, u) && scene.camera.project(scene.T_cur_prev * point, v)));
+      line_prev.push_back({u.x() + 0.3 * random.normal(), u.y() + 0.3 * random.normal()});
+      line_cur.push_back({v.x() + 0.3 * random.normal(), v.y() + 0.3 * random.normal()});
+    }
+    CHECK(status(scene.prev, scene.prev) == RansacStatus::no_motion);
+    CHECK(status(scene.prev, shifted) == RansacStatus::homography);
+    CHECK(refuses(copied_prev, copied_cur));
+    CHECK(refuses(line_prev, line_cur));
+    chance += refuses(scene.prev, anywhere) ? 0 : 1;
+  }
+  CHECK(chance <= 1);
+}
+
+TEST_CASE("Mismatches that all end in one place are no support", "[robust]") {
+  FundamentalRansacWorkspace workspace;
+  cfp::Random random(49, "one place");
+  for (int trial = 0; trial < 20; ++trial) {
+    auto scene = make_two_view_scene<double>(random, noisy(300, 0));
+    for (std::size_t i = 0; i < 300; i += 2) scene.cur[i] = {300 + random.uniform(0, 1), 200 + random.uniform(0, 1)};
+    const auto result = fundamental_ransac(PointPairs{scene.prev, scene.cur}, FundamentalRansacOptions{}, workspace);
+    REQUIRE(result.found());
+    CHECK(cfp_test::median_sampson_of_truth<double>(scene, result.F) < 0.35);
   }
 }

@@ -29,7 +29,7 @@ struct Pairs {
     scene = cfp_test::make_two_view_scene<double>(random, options);
     std::vector<double> weights(options.pairs);
     for (double& w : weights) w = random.uniform(0.1, 1);
-    cfp::detail::load_pairs(cfp::PointPairs{scene.prev, scene.cur, weights}, arrays);
+    cfp::detail::load_pairs(cfp::PointPairs{scene.prev, scene.cur, weights}, 1e-6, arrays);
     truth = cfp_test::scaled_fundamental(scene.F, arrays.scaling);
   }
 };

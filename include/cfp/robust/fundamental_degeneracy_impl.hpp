@@ -15,57 +15,58 @@
 #include "cfp/core/numeric.hpp"
 #include "cfp/math/matrix3.hpp"
 #include "cfp/math/so3.hpp"
+#include "cfp/robust/fundamental_evidence_impl.hpp"
 #include "cfp/robust/fundamental_search_impl.hpp"
 #include "cfp/robust/homography_impl.hpp"
 
 namespace cfp::detail {
 inline namespace CFP_ISA {
 
-// The steps around the homography of a search, in their order.
+// The steps around the homography of a search, in their order. T is double.
 template <typename T>
-struct HomographyCheck {
+struct DegeneracyCheck {
   FundamentalSearch<T>& search;
+  std::vector<T>& scratch;  // of twice the arrays' capacity
   const PairArrays& pairs = search.pairs;
+  Matrix3<T> H = scaled_homography(Matrix3<T>::Identity());
+  bool refined = false, sound = false, dominant = false;  // H explains something; more than chance; half of the pairs
 
   // Transfer distances have two degrees of freedom and the noise of both images: 95 % of chi-squared is there at 3
   // times the squared threshold that holds 95 % of the Sampson distances.
-  [[nodiscard]] T transfer_limit() const noexcept { return 3 * search.limit; }
+  [[nodiscard]] T transfer_limit() const noexcept { return 3 * (std::max)(search.limit, search.noise_limit()); }
   [[nodiscard]] T transfer_noise_limit() const noexcept { return 3 * search.noise_limit(); }
 
   [[nodiscard]] std::uint32_t drawn() noexcept {
     return search.list[search.random.index(static_cast<std::uint32_t>(search.list.size()))];
   }
 
-  // The homography that explains most of the inliers of F, the search's result, refined on all pairs. False when none
-  // explains `share` of them, by weight.
-  bool dominant_homography(const Matrix3<T>& F, double share, Matrix3<T>& H) noexcept {
-    (void)search.inlier_test(F);
-    search.collect_inliers();
-    double inlier_weight = 0;
-    for (const std::uint32_t i : search.list) inlier_weight += pairs.weights()[i];
-    if (search.list.size() < 4) return false;
-    constexpr int samples = 16;  // 99.8 % to hit a plane with 70 % of the inliers
-    double best = std::numeric_limits<double>::infinity();
+  // The homography that explains most of `list`, refined on all pairs: the identity or one of four pairs.
+  void find_homography(int samples) noexcept {
+    if (search.list.size() < 4) return;
+    double best = transfer_cost(thinned_columns(pairs), H, transfer_limit());
     for (int k = 0; k < samples; ++k) {
-      const std::array<std::uint32_t, 3> sample = {drawn(), drawn(), drawn()};
       Matrix3<T> candidate;
-      if (!homography_from_fundamental(pairs, F, sample, candidate)) continue;
-      const double cost = transfer_cost(fast_columns(pairs), candidate, transfer_limit());
+      if (!homography_of_four(pairs, {drawn(), drawn(), drawn(), drawn()}, candidate)) continue;
+      const double cost = transfer_cost(thinned_columns(pairs), candidate, transfer_limit());
       if (cost < best) best = cost, H = candidate;
     }
-    // Three noisy points carry a homography only so far: a third of the wanted support is enough to go on and refine.
-    if (!(pairs.total_weight - best > share / 3 * inlier_weight)) return false;
+    double weight = 0, explained = 0;
+    for (const std::uint32_t i : search.list) weight += search.weights()[i];
+    // A few noisy points carry a homography only so far: a sixth of the support is enough to go on and refine.
+    best = transfer_cost(fast_columns(pairs), H, transfer_limit());
+    refined = search.total_weight() - best > weight / 6;
+    if (!refined) return;
     refine_homography(thinned_columns(pairs), 4 * transfer_limit(), 5, H);
     refine_homography(exact_columns(pairs), transfer_limit(), 3, H);
-    double explained = 0;
     for (const std::uint32_t i : search.list)
-      explained += transfer_sq(pairs, H, i) <= transfer_limit() ? pairs.weights()[i] : 0.0;
-    return explained >= share * inlier_weight;
+      explained += transfer_sq(pairs, H, i) <= transfer_limit() ? search.weights()[i] : 0.0;
+    dominant = explained >= 0.5 * weight;
+    sound = explained >= 0.2 * weight && explained >= 10;
   }
 
   // Plane and parallax: with H known, two pairs off the plane give the epipole and F = [e']x H. Improves candidate when
   // it can. Source: Chum, Werner, Matas: "Two-view geometry estimation unaffected by a dominant plane", CVPR 2005.
-  void complete_from_plane(const Matrix3<T>& H, RansacCandidate<Matrix3<T>>& candidate) noexcept {
+  void complete_from_plane(RansacCandidate<Matrix3<T>>& candidate) noexcept {
     search.list.clear();
     for (std::size_t i = 0; i < pairs.size; ++i) {
       if (transfer_sq(pairs, H, i) > transfer_limit()) search.list.push_back(static_cast<std::uint32_t>(i));
@@ -91,57 +92,78 @@ struct HomographyCheck {
     if (best.cost < candidate.cost) candidate = best;
   }
 
-  // Of the F whose noise was measured last.
-  [[nodiscard]] bool has_parallax(const Matrix3<T>& H) const noexcept {
-    return has_pairs_off_plane(H) || varies_along_lines(H);
+  // Whether the F whose noise was measured last is one: its lines explain more than chance does, without any part of
+  // the image in which a person may move, too, and without any two lines of points, which leave F undetermined. Against
+  // no motion and against H. least: distinct pairs it has to explain.
+  [[nodiscard]] bool has_parallax(double least) noexcept {
+    FundamentalEvidence<T> evidence{search, scratch};
+    bool person_possible = true;
+    evidence.stride = (std::max)(pairs.size / PairArrays::enough, std::size_t(1));
+    if (refined) {
+      evidence.compare(H);
+      person_possible = refine_beside(evidence.judge().window);
+    }
+    const auto suffices = [&](T factor) {
+      const T n = static_cast<T>(pairs.size);
+      const auto stands = [&](const Matrix3<T>& other) {
+        const T distinct = evidence.compare(other);
+        const typename FundamentalEvidence<T>::Verdict v = evidence.judge();
+        // A sound homography leaves F few freedoms, and many pairs lie on no lines by chance; else any seven have an F.
+        const bool sure = sound || distinct >= (std::max)(T(0.3) * n, T(36));
+        return distinct >= least && v.all > factor * (sure ? T(14.5) : T(6.5) * std::log(n)) &&
+               (!person_possible || v.outside > 6 * factor);
+      };
+      if (!stands(scaled_homography(Matrix3<T>::Identity())) || !stands(H)) return false;
+      evidence.drop_line();
+      evidence.drop_line();
+      return evidence.judge().all > 5 * factor;
+    };
+    // Some of the pairs are enough where they say it clearly.
+    if (evidence.stride > 1 && suffices(3)) return true;
+    evidence.stride = 1;
+    return suffices(1);
   }
 
-  // Whether F explains clearly more of the pairs off the plane than lines in random directions through H p would: those
-  // catch a pair at distance d with probability 2/pi asin(sqrt(2) t / d), t the Sampson threshold (noise of both
-  // images). Two pairs fix the epipole; six standard deviations make up for the best epipole having been searched.
-  [[nodiscard]] bool has_pairs_off_plane(const Matrix3<T>& H) const noexcept {
-    T expected = 2, variance = 1, found = 0;
+  // Refines H on the pairs outside the window of a person, who bends H towards F. Whether H then explains most of what
+  // F explains there, as it does if a person is all that moves, or F explains too little to tell; else H stays as it
+  // was.
+  [[nodiscard]] bool refine_beside(std::size_t window) noexcept {
+    Matrix3<T> candidate = H;
+    PairColumns<float> columns = thinned_columns(pairs);
+    std::array<float, PairArrays::enough> weights = {};
+    const auto index = [&](std::size_t k) { return pairs.size > columns.size ? k * pairs.size / columns.size : k; };
+    for (std::size_t k = 0; k < columns.size; ++k)
+      weights[k] = FundamentalEvidence<T>::in_window(pairs, index(k), window) ? 0.0F : columns.row[4][k];
+    columns.row[4] = weights.data();
+    refine_homography(columns, 4 * transfer_limit(), 3, candidate);
+    refine_homography(columns, transfer_noise_limit(), 3, candidate);
+    T both = 0, outside = 0, explained = 0;
     for (std::size_t i = 0; i < pairs.size; ++i) {
-      const T d2 = transfer_sq(pairs, H, i);
-      if (!(d2 > transfer_noise_limit())) continue;
-      const T chance = 2 / pi<T> * std::asin(std::sqrt((std::min)(T(1), 2 * search.noise_limit() / d2)));
-      expected += chance;
-      variance += chance * (1 - chance);
-      found += search.distances_sq[i] <= search.noise_limit() ? 1 : 0;
+      if (!(search.distances_sq[i] <= search.noise_limit())) continue;
+      const T w = search.weights()[i];
+      explained += w;
+      if (FundamentalEvidence<T>::in_window(pairs, i, window)) continue;
+      outside += w;
+      both += transfer_sq(pairs, candidate, i) <= transfer_noise_limit() ? w : T(0);
     }
-    return found >= expected + 6 * std::sqrt(variance);
-  }
-
-  // Whether the pairs are spread more along their epipolar lines than across them: d_H^2 / 2 is the sum of both
-  // squares, and under H alone their sums have an F distribution around n / (n - 7) (F has 7 parameters) with deviation
-  // sqrt(4/n); six of them. Finds the small parallax of a slow camera before a far wall, which no single pair shows.
-  // Pairs far off H are left to the test above: mismatches would otherwise outweigh everything.
-  [[nodiscard]] bool varies_along_lines(const Matrix3<T>& H) const noexcept {
-    const T farthest = 16 * search.noise_limit() / T(3.84);
-    T across = 0, along = 0, n = 0;
-    for (std::size_t i = 0; i < pairs.size; ++i) {
-      const T sum = transfer_sq(pairs, H, i) / 2, across_sq = search.distances_sq[i];
-      if (!(sum <= farthest && across_sq <= farthest)) continue;
-      across += across_sq;
-      along += sum - across_sq;
-      n += 1;
-    }
-    return n > 7 && along * (n - 7) > across * n * (1 + 6 * std::sqrt(4 / n));
+    if (!(both >= T(0.8) * outside) && explained > search.total_weight() / 4) return false;
+    H = candidate;
+    return true;
   }
 
   // Share of the pairs explained by H that `other` explains, too.
-  [[nodiscard]] double explained_by(const Matrix3<T>& other, const Matrix3<T>& H) const noexcept {
+  [[nodiscard]] double explained_by(const Matrix3<T>& other) const noexcept {
     double both = 0, all = 0;
     for (std::size_t i = 0; i < pairs.size; ++i) {
       if (!(transfer_sq(pairs, H, i) <= transfer_noise_limit())) continue;
-      all += pairs.weights()[i];
-      both += transfer_sq(pairs, other, i) <= transfer_noise_limit() ? pairs.weights()[i] : 0.0;
+      all += search.weights()[i];
+      both += transfer_sq(pairs, other, i) <= T(1.5) * transfer_noise_limit() ? search.weights()[i] : 0.0;
     }
     return all > 0 ? both / all : 0;
   }
 
   // The rotation that fits the rays of H's pairs best, as a homography of scaled pixels. K: intrinsics. Kabsch.
-  [[nodiscard]] Matrix3<T> best_rotation(const Matrix3<T>& K, const Matrix3<T>& H) const noexcept {
+  [[nodiscard]] Matrix3<T> best_rotation(const Matrix3<T>& K) const noexcept {
     const Matrix3<T> to_pixels[2] = {unscaling_matrix<T>(pairs.scaling.previous),
                                      unscaling_matrix<T>(pairs.scaling.current)};
     const Matrix3<T> K_inverse = inverse(K);
@@ -150,7 +172,7 @@ struct HomographyCheck {
       if (!(transfer_sq(pairs, H, i) <= transfer_noise_limit())) continue;
       const Vector3<T> p = K_inverse * (to_pixels[0] * previous_point<T>(pairs, i)),
                        q = K_inverse * (to_pixels[1] * current_point<T>(pairs, i));
-      M += pairs.weights()[i] * q.normalized() * p.normalized().transpose();
+      M += search.weights()[i] * q.normalized() * p.normalized().transpose();
     }
     const SVD3<T> m = svd(M);
     return scaled_homography(Matrix3<T>(K * (m.U * m.V.transpose()) * K_inverse));
@@ -161,15 +183,16 @@ struct HomographyCheck {
 
   // What motion a homography stands for; K: intrinsics or null. The identity, and then the rotation that fits best, is
   // taken in its place when it explains nine tenths of the same pairs.
-  [[nodiscard]] RansacStatus classify(const Matrix3<T>* K, Matrix3<T>& H) const noexcept {
+  [[nodiscard]] RansacStatus classify(const Matrix3<T>* K) noexcept {
+    refine_homography(exact_columns(pairs), transfer_noise_limit(), 5, H);
     const auto replaced_by = [&](const Matrix3<T>& other) {
-      if (!other.allFinite() || !(explained_by(other, H) >= 0.9)) return false;
+      if (!other.allFinite() || !(explained_by(other) >= 0.9)) return false;
       H = other;
       return true;
     };
     if (replaced_by(scaled_homography(Matrix3<T>::Identity()))) return RansacStatus::no_motion;
     if (K == nullptr) return RansacStatus::homography;
-    return replaced_by(best_rotation(*K, H)) ? RansacStatus::pure_rotation : RansacStatus::planar;
+    return replaced_by(best_rotation(*K)) ? RansacStatus::pure_rotation : RansacStatus::planar;
   }
 };
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include <Eigen/Core>
@@ -19,14 +20,24 @@
 
 namespace cfp::detail {
 
-// Previous x, y, current x, y, weight of the pairs present, centred per image and scaled by one common factor, so that
-// distances are pixels times `factor`.
-struct PairArrays : RansacColumns<5> {
+// Counts what falls into the same cell: open addressing.
+struct CellCounts {
+  std::vector<std::uint64_t> keys;
+  std::vector<std::uint32_t> counts, slots;  // per slot; the slot of every pair
+};
+
+// Previous x, y, current x, y, shared weights, weight of the pairs present, centred per image and scaled by one common
+// factor, so that distances are pixels times `factor`. Pairs that begin or end in one cell share weight: copies, or
+// mismatches that all end in one place, are no support. In the score they have the weight of three at most, as
+// evidence that of one.
+struct PairArrays : RansacColumns<7> {
   static constexpr std::size_t enough = 256;  // pairs, to refine a candidate
 
   PairScaling scaling;
   double factor = 0;           // 0: the points of an image coincide, nothing else is set
+  double total_shared = 0;     // sum of the weights in the score
   std::vector<float> thinned;  // evenly chosen ones of the pairs
+  CellCounts cells[2];
 };
 
 inline namespace CFP_ISA {
@@ -62,8 +73,42 @@ template <typename T>
   return {pairs.row(2)[i], pairs.row(3)[i], T(1)};
 }
 
+// Enters every pair's point of one image, the first row of which is given; cells of 1 / inverse_size.
+inline void count_cells(const PairArrays& pairs, std::size_t row, double inverse_size, CellCounts& cells) {
+  std::size_t size = 64;
+  while (size < 2 * pairs.size) size *= 2;
+  cells.keys.assign(size, 0), cells.counts.assign(size, 0), cells.slots.resize(pairs.size);
+  const auto index = [&](double x) {
+    return static_cast<std::uint64_t>((std::min)((std::max)(x * inverse_size, -1e9), 1e9) + 2e9);
+  };
+  for (std::size_t i = 0; i < pairs.size; ++i) {
+    const std::uint64_t key = index(pairs.row(row)[i]) << 32 | index(pairs.row(row + 1)[i]);  // never 0
+    std::size_t at = static_cast<std::size_t>(key * 0x9e3779b97f4a7c15U >> 32) & (size - 1);
+    while (cells.keys[at] != 0 && cells.keys[at] != key) at = (at + 1) & (size - 1);
+    cells.keys[at] = key;
+    ++cells.counts[at];
+    cells.slots[i] = static_cast<std::uint32_t>(at);
+  }
+}
+
+// Shares the weights among the pairs that begin in one cell, or end in one.
+inline void share_weights(PairArrays& pairs, double cell_size) {
+  const CellCounts& previous = pairs.cells[0];
+  const CellCounts& current = pairs.cells[1];
+  for (std::size_t image = 0; image < 2; ++image) count_cells(pairs, 2 * image, 1 / cell_size, pairs.cells[image]);
+  pairs.total_shared = 0;
+  float* const fast = pairs.fast.data() + 4 * pairs.capacity;
+  for (std::size_t i = 0; i < pairs.size; ++i) {
+    const double n = (std::max)(previous.counts[previous.slots[i]], current.counts[current.slots[i]]);
+    const double w = pairs.weights()[i], shared = w * (std::min)(3 / n, 1.0);
+    pairs.row(4)[i] = shared, fast[i] = static_cast<float>(shared), pairs.row(5)[i] = w / n;
+    pairs.total_shared += shared;
+  }
+}
+
+// cell_px: of the cells of PairArrays, > 0.
 template <typename Scalar>
-void load_pairs(const PointPairs<Scalar>& input, PairArrays& pairs) {
+void load_pairs(const PointPairs<Scalar>& input, double cell_px, PairArrays& pairs) {
   pairs.scaling = scale_pairs(input);
   pairs.factor = 0;
   pairs.begin(input.previous.size());
@@ -75,9 +120,10 @@ void load_pairs(const PointPairs<Scalar>& input, PairArrays& pairs) {
   pairs.scaling.previous.factor = pairs.scaling.current.factor = pairs.factor;
   for_each_pair(input, [&](std::size_t i, const Vector2<double>& previous, const Vector2<double>& current, double w) {
     const Vector3<double> p = scaled(pairs.scaling.previous, previous), q = scaled(pairs.scaling.current, current);
-    pairs.push(i, {p.x(), p.y(), q.x(), q.y(), w});
+    pairs.push(i, {p.x(), p.y(), q.x(), q.y(), w, w, w});
   });
   finish(pairs);
+  share_weights(pairs, cell_px * pairs.factor);
   constexpr std::size_t enough = PairArrays::enough;
   for (std::size_t k = 0; k < 5 * enough && pairs.size > enough; ++k)
     pairs.thinned[k] = pairs.fast_row(k / enough)[k % enough * pairs.size / enough];

@@ -58,11 +58,11 @@ struct FundamentalSearch {
   static constexpr T search_scale = 4, final_scale = T(2.25 * 2.25);
 
   [[nodiscard]] std::size_t size() const noexcept { return pairs.size; }
-  [[nodiscard]] span<const double> weights() const noexcept { return pairs.weights(); }
-  [[nodiscard]] double total_weight() const noexcept { return pairs.total_weight; }
+  [[nodiscard]] span<const double> weights() const noexcept { return {pairs.row(4), pairs.size}; }
+  [[nodiscard]] double total_weight() const noexcept { return pairs.total_shared; }
 
   // Squared Sampson distance that 95 % of the true pairs stay below.
-  [[nodiscard]] T noise_limit() const noexcept { return (std::min)(limit, T(3.84) * noise_variance); }
+  [[nodiscard]] T noise_limit() const noexcept { return T(3.84) * noise_variance; }
 
   template <typename Visit>
   void solve(const Sample& sample, Visit&& visit) const {
@@ -149,27 +149,34 @@ struct FundamentalSearch {
     measure_noise(F);
   }
 
-  // The threshold is the caller's tolerance, not the noise, which the spread of F's own residuals shows: a truncated
-  // variance iterated to its fixed point. 0.911 is the variance that a normal distribution keeps within 2.5 sigma.
-  // Floor: 0.01 px. The refinement needs it for its loss, and whether a homography suffices must not be judged by a
-  // threshold above the parallax of a video.
+  // The threshold is the caller's tolerance, not the noise, which the spread of F's own residuals shows.
   void measure_noise(const Model& F) noexcept {
     sampson_distances_sq(exact_columns(pairs), F, distances_sq);
+    measure_noise();
+  }
+  // Of distances_sq: a truncated variance iterated to its fixed point; 0.911 is the variance that a normal distribution
+  // keeps within 2.5 sigma. Where it comes near to what the cut leaves of any distribution the noise exceeds the
+  // threshold, and a wider cut tells by how much. Floor: 0.01 px. The refinement needs it for its loss, and whether a
+  // homography suffices must not be judged by a threshold above the parallax of a video.
+  void measure_noise() noexcept {
     const T floor = T(1e-4) * pairs.factor * pairs.factor;
-    noise_variance = limit / T(3.84);
-    for (int step = 0; step < 10; ++step) {
-      const T farthest = (std::min)(limit, T(6.25) * noise_variance);
-      T sum = 0, weight = 0;
-      for (std::size_t i = 0; i < pairs.size; ++i) {
-        if (!(distances_sq[i] <= farthest)) continue;
-        sum += pairs.weights()[i] * distances_sq[i];
-        weight += pairs.weights()[i];
+    for (T cut = limit; cut <= 16 * limit; cut *= 4) {
+      noise_variance = cut / T(3.84);
+      for (int step = 0; step < 10; ++step) {
+        const T farthest = (std::min)(cut, T(6.25) * noise_variance);
+        T sum = 0, weight = 0;
+        for (std::size_t i = 0; i < pairs.size; ++i) {
+          if (!(distances_sq[i] <= farthest)) continue;
+          sum += weights()[i] * distances_sq[i];
+          weight += weights()[i];
+        }
+        if (!(weight > 0)) break;
+        const T next = (std::max)(sum / weight / T(0.911), floor);
+        const bool settled = std::abs(next - noise_variance) < T(5e-3) * next;
+        noise_variance = next;
+        if (settled) break;
       }
-      if (!(weight > 0)) break;
-      const T next = (std::max)(sum / weight / T(0.911), floor);
-      const bool settled = std::abs(next - noise_variance) < T(1e-3) * next;
-      noise_variance = next;
-      if (settled) break;
+      if (noise_variance < T(0.22) * cut) break;
     }
   }
 };

@@ -45,23 +45,17 @@ template <typename T>
   return sum / limit;
 }
 
-// The homography compatible with F that maps three pairs: H = [e']x F - e' v^T. Hartley and Zisserman, result 13.6.
-// False for collinear points or a degenerate F.
+// The homography of four pairs: each image's four points are a projective basis. False when three lie on a line.
 template <typename T>
-[[nodiscard]] bool homography_from_fundamental(const PairArrays& pairs, const Matrix3<T>& F,
-                                               const std::array<std::uint32_t, 3>& sample, Matrix3<T>& H) noexcept {
-  const Vector3<T> e = epipole_of(F).normalized();
-  const Matrix3<T> A = hat(e) * F;
-  Matrix3<T> M;
-  Vector3<T> b;
-  for (int k = 0; k < 3; ++k) {
-    const std::uint32_t i = sample[static_cast<std::size_t>(k)];
-    const Vector3<T> p = previous_point<T>(pairs, i), q = current_point<T>(pairs, i), across = cross(q, e);
-    M.row(k) = p.transpose();
-    b[k] = cross(q, Vector3<T>(A * p)).dot(across) / across.squaredNorm();
-  }
-  if (!(std::abs(determinant(M)) > T(1e-6))) return false;
-  H = A - e * (inverse(M) * b).transpose();
+[[nodiscard]] bool homography_of_four(const PairArrays& pairs, const std::array<std::uint32_t, 4>& sample,
+                                      Matrix3<T>& H) noexcept {
+  const auto basis = [&](auto&& point) -> Matrix3<T> {
+    Matrix3<T> M;
+    for (std::size_t k = 0; k < 3; ++k) M.col(static_cast<Eigen::Index>(k)) = point(pairs, sample[k]);
+    return M * Vector3<T>(inverse(M) * point(pairs, sample[3])).asDiagonal();
+  };
+  const Matrix3<T> previous = basis(previous_point<T>);
+  H = basis(current_point<T>) * inverse(previous);
   const T norm = H.norm();
   return H.allFinite() && std::abs(determinant(H)) > T(1e-9) * norm * norm * norm;
 }
