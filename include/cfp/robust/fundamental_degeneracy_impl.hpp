@@ -110,8 +110,8 @@ struct DegeneracyCheck {
         const typename FundamentalEvidence<T>::Verdict v = evidence.judge();
         // A sound homography leaves F few freedoms, and many pairs lie on no lines by chance; else any seven have an F.
         const bool sure = sound || distinct >= (std::max)(T(0.3) * n, T(36));
-        return distinct >= least && v.all > factor * (sure ? T(14.5) : T(6.5) * std::log(n)) &&
-               (!person_possible || v.outside > 6 * factor);
+        return distinct >= least && v.all > factor * (sure ? T(11) : T(6.5) * std::log(n)) &&
+               (!person_possible || v.outside > 4 * factor);
       };
       if (!stands(scaled_homography(Matrix3<T>::Identity())) || !stands(H)) return false;
       evidence.drop_line();

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <vector>
 
 #include "cfp/math/matrix3.hpp"
@@ -19,16 +18,19 @@ inline namespace CFP_ISA {
 
 // Without parallax the distances of the pairs from H have no preferred direction, be they noise or mismatches; F says
 // that they point along its lines. With the distance d from H, a from the line and a scale s the density of the
-// direction is sqrt(1 + d^2/s^2) / (1 + a^2/s^2) of the uniform one (a wrapped Cauchy distribution). Whatever s, a pair
-// that does not know F expects the ratio 1, and so 1 + share (ratio - 1), where only a share of the pairs obeys F. The
-// product over all pairs then exceeds e^t with a probability of at most e^-t: its logarithm is the evidence. T is
-// double.
+// direction is (1 + d^2/s^2)^(3/2) / (1 + d^2/2s^2) / (1 + a^2/s^2)^2 of the uniform one. Whatever s, a pair that does
+// not know F expects the ratio 1, and so 1 + share (ratio - 1), where only a share of the pairs obeys F. The product
+// over all pairs then exceeds e^t with a probability of at most e^-t, and so does the mean of such products for several
+// shares: its logarithm is the evidence. Mismatches lie far from H, parallax mostly near it: the share is another one
+// in every range of d. T is double.
 template <typename T>
 struct FundamentalEvidence {
   static constexpr std::size_t strips = 16, person = 5;  // over the extent of the pairs; the width of a person in them
+  static constexpr std::size_t ranges = 6, shares = 5;   // of d, doubling
+  static constexpr T share[shares] = {T(0), T(0.1), T(0.3), T(0.6), T(0.9)};
 
   const FundamentalSearch<T>& search;
-  std::vector<T>& gains;   // weight times (ratio - 1): of the pairs far from H, then of those near it, else 0
+  std::vector<T>& gains;   // weight times (ratio - 1), and then the range of every pair
   std::size_t stride = 1;  // every so manieth pair is looked at
   const PairArrays& pairs = search.pairs;
 
@@ -43,49 +45,57 @@ struct FundamentalEvidence {
   [[nodiscard]] static bool in_window(const PairArrays& pairs, std::size_t i, std::size_t window) noexcept {
     return strip_of(pairs, i) - window < person;
   }
+  [[nodiscard]] std::size_t range_of(std::size_t i) const noexcept {
+    return static_cast<std::size_t>(gains[i + pairs.capacity]);
+  }
 
   template <typename Visit>
   void for_each(Visit&& visit) const noexcept {
     for (std::size_t i = 0; i < pairs.size; i += stride) visit(i);
   }
 
-  // The gains of the F whose distances were measured last. s^2 is twice the variance of a where d is noise, and falls
-  // to 0.4 times it where d is parallax. Returns how many distinct pairs F explains.
+  // The gains of the F whose distances were measured last. Returns how many distinct pairs F explains.
   T compare(const Matrix3<T>& H) noexcept {
-    const T variance = 2 * search.noise_variance + T(1e-4) * pairs.factor * pairs.factor;
+    const T variance = 2 * search.noise_variance + T(1e-4) * pairs.factor * pairs.factor, s2 = 2 * variance;
     const T limit = (std::max)(search.limit, search.noise_limit());
     T distinct = 0;
     for_each([&](std::size_t i) {
-      const T d2 = (std::min)(transfer_sq(pairs, H, i), T(100)), a2 = 2 * search.distances_sq[i];
-      const T s2 = variance * (2 - T(1.6) * d2 / (d2 + 8 * variance)), ratio = std::sqrt(1 + d2 / s2) / (1 + a2 / s2);
-      const bool near = d2 < 12 * variance;
-      gains[i + (near ? 0 : pairs.capacity)] = 0;
-      gains[i + (near ? pairs.capacity : 0)] = pairs.row(5)[i] * (ratio >= 0 ? ratio - 1 : T(-1));
+      const T d2 = (std::min)(transfer_sq(pairs, H, i), T(100)) / s2, a2 = 1 + 2 * search.distances_sq[i] / s2;
+      const T ratio = (1 + d2) * std::sqrt(1 + d2) / ((1 + d2 / 2) * a2 * a2);
+      std::size_t range = 0;
+      for (T edge = 6; range + 1 < ranges && d2 > edge; edge *= 4) ++range;
+      gains[i] = pairs.row(5)[i] * (ratio >= 0 ? ratio - 1 : T(-1));
+      gains[i + pairs.capacity] = static_cast<T>(range);
       if (search.distances_sq[i] <= limit) distinct += pairs.row(5)[i] / pairs.weights()[i];
     });
     return distinct * static_cast<T>(stride);
   }
 
-  // Near H there are hardly any mismatches.
-  [[nodiscard]] T factor(std::size_t i, T share) const noexcept {
-    return (1 + share * gains[i]) * (1 + T(0.9) * gains[i + pairs.capacity]);
-  }
-
   [[nodiscard]] Verdict judge() const noexcept {
-    T best = 0, all = -std::numeric_limits<T>::infinity();
-    for (const T share : {T(0.1), T(0.3), T(0.6), T(0.9)}) {
-      T sum = 0, product = 1;
-      for_each([&](std::size_t i) {
-        product *= factor(i, share);
-        if (product > T(1e-100) && product < T(1e100)) return;
-        sum += std::log(product);
+    T sums[ranges][shares] = {}, products[ranges][shares];
+    for (auto& row : products) std::fill(row, row + shares, T(1));
+    for_each([&](std::size_t i) {
+      const std::size_t range = range_of(i);
+      for (std::size_t k = 1; k < shares; ++k) {
+        T& product = products[range][k];
+        product *= 1 + share[k] * gains[i];
+        if (product > T(1e-100) && product < T(1e100)) continue;
+        sums[range][k] += std::log(product);
         product = 1;
-      });
-      sum += std::log(product);
-      if (sum > all) all = sum, best = share;
+      }
+    });
+    T all = 0, best[ranges];
+    for (std::size_t range = 0; range < ranges; ++range) {
+      T* const sum = sums[range];
+      for (std::size_t k = 1; k < shares; ++k) sum[k] += std::log(products[range][k]);
+      const T* const most = std::max_element(sum, sum + shares);
+      best[range] = share[most - sum];
+      T mean = 0;
+      for (std::size_t k = 0; k < shares; ++k) mean += std::exp(sum[k] - *most) / shares;
+      all += *most + std::log(mean);
     }
     std::array<T, strips> nats{};
-    for_each([&](std::size_t i) { nats[strip_of(pairs, i)] += std::log(factor(i, best)); });
+    for_each([&](std::size_t i) { nats[strip_of(pairs, i)] += std::log(1 + best[range_of(i)] * gains[i]); });
     Verdict out{all, all, 0};
     for (std::size_t first = 0; first + person <= strips; ++first) {
       T rest = all;
@@ -112,14 +122,11 @@ struct FundamentalEvidence {
     for (int k = 0; k < 16; ++k) {
       const Vector3<T> a = point(), across = cross(a, point()), line = across / across.template head<2>().norm();
       T sum = 0;
-      for_each([&](std::size_t i) {
-        const T gain = gains[i] + gains[i + pairs.capacity];
-        sum += holds(line, i) ? (std::min)((std::max)(gain, T(0)), T(1)) : T(0);
-      });
+      for_each([&](std::size_t i) { sum += holds(line, i) ? (std::min)((std::max)(gains[i], T(0)), T(1)) : T(0); });
       if (sum > most) most = sum, best = line;
     }
     for_each([&](std::size_t i) {
-      if (holds(best, i)) gains[i] = gains[i + pairs.capacity] = 0;
+      if (holds(best, i)) gains[i] = 0;
     });
   }
 };
