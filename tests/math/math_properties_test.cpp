@@ -1,6 +1,8 @@
 // Properties of math/, for whatever the generators make.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "cfp/math/cubic.hpp"
@@ -122,63 +124,75 @@ CFP_PROPERTIES("Properties of 3x3 matrices", "[math]",
                          (cfp::cofactors(M).transpose() / d - cfp::inverse(M)).norm() < 1e-9;
                 }})
 
-CFP_PROPERTIES("Properties of solvers and order statistics", "[math]",
-               {"the roots of a cubic made of three roots are those", 500,
-                [](Random& random) {
-                  std::array<double, 3> x;
-                  for (double& r : x) r = random.uniform(-10, 10);
-                  std::sort(x.begin(), x.end());
-                  if (x[1] - x[0] < 0.01 || x[2] - x[1] < 0.01) return true;
-                  double roots[3];
-                  if (cfp::real_cubic_roots(-(x[0] + x[1] + x[2]), x[0] * x[1] + x[1] * x[2] + x[2] * x[0],
-                                            -x[0] * x[1] * x[2], roots) != 3)
-                    return false;
-                  std::sort(roots, roots + 3);
-                  for (std::size_t k = 0; k < 3; ++k) {
-                    if (std::abs(roots[k] - x[k]) > 1e-8) return false;
-                  }
-                  return true;
-                }},
-               {"a cubic of one real root has that one", 500,
-                [](Random& random) {  // (x - r) ((x - u)^2 + v^2)
-                  const double r = random.uniform(-5, 5), u = random.uniform(-5, 5), v = random.uniform(0.3, 5);
-                  double roots[3];
-                  const int n =
-                      cfp::real_cubic_roots(-r - 2 * u, u * u + v * v + 2 * r * u, -r * (u * u + v * v), roots);
-                  return n == 1 && std::abs(roots[0] - r) < 1e-9;
-                }},
-               {"the step solves its equations, whatever the scale of each unknown", 200,
-                [](Random& random) {
-                  const Eigen::Matrix<double, 6, 6> H = positive_definite(random);
-                  const cfp::Vector6<double> g = vector6(random);
-                  cfp::Vector6<double> step, scaled_step, scale;
-                  for (int k = 0; k < 6; ++k) scale[k] = std::exp2(static_cast<double>(random.index(41)) - 20);
-                  const Eigen::Matrix<double, 6, 6> scaled_H = scale.asDiagonal() * H * scale.asDiagonal();
-                  const cfp::Vector6<double> scaled_g = scale.asDiagonal() * g;
-                  if (!cfp::solve_normal_equations(H, g, 0, 1e-14, step)) return false;
-                  if (!cfp::solve_normal_equations(scaled_H, scaled_g, 0, 1e-14, scaled_step)) return false;
-                  return (H * step + g).norm() < 1e-9 && (scale.asDiagonal() * scaled_step - step).norm() < 1e-9;
-                }},
-               {"more damping never lengthens the step, and the decrease foretold is positive", 200,
-                [](Random& random) {
-                  const Eigen::Matrix<double, 6, 6> H = positive_definite(random);
-                  const cfp::Vector6<double> g = vector6(random);
-                  const double damping = random.uniform(0, 2), more = damping + random.uniform(0, 2);
-                  cfp::Vector6<double> a, b;
-                  if (!cfp::solve_normal_equations(H, g, damping, 1e-14, a) ||
-                      !cfp::solve_normal_equations(H, g, more, 1e-14, b))
-                    return false;
-                  const cfp::Vector6<double> d = H.diagonal();  // the norm that damping bounds
-                  return (d.asDiagonal() * b).dot(b) <= (d.asDiagonal() * a).dot(a) * (1 + 1e-12) &&
-                         cfp::predicted_decrease(H, g, damping, a) > 0;
-                }},
-               {"an order statistic does not depend on the order, and grows with its rank", 200, [](Random& random) {
-                  std::vector<double> values =
-                      cfp_testing::many(cfp_testing::count(random, 1, 300), [&] { return random.normal(); });
-                  const auto n = static_cast<std::uint32_t>(values.size());
-                  const std::size_t rank = random.index(n);
-                  const double before = cfp::order_statistic(cfp::span(values), rank);
-                  std::shuffle(values.begin(), values.end(), random);
-                  const bool same = cfp::order_statistic(cfp::span(values), rank) == before;
-                  return same && (rank + 1 == n || cfp::order_statistic(cfp::span(values), rank + 1) >= before);
-                }})
+CFP_PROPERTIES(
+    "Properties of solvers and order statistics", "[math]",
+    {"the roots of a cubic made of three roots are those", 500,
+     [](Random& random) {
+       std::array<double, 3> x;
+       for (double& r : x) r = random.uniform(-10, 10);
+       std::sort(x.begin(), x.end());
+       if (x[1] - x[0] < 0.01 || x[2] - x[1] < 0.01) return true;
+       double roots[3];
+       if (cfp::real_cubic_roots(-(x[0] + x[1] + x[2]), x[0] * x[1] + x[1] * x[2] + x[2] * x[0], -x[0] * x[1] * x[2],
+                                 roots) != 3)
+         return false;
+       std::sort(roots, roots + 3);
+       for (std::size_t k = 0; k < 3; ++k) {
+         if (std::abs(roots[k] - x[k]) > 1e-8) return false;
+       }
+       return true;
+     }},
+    {"the roots of a cubic hold to a few roundings of its terms", 2000,
+     [](Random& random) {
+       std::array<double, 3> x;
+       for (double& r : x) r = random.uniform(-10, 10);
+       const double a = -(x[0] + x[1] + x[2]), b = x[0] * x[1] + x[1] * x[2] + x[2] * x[0], c = -x[0] * x[1] * x[2];
+       double roots[3];
+       const int n = cfp::real_cubic_roots(a, b, c, roots);
+       for (int k = 0; k < n; ++k) {
+         const double r = roots[k], terms = std::abs(r * r * r) + std::abs(a * r * r) + std::abs(b * r) + std::abs(c);
+         if (std::abs(((r + a) * r + b) * r + c) > 8 * std::numeric_limits<double>::epsilon() * terms) return false;
+       }
+       return n > 0;
+     }},
+    {"a cubic of one real root has that one", 500,
+     [](Random& random) {  // (x - r) ((x - u)^2 + v^2)
+       const double r = random.uniform(-5, 5), u = random.uniform(-5, 5), v = random.uniform(0.3, 5);
+       double roots[3];
+       const int n = cfp::real_cubic_roots(-r - 2 * u, u * u + v * v + 2 * r * u, -r * (u * u + v * v), roots);
+       return n == 1 && std::abs(roots[0] - r) < 1e-9;
+     }},
+    {"the step solves its equations, whatever the scale of each unknown", 200,
+     [](Random& random) {
+       const Eigen::Matrix<double, 6, 6> H = positive_definite(random);
+       const cfp::Vector6<double> g = vector6(random);
+       cfp::Vector6<double> step, scaled_step, scale;
+       for (int k = 0; k < 6; ++k) scale[k] = std::exp2(static_cast<double>(random.index(41)) - 20);
+       const Eigen::Matrix<double, 6, 6> scaled_H = scale.asDiagonal() * H * scale.asDiagonal();
+       const cfp::Vector6<double> scaled_g = scale.asDiagonal() * g;
+       if (!cfp::solve_normal_equations(H, g, 0, 1e-14, step)) return false;
+       if (!cfp::solve_normal_equations(scaled_H, scaled_g, 0, 1e-14, scaled_step)) return false;
+       return (H * step + g).norm() < 1e-9 && (scale.asDiagonal() * scaled_step - step).norm() < 1e-9;
+     }},
+    {"more damping never lengthens the step, and the decrease foretold is positive", 200,
+     [](Random& random) {
+       const Eigen::Matrix<double, 6, 6> H = positive_definite(random);
+       const cfp::Vector6<double> g = vector6(random);
+       const double damping = random.uniform(0, 2), more = damping + random.uniform(0, 2);
+       cfp::Vector6<double> a, b;
+       if (!cfp::solve_normal_equations(H, g, damping, 1e-14, a) || !cfp::solve_normal_equations(H, g, more, 1e-14, b))
+         return false;
+       const cfp::Vector6<double> d = H.diagonal();  // the norm that damping bounds
+       return (d.asDiagonal() * b).dot(b) <= (d.asDiagonal() * a).dot(a) * (1 + 1e-12) &&
+              cfp::predicted_decrease(H, g, damping, a) > 0;
+     }},
+    {"an order statistic does not depend on the order, and grows with its rank", 200, [](Random& random) {
+       std::vector<double> values =
+           cfp_testing::many(cfp_testing::count(random, 1, 300), [&] { return random.normal(); });
+       const auto n = static_cast<std::uint32_t>(values.size());
+       const std::size_t rank = random.index(n);
+       const double before = cfp::order_statistic(cfp::span(values), rank);
+       std::shuffle(values.begin(), values.end(), random);
+       const bool same = cfp::order_statistic(cfp::span(values), rank) == before;
+       return same && (rank + 1 == n || cfp::order_statistic(cfp::span(values), rank + 1) >= before);
+     }})
