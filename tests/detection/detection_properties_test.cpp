@@ -1,6 +1,7 @@
 // Properties of the box tracker and its filters, for whatever the generators make.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <vector>
 
@@ -85,6 +86,17 @@ CFP_PROPERTIES("Properties of the box filter", "[detection]",
                     if (f.var_value > before || !valid) return false;
                   }
                   return true;
+                }},
+               {"what cannot be measured changes nothing", 100,
+                [](Random& random) {
+                  cfp::RateFilter<double> f;
+                  f.value = random.normal(), f.var_rate = random.uniform(0, 1);
+                  const cfp::RateFilter<double> before = f;
+                  f.correct(random.normal(), 0);  // sure already, of a value that is measured without noise
+                  f.var_value = 1;
+                  f.correct(cfp_testing::hostile_numbers<double>()[random.index(3)], 1);
+                  f.correct(1, std::numeric_limits<double>::infinity());
+                  return f.value == before.value && f.rate == before.rate && f.var_rate == before.var_rate;
                 }},
                {"two short predictions are one long one", 200,
                 [](Random& random) {

@@ -176,6 +176,27 @@ CFP_PROPERTIES("Properties of the pose refinement", "[optimization]",
                   return close(a, b) && (a.information - 2 * b.information).norm() < 1e-6 * a.information.norm();
                 }})
 
+CFP_PROPERTIES("Properties of the pose refinement for any camera", "[optimization]",
+               {"points behind the camera count the same for every camera model", 25, [](Random& random) {
+                  auto s = scene(random);
+                  const cfp::SE3<double> T_world_cam = s.truth.inverse();
+                  for (auto& X : s.points) {  // seen by mistake: they stand behind the camera
+                    if (random.index(4) != 0) continue;
+                    const cfp::Vector3<double> p(random.uniform(-1, 1), random.uniform(-1, 1),
+                                                 random.uniform(-2, -0.2));
+                    const cfp::Vector3<double> Y = T_world_cam * p;
+                    X = {Y.x(), Y.y(), Y.z()};
+                  }
+                  cfp::PoseWorkspace<double> workspace;
+                  cfp::PoseOptions options;
+                  options.min_decrease = 1e-14, options.handover_decrease = 0, options.max_iterations = 60;
+                  const auto fast = cfp::refine_pose(s.observations(), s.camera, s.start, options, workspace);
+                  const cfp_test::PlainCamera camera{s.camera};
+                  const auto plain = cfp::refine_pose(s.observations(), camera, s.start, options, workspace);
+                  return fast.used == plain.used && fast.inliers == plain.inliers && close(fast, plain) &&
+                         std::abs(fast.cost - plain.cost) < 1e-6 * fast.cost;
+                }})
+
 CFP_PROPERTIES("Properties of bundle adjustment", "[optimization]",
                {"the cost never rises, fixed poses keep their bits", 15,
                 [](Random& random) {
