@@ -24,6 +24,15 @@ TEMPLATE_TEST_CASE("without coefficients the distorted camera is the pinhole cam
   }
 }
 
+TEMPLATE_TEST_CASE("a pixel that overflows is refused and leaves the outputs alone", "[geometry]", float, double) {
+  const TestType huge = (std::numeric_limits<TestType>::max)();
+  for (const auto& camera : {RadialTangentialCamera<TestType>{huge, 1, 0, 0}, {1, huge, 0, 0}}) {
+    Vector2<TestType> pixel(1, 2);
+    CHECK_FALSE(camera.project({TestType(0.9), TestType(2), TestType(0.5)}, pixel));
+    CHECK(pixel == Vector2<TestType>(1, 2));
+  }
+}
+
 TEST_CASE("the distorted camera reproduces a pixel computed by hand", "[geometry]") {
   // x = 0.5, y = -0.25: s = 0.3125, radial = 1 - 0.2 s + 0.1 s^2 + 0.05 s^3 = 0.948791503906250; tangential terms
   // 2 p1 x y + p2 (s + 2 x^2) = -0.00025 + 0.001625, p1 (s + 2 y^2) + 2 p2 x y = 0.0004375 - 0.0005.

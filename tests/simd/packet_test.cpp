@@ -54,6 +54,8 @@ TEMPLATE_TEST_CASE("Packet: every operation equals the scalar one in every lane"
   check_lanes<T>([](auto a, auto b, auto c) { return cfp::simd::select(a < b, b, c); }, T(-9), T(9), T(0));
   check_lanes<T>([](auto a, auto b, auto c) { return cfp::simd::select((a <= b) & (b > c), a, c); }, T(-9), T(9), T(0));
   check_lanes<T>([](auto a, auto b, auto c) { return cfp::simd::select((a >= b) | (b > c), a, c); }, T(-9), T(9), T(0));
+  check_lanes<T>([](auto a, auto b, auto c) { return cfp::simd::select(cfp::simd::both(a<b, b> c), a, c); }, T(-9),
+                 T(9), T(0));
 }
 
 TEMPLATE_TEST_CASE("Packet: a comparison with NaN is false, and select drops the branch not taken", "[core]", float,
