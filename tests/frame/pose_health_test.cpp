@@ -57,6 +57,8 @@ TEST_CASE("A pose from points all over the image is believed", "[health]") {
   const Scene scene = Scene().add(200, 500, 350).refine();
   const cfp::PoseAssessment a = scene.assess();
   CHECK(a.status == PoseHealth::ok);
+  CHECK(a.ok());
+  CHECK_FALSE(cfp::PoseAssessment().ok());
   CHECK(a.inliers > 190);
   CHECK(a.inlier_share > 0.95);
   CHECK(a.spread > 0.5);
