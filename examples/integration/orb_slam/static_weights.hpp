@@ -98,7 +98,7 @@ class StaticWeights {
   void Remember(Frame& F) const {
     F.mvStaticProbability.resize(mProbability.state().size());
     for (std::size_t i = 0; i < F.mvStaticProbability.size(); ++i)
-      F.mvStaticProbability[i] = mProbability.weight(i, -1.0F);
+      F.mvStaticProbability[i] = mProbability.static_probability(i, -1.0F);
   }
 
   cfp::StaticProbability<typename Host::Camera> mProbability;

@@ -62,7 +62,7 @@ class static_weights {
 
   // keyframe_inserter and mapping_module: whether a keypoint may make a landmark, and its M.
   bool may_create(std::size_t i) const { return probability_.may_create_map_point(i); }
-  float initial(std::size_t i) const { return probability_.weight(i, -1.0F); }
+  float initial(std::size_t i) const { return probability_.static_probability(i, -1.0F); }
   const cfp::FrameReport& report() const { return report_; }
 
  private:

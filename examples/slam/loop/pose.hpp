@@ -102,8 +102,7 @@ class PoseSolver {
 
   // What enters the view and moves, and no detector knows, must not outvote what keyframes agree about: where enough of
   // that is to be expected in view, all else weighs a small share of it, and only helps where that leaves the pose
-  // open. Where the camera looks at something new, all counts.
-  // Whether it does.
+  // open. Where the camera looks at something new, all counts. Returns whether the proven ones decided.
   bool let_proven_decide(std::size_t expected) {
     constexpr double few = 20, enough = 50;
     double proven = 0, others = 0;
