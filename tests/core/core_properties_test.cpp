@@ -34,3 +34,12 @@ CFP_PROPERTIES("Properties of numbers", "[core]",
                   const auto first = a();
                   return first == again() && first != b();
                 }})
+
+TEST_CASE("The first failing run is named, and gives the same numbers alone", "[core]") {
+  const auto small = [](Random& random) { return random.uniform() < 0.9; };
+  const std::int64_t run = cfp_testing::first_failure(1000, small);
+  REQUIRE(run > 0);
+  Random alone = cfp_testing::random_of_run(run);
+  CHECK_FALSE(small(alone));
+  CHECK(cfp_testing::first_failure(run, small) == cfp_testing::none);
+}
