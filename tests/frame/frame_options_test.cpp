@@ -14,6 +14,7 @@ TEST_CASE("Frame options outside their range are named by their whole path", "[f
     return cfp::invalid_field(changed).string();
   };
   CHECK(named([](auto& o) { o.coarse.flow.ransac.confidence = 2; }) == "coarse.flow.ransac.confidence");
+  CHECK(named([](auto& o) { o.coarse.flow_radius_px = -1; }) == "coarse.flow_radius_px");
   CHECK(named([](auto& o) { o.fine.min_parallax = -1; }) == "fine.min_parallax");
   CHECK(named([](auto& o) { o.fine.epipolar.quantile = 2; }) == "fine.epipolar.quantile");
   CHECK(named([](auto& o) { o.fine.matching.max_ratio = 0; }) == "fine.matching.max_ratio");

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "cfp/frame/explain.hpp"
 #include "support/catch.hpp"
 #include "support/frame_runs.hpp"
 
@@ -141,6 +142,56 @@ TEST_CASE("M learns after the weights and from K alone, so that nothing counts t
     ++silent;
   }
   CHECK(silent > 20);
+}
+
+TEST_CASE("The flow at a keypoint's place tells the part of a person that moves from the part that rests", "[frame]") {
+  cfp_test::DynamicSceneOptions at_rest;
+  at_rest.person_motion_m = 0;
+  FrameRun<double> run(make_dynamic_scene<double>(at_rest, 79));
+  std::vector<char> moves(run.m.size());
+  for (std::size_t i = 0; i < run.m.size(); i += 8) {
+    moves[i] = run.scene.is_person[i];
+    if (moves[i] != 0) run.scene.keypoints[i][0] += 25;
+  }
+  cfp::Frame<double> frame = run.frame();
+  frame.flow.previous_depths = run.scene.previous_depths;
+  const auto each_on_a_person = [&](const auto& visit) {
+    std::size_t moving = 0, resting = 0;
+    for (std::size_t i = 0; i < run.m.size(); ++i) {
+      if (run.label(i) != cfp::KeypointLabel::foreground || run.scene.is_person[i] == 0) continue;
+      ++(moves[i] != 0 ? moving : resting);
+      visit(i);
+    }
+    CHECK((moving > 15 && resting > 100));
+  };
+
+  cfp::FrameOptions options;
+  run.coarse(options, frame, run.scene.camera);
+  CHECK(run.state.objects[0].static_probability > options.object_threshold);  // most of it rests
+  each_on_a_person([&](std::size_t i) {
+    CHECK((run.state.flow_probability[i] < 0.1) == (moves[i] != 0));
+    CHECK((cfp::model_weight(i, 0.9, options, run.state) < 0.3) == (moves[i] != 0));
+    CHECK((cfp::unknown_map_point(i, options, run.state) > options.map_point.foreground_prior) ==
+          (run.state.flow_probability[i] > options.object_threshold));
+    CHECK(cfp::explain(i, 0.9, options, run.state).flow_probability == run.state.flow_probability[i]);
+  });
+  for (std::size_t i = 0; i < run.m.size(); ++i) CHECK((run.state.flow_probability[i] < 0 || run.state.box[i] >= 0));
+  run.m.assign(run.m.size(), 0.9);
+  run.fine(options);
+  each_on_a_person([&](std::size_t i) {
+    const double from_constraints = cfp::updated_map_point(run.k(i), 0.9, options.map_point);
+    CHECK((run.m[i] < from_constraints - 0.01) == (moves[i] != 0 && run.k(i) > 0.02));
+  });
+
+  const auto without = [&] {
+    run.coarse(options, frame, run.scene.camera);
+    CHECK(run.state.flow_probability == std::vector<double>(run.m.size(), -1.0));
+  };
+  options.coarse.flow_radius_px = 0;
+  without();
+  options = {};
+  frame.flow.previous_depths = {};
+  without();
 }
 
 TEST_CASE("A map point confirmed over many frames survives one box, a new one on a person earns its weight",

@@ -44,6 +44,7 @@ struct KeypointExplanation {
   ObjectProbability object;                        ///< O, its pairs, and whether it is known
   FlowModelKind flow_model = FlowModelKind::none;  ///< what those pairs were judged by
   double flow_sigma_px = 0;                        ///< their noise; 0: not measured
+  double flow_probability = -1;                    ///< what stands for O in its weight: score of the flow at its place
   double coarse_probability = 1;                   ///< K of the first stage
   std::int32_t match = no_match;
   ConstraintExplanation projection, epipolar;
@@ -111,6 +112,7 @@ template <typename Scalar>
     e.high_dynamic = is_high_dynamic(e.object.static_probability, options.object_threshold);
     e.flow_model = state.report.flow_model;
     e.flow_sigma_px = state.report.flow_sigma_px;
+    e.flow_probability = static_cast<double>(state.flow_probability[i]);
     if (foreground || options.coarse.soft_background)
       e.coarse_probability = static_cast<double>(first_stage_probability(
           static_cast<Scalar>(e.object.static_probability), foreground, static_cast<Scalar>(options.object_threshold)));
@@ -150,6 +152,7 @@ template <typename Scalar>
                 ? "unknown, " + std::to_string(e.object.pairs) + " flow pairs\n"
                 : std::to_string(e.object.pairs) + " flow pairs judged by " + models[static_cast<int>(e.flow_model)] +
                       ", noise " + number(e.flow_sigma_px) + " px, and the frames before\n";
+    if (e.flow_probability >= 0) text += "  flow    " + number(e.flow_probability) + " at its place\n";
     text += "  coarse  K " + number(e.coarse_probability) + "\n";
     if (e.stage == Stage::fine) {
       text += detail::constraint_text("  K^T     ", "projection", e.projection) +

@@ -30,6 +30,9 @@ struct CoarseOptions {
   bool use_object_probability = true;  ///< false: O of every object is unknown (the paper's CFP-SLAM-)
   bool use_depth_foreground = true;    ///< false: all keypoints in a box are its foreground (W/O-DBS)
   bool soft_background = true;  ///< false: background keypoints keep K = 1, as do all outside (W/O-KSP, Only-YOLO)
+  /// WeightRule::posterior: a keypoint in a box is judged by the flow pair nearest to it, if one with a depth lies
+  /// within; by its object else. >= 0; 0: always by its object.
+  double flow_radius_px = 10;
   FlowModelOptions flow;
   ObjectProbabilityOptions object;
   ObjectMemoryOptions memory;
@@ -77,6 +80,7 @@ enum class Variant : std::uint8_t {
 inline namespace CFP_ISA {
 
 [[nodiscard]] inline OptionPath invalid_field(const CoarseOptions& o) noexcept {
+  if (!detail::non_negative(o.flow_radius_px)) return "flow_radius_px";
   if (const OptionPath field = nested("flow", invalid_field(o.flow))) return field;
   if (const OptionPath field = nested("object", invalid_field(o.object))) return field;
   if (const OptionPath field = nested("memory", invalid_field(o.memory))) return field;

@@ -1,6 +1,6 @@
 /// @file label_keypoints.hpp
 /// The step from boxes and depths to the coarse K of every keypoint (paper section IV-C): foreground and background of
-/// each object, and K by the first stage's rule.
+/// each object, and K by the first stage's rule. And what the flow says of the keypoint alone.
 #pragma once
 
 #include <algorithm>
@@ -51,6 +51,38 @@ bool separate_foreground(const TrackedBox<Scalar>& box, const CoarseOptions& opt
   return true;
 }
 
+/// Sets state.flow_probability: the score of the flow pair next to the keypoint, among the pairs in its box. Only the
+/// camera's motion judges a pair with depth well enough for that; after estimate_objects.
+template <typename Scalar>
+void score_flow_at_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
+  if (state.report.flow_model != FlowModelKind::motion || frame.flow.previous_depths.empty()) return;
+  const ObjectProbabilityOptions scored = scaled_to_noise(options.coarse.object, state.report.flow_sigma_px, 2);
+  FrameScratch<Scalar>& scratch = state.scratch;
+  for (std::size_t b = 0; b < state.boxes.size(); ++b) {
+    scratch.points.clear();
+    scratch.samples.clear();
+    for (std::size_t p = 0; p < frame.flow.current.size(); ++p) {
+      const Scalar x = frame.flow.current(p, 0), y = frame.flow.current(p, 1);
+      if (!has_distance(scratch.epipolar[p]) || !is_valid_depth(frame.flow.previous_depths[p])) continue;
+      if (!contains(state.boxes[b].box, x, y)) continue;
+      scratch.points.push_back({x, y});
+      scratch.samples.push_back(scratch.epipolar[p]);
+    }
+    for (std::size_t i = 0; i < state.size(); ++i) {
+      if (state.box[i] != static_cast<std::int32_t>(b)) continue;
+      const auto& [x, y] = state.current.keypoints[i];
+      Scalar nearest_sq = Scalar(options.coarse.flow_radius_px * options.coarse.flow_radius_px), distance = Scalar(-1);
+      for (std::size_t p = 0; p < scratch.points.size(); ++p) {
+        const Scalar dx = scratch.points[p][0] - x, dy = scratch.points[p][1] - y, apart_sq = dx * dx + dy * dy;
+        if (!(apart_sq < nearest_sq)) continue;
+        nearest_sq = apart_sq;
+        distance = scratch.samples[p];
+      }
+      if (has_distance(distance)) state.flow_probability[i] = object_score(distance, scored);
+    }
+  }
+}
+
 }  // namespace CFP_ISA
 }  // namespace detail
 
@@ -58,7 +90,7 @@ inline namespace CFP_ISA {
 
 /// Sets K, label and box of every keypoint from state.boxes and state.objects. A keypoint on several objects takes the
 /// smallest of their K, and that box decides for it from then on (ties: foreground before background, then the lower
-/// index). Keypoints on no object keep K = 1. O(keypoints x boxes).
+/// index). Keypoints on no object keep K = 1. O(keypoints x boxes), and keypoints x flow pairs within each box.
 template <typename Scalar>
 void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   CFP_ASSERT(state.objects.size() == state.boxes.size());
@@ -93,6 +125,7 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
       state.box[i] = static_cast<std::int32_t>(b);
     }
   }
+  detail::score_flow_at_keypoints(frame, options, state);
   const auto count = [&](KeypointLabel label) {
     return static_cast<std::size_t>(std::count(state.label.begin(), state.label.end(), label));
   };

@@ -21,17 +21,19 @@ template <typename Scalar>
   return state.label[i] == KeypointLabel::foreground && !state.boxes[static_cast<std::size_t>(state.box[i])].associated;
 }
 
-/// E of keypoint i, which must be in a box: first_stage_evidence of its object.
+/// E of keypoint i, which must be in a box: first_stage_evidence of the flow at its place, which tells a part that
+/// moves from one that rests, or where there is none of its object.
 template <typename Scalar>
 [[nodiscard]] Scalar first_stage_evidence(std::size_t i, const FrameOptions& options,
                                           const FrameState<Scalar>& state) noexcept {
-  const double o = state.objects[static_cast<std::size_t>(state.box[i])].static_probability;
-  const bool foreground = state.label[i] == KeypointLabel::foreground;
-  return static_cast<Scalar>(first_stage_evidence(o, foreground, options.object_threshold));
+  const bool judged = state.flow_probability[i] >= Scalar(0), foreground = state.label[i] == KeypointLabel::foreground;
+  const double o = judged ? static_cast<double>(state.flow_probability[i])
+                          : state.objects[static_cast<std::size_t>(state.box[i])].static_probability;
+  return static_cast<Scalar>(first_stage_evidence(o, judged || foreground, options.object_threshold));
 }
 
 /// M of a map point of which nothing is known when keypoint i observes it: 1 outside all boxes and by the printed
-/// rules, else the prior of its label, which an object that has been shown static raises.
+/// rules, else the prior of its label, which what is shown static raises.
 template <typename Scalar>
 [[nodiscard]] Scalar unknown_map_point(std::size_t i, const FrameOptions& options,
                                        const FrameState<Scalar>& state) noexcept {
@@ -42,9 +44,9 @@ template <typename Scalar>
   return posterior_probability(Scalar(0.5), e, Scalar(foreground ? o.foreground_prior : o.background_prior), o);
 }
 
-/// The weight by Bayes' rule, before any fallback. Outside all boxes it is M. In one, the object can only lower it,
-/// because parts of people at rest move; K counts once the constraints were asked, and what came from nowhere is then
-/// left out.
+/// The weight by Bayes' rule, before any fallback. Outside all boxes it is M. In one, E can only lower it,
+/// because what rests may move in the next frame; K counts once the constraints were asked, and what came from nowhere
+/// is then left out.
 template <typename Scalar>
 [[nodiscard]] Scalar posterior_weight(std::size_t i, non_deduced<Scalar> map_point_probability,
                                       const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
@@ -89,8 +91,9 @@ template <typename Scalar>
              : model_weight(i, map_point_probability, options, state);
 }
 
-/// M of the map point that keypoint i observes, after this frame: it learns from K, once the constraints were asked. No
-/// map point (M negative or NaN) stays none, and a keypoint without a pixel says nothing.
+/// M of the map point that keypoint i observes, after this frame: it learns from K, once the constraints were asked,
+/// and by Bayes' rule from flow at its place that moves; from its object never. No map point (M negative or NaN) stays
+/// none, and a keypoint without a pixel says nothing.
 template <typename Scalar>
 [[nodiscard]] Scalar updated_map_point(std::size_t i, non_deduced<Scalar> map_point_probability,
                                        const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
@@ -98,7 +101,12 @@ template <typename Scalar>
   const bool silent =
       options.map_point.weight == WeightRule::posterior && state.box[i] != no_box && state.report.constrained == 0;
   if (state.report.stage != Stage::fine || silent) return clamp_probability(map_point_probability);
-  return updated_map_point(state.static_probability[i], map_point_probability, options.map_point);
+  Scalar k = state.static_probability[i];
+  if (options.map_point.weight == WeightRule::posterior && state.flow_probability[i] >= Scalar(0)) {
+    const Scalar e = (std::min)(first_stage_evidence(i, options, state), Scalar(0.5));
+    k = posterior_probability(Scalar(0.5), e, k, options.map_point);
+  }
+  return updated_map_point(k, map_point_probability, options.map_point);
 }
 
 /// M of every map point after this frame, in place: the last step of a frame, since its weights have M of before as
