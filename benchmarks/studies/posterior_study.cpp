@@ -129,7 +129,7 @@ class Tracker {
     std::size_t outside = 0;
     for (std::size_t p = 0; p < frame.flow_to.size(); ++p) {
       const bool inside = in_a_box(frame.flow_to[p]);
-      outside += inside ? 0 : 1;
+      outside += inside ? 0U : 1U;
       if (rule_.flow == FlowSource::matches || (rule_.flow == FlowSource::matched_inside && inside)) continue;
       if (rule_.flow == FlowSource::few_outside && !inside && outside % (frame.flow_to.size() / 60 + 1) != 0) continue;
       add_pair(frame.flow_from[p], frame.flow_to[p], frame.flow_depths[p]);
