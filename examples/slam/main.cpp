@@ -27,6 +27,7 @@ struct Arguments {
   cfp_slam::RunSettings settings;  // of every run; recording and variant are its own
   std::uint64_t seeds = 1;
   std::vector<std::string> stresses;
+  fs::path options;  // a file of them
   int threads = 2;
   bool resume = false;
 };
@@ -41,6 +42,8 @@ void add_common_options(CLI::App& run, Arguments& a) {
   run.add_option("--frames", a.settings.frames, "only so many frames; 0: all");
   run.add_option("--features", a.settings.features, "ORB keypoints per frame")->check(CLI::Range(100, 10000));
   run.add_option("--threads", a.threads, "1: one after the other, with the same result")->check(CLI::Range(1, 64));
+  run.add_option("--options", a.options, "a file of lines 'name value', as cfp_slam_report calibrate writes them")
+      ->check(CLI::ExistingFile);
   run.add_option("--seed", a.settings.seed, "of the random samplers");
 }
 
@@ -154,6 +157,7 @@ int main(int argc, char** argv) {
   try {
     if (a.variants == std::vector<std::string>{"all"}) a.variants = CLI::detail::split(cfp_slam::all_variants, ',');
     for (const std::string& variant : a.variants) cfp_slam::variant_of(variant);
+    if (!a.options.empty()) a.settings.options = cfp_slam::read_options(a.options);
     cv::setNumThreads(a.threads);
     for (const fs::path& recording : recordings(a.folders))
       stress.parsed() ? stress_recording(recording, a) : run_recording(recording, a);

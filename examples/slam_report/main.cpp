@@ -13,6 +13,7 @@
 
 #include "../slam_runs/read_run.hpp"
 #include "annotate.hpp"
+#include "calibrate.hpp"
 #include "explained.hpp"
 #include "picture.hpp"
 #include "profile.hpp"
@@ -58,7 +59,7 @@ void print_summary(const RunRecord& run) {
 }
 
 struct Arguments {
-  fs::path out, picture, pictures_folder;
+  fs::path out, picture, pictures_folder, options = "options.txt";
   std::size_t pictures = 8;
   std::vector<std::size_t> explained;
   double target_fps = 30;
@@ -98,6 +99,15 @@ void report(const Arguments& a) {
   std::printf("report: %s\n", (a.out / "report.html").c_str());
 }
 
+// Options from the runs that have decisions, and labels.
+void calibrate(const Arguments& a) {
+  cfp_slam::CalibrationData data;
+  for_each_run(a.out, [&](const fs::path& folder, const RunRecord& run) {
+    if (fs::exists(folder / "decisions.txt")) cfp_slam::add_run(folder, run, data);
+  });
+  cfp_slam::calibrate(data, a.options);
+}
+
 void tables(const Arguments& a) {
   std::vector<cfp_slam::RunSummary> runs;
   for_each_run(a.out, [&](const fs::path&, const RunRecord& run) { runs.push_back(cfp_slam::summarize(run)); });
@@ -128,9 +138,13 @@ int main(int argc, char** argv) {
       ->check(CLI::PositiveNumber);
   CLI::App& tables_command = *app.add_subcommand("tables", "the paper's Tables I to V, and what they show");
   out(tables_command);
+  CLI::App& calibrate_command =
+      *app.add_subcommand("calibrate", "options from runs with --decisions over labelled recordings");
+  out(calibrate_command);
+  calibrate_command.add_option("--options", a.options, "the file to write, for cfp_slam run --options");
   CLI11_PARSE(app, argc, argv);
   try {
-    report_command.parsed() ? report(a) : tables(a);
+    report_command.parsed() ? report(a) : calibrate_command.parsed() ? calibrate(a) : tables(a);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

@@ -14,11 +14,10 @@ namespace cfp_slam {
 enum class PixelLabel : unsigned char { still = 0, moving = 1, still_part = 2 };
 
 // The label that all pixels of the corner's circle (radius 3 at its level) share; still_part where they differ.
-inline PixelLabel label_of_patch(const cv::Mat& labels, const BoxKeypoint& keypoint) {
-  const int radius = static_cast<int>(std::ceil(3 * keypoint.size / 31)), x = cvRound(keypoint.x),
-            y = cvRound(keypoint.y);
-  const cv::Rect patch =
-      cv::Rect(x - radius, y - radius, 2 * radius + 1, 2 * radius + 1) & cv::Rect(0, 0, labels.cols, labels.rows);
+inline PixelLabel label_of_patch(const cv::Mat& labels, float x, float y, float size) {
+  const int radius = static_cast<int>(std::ceil(3 * size / 31));
+  const cv::Rect patch = cv::Rect(cvRound(x) - radius, cvRound(y) - radius, 2 * radius + 1, 2 * radius + 1) &
+                         cv::Rect(0, 0, labels.cols, labels.rows);
   if (patch.empty()) return PixelLabel::still_part;
   const unsigned char first = labels.at<unsigned char>(patch.tl());
   return cv::countNonZero(labels(patch) != first) == 0 ? static_cast<PixelLabel>(first) : PixelLabel::still_part;
@@ -51,7 +50,7 @@ inline void add_samples(const RunFrame& frame, const cv::Mat& labels, RunRecord&
   }
   for (const BoxKeypoint& keypoint : frame.box_keypoints) {
     if (!(keypoint.fine >= 0 && keypoint.map_point >= 0)) continue;
-    const PixelLabel label = label_of_patch(labels, keypoint);
+    const PixelLabel label = label_of_patch(labels, keypoint.x, keypoint.y, keypoint.size);
     if (label == PixelLabel::still_part) continue;
     add_sample(run.first_stage, keypoint.coarse, label == PixelLabel::still);
     add_sample(run.second_stage, keypoint.fine, label == PixelLabel::still);

@@ -101,6 +101,7 @@ inline RunRecord read_run(const std::filesystem::path& folder) {
   run.sequence = folder.parent_path().filename().string();
   run.variant = value("variant");
   run.detector = value("detector");
+  run.options = settings.count("options") > 0 ? value("options") : "none";
   run.seed = std::stoull(value("seed"));
   run.features = static_cast<int>(number("features"));
   run.keyframes = number("keyframes");

@@ -15,6 +15,7 @@
 #include "../slam/loop/run.hpp"
 #include "../support/tum.hpp"
 #include "../support/write_text.hpp"
+#include "options_file.hpp"
 #include "run_writer.hpp"
 
 namespace cfp_slam {
@@ -26,6 +27,7 @@ struct RunSettings {
   std::size_t frames = 0;  // 0: all
   int features = 1000;
   double min_score = 0;
+  OptionValues options;    // other than the defaults
   bool decisions = false;  // everything about every keypoint is written; no figure depends on it
 
   [[nodiscard]] std::string text() const {
@@ -33,7 +35,8 @@ struct RunSettings {
     out.imbue(std::locale::classic());
     out.precision(17);
     out << "recording " << recording << "\ndetector " << detector << "\nvariant " << variant << "\nseed " << seed
-        << "\nframes " << frames << "\nfeatures " << features << "\nmin_score " << min_score << '\n';
+        << "\nframes " << frames << "\nfeatures " << features << "\nmin_score " << min_score << "\noptions "
+        << options_text(options) << '\n';
     return out.str();
   }
 };
@@ -75,6 +78,7 @@ inline bool is_done(const std::filesystem::path& folder, const RunSettings& sett
 // The loop's options of a run.
 inline Options options_of(const RunSettings& settings, bool threads) {
   Options options;
+  for (const auto& [name, value] : settings.options) set_option(options, name, value);
   options.variant = variant_of(settings.variant);
   options.seed = settings.seed;
   options.threads = threads;

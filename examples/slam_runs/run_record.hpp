@@ -52,7 +52,7 @@ struct ExplainedFrame {
 
 struct RunRecord {
   std::string recording;  // its folder
-  std::string sequence, variant, detector;
+  std::string sequence, variant, detector, options;
   std::uint64_t seed = 0;
   int features = 0;
   std::vector<RunFrame> frames;

@@ -61,6 +61,9 @@ int main(int argc, char* argv[]) {
   app.add_option("--blur", options.blur_samples, "sub-exposures of the motion blur; 1 = none")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
+  app.add_option("--image-noise", options.sensor.image_noise, "standard deviation, grey levels")
+      ->check(CLI::Range(0, 100))
+      ->capture_default_str();
   app.add_option("--threads", threads, "rendering threads")->check(CLI::Range(1, 256))->capture_default_str();
   app.add_option("--background", background, "a recording in TUM format with poses; the people are put into it")
       ->check(CLI::ExistingDirectory);

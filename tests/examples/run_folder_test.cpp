@@ -132,7 +132,8 @@ TEST_CASE("Only a whole run with the same settings is not run again", "[slam]") 
   for (const auto change : {+[](RunSettings& s) { s.recording += "2"; }, +[](RunSettings& s) { s.detector = "none"; },
                             +[](RunSettings& s) { s.variant = "plain"; }, +[](RunSettings& s) { s.seed = 1; },
                             +[](RunSettings& s) { s.frames = 3; }, +[](RunSettings& s) { s.features = 500; },
-                            +[](RunSettings& s) { s.min_score = 0.1000001; }}) {
+                            +[](RunSettings& s) { s.min_score = 0.1000001; },
+                            +[](RunSettings& s) { s.options["keypoint_sigma_px"] = 0.5; }}) {
     RunSettings other = same;
     change(other);
     CHECK_FALSE(is_done(folder.path / "run", other));

@@ -4,6 +4,7 @@
 
 #include "../../examples/detection/simple_detectors.hpp"
 #include "../../examples/slam_report/annotate.hpp"
+#include "../../examples/slam_report/calibrate.hpp"
 #include "../../examples/slam_runs/read_run.hpp"
 #include "../../examples/slam_runs/run_folder.hpp"
 #include "../../examples/slam_runs/stress_result.hpp"
@@ -115,6 +116,22 @@ TEST_CASE("Why every keypoint of every frame has its weight is on file when aske
   CHECK(seen > 20 * 100);
   CHECK(double(near) > 0.95 * double(seen));
   CHECK(double(heavy) > 0.7 * double(seen));
+
+  // A calibration that changes nothing gives every sample the weight that it had.
+  CalibrationData data;
+  add_run(out.path, r, data);
+  CHECK(data.samples.size() > 500);
+  CHECK(data.residuals_px.size() > 1000);
+  for (const CalibrationSample& s : data.samples)
+    CHECK_THAT(weight_with(s, chosen(data.options), data.options), WithinAbs(double(s.weight), 1e-3));
+  CalibratedOptions none = chosen(data.options);
+  none.min_translation_m = 1e9;
+  for (const CalibrationSample& s : data.samples) {
+    CalibrationSample without = s;
+    without.known.epipolar = {};
+    CHECK(weight_with(s, none, data.options) == weight_with(without, chosen(data.options), data.options));
+  }
+
   settings.decisions = false;
   run_into(out.path, Sequence(rendered()), detector, settings, false, [](std::size_t) {});
   CHECK_FALSE(std::filesystem::exists(out.path / "decisions.txt"));

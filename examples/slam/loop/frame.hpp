@@ -25,12 +25,14 @@ struct View {
   cfp::PinholeCamera<float> camera;
   cfp::PinholeCamera<double> exact;  // the same one, for the solvers
   int width = 0, height = 0;
-  std::vector<float> sigmas;  // standard deviation in pixels, per level
-  double baseline_fx = 0;     // of the depth camera seen as a stereo camera, pixels times metres
+  std::vector<float> scales;    // of the pyramid's levels
+  float keypoint_sigma_px = 1;  // standard deviation of one coordinate, at level 0
+  double baseline_fx = 0;       // of the depth camera seen as a stereo camera, pixels times metres
 
-  [[nodiscard]] float sigma(const cv::KeyPoint& keypoint) const {
-    return sigmas[static_cast<std::size_t>(keypoint.octave)];
+  [[nodiscard]] float scale(const cv::KeyPoint& keypoint) const {
+    return scales[static_cast<std::size_t>(keypoint.octave)];
   }
+  [[nodiscard]] float sigma(const cv::KeyPoint& keypoint) const { return keypoint_sigma_px * scale(keypoint); }
   // Whether the point, in the camera's frame, is in the image, and where.
   [[nodiscard]] bool sees(const cfp::Vector3<double>& point, cfp::Vector2<double>& pixel) const {
     return exact.project(point, pixel) && pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < width && pixel.y() < height;

@@ -61,7 +61,7 @@ class LastFrameMatching {
       if (!view.sees(T_cam_world * positions[j], pixel)) continue;
       if (mapped && map.is_proven(last.map_point[j])) ++found.expected_proven;
       const cv::KeyPoint& seen = last.keypoints[j];
-      expected_.push_back({float(pixel.x()), float(pixel.y()), seen.octave, radius * view.sigma(seen),
+      expected_.push_back({float(pixel.x()), float(pixel.y()), seen.octave, radius * view.scale(seen),
                            &last.descriptors[j], seen.angle, static_cast<int>(j)});
     }
   }

@@ -84,7 +84,7 @@ class LocalMap {
       ++point.in_view;
       expected_proven_ += map.is_proven(p) ? 1U : 0U;
       const int clamped = std::clamp(level, 0, features_.levels - 1);
-      const float radius = (cosine > 0.998 ? 2.5F : 4.0F) * widening * view.sigmas[static_cast<std::size_t>(clamped)];
+      const float radius = (cosine > 0.998 ? 2.5F : 4.0F) * widening * view.scales[static_cast<std::size_t>(clamped)];
       expected_.push_back({float(pixel.x()), float(pixel.y()), clamped, radius, &point.descriptor, -1, p});
     }
   }

@@ -121,7 +121,7 @@ class Mapping {
     MapPoint point;
     point.position = T_world_cam * in_camera;
     point.normal.setZero();
-    point.max_distance = static_cast<float>(in_camera.norm()) * view.sigma(frame.keypoints[i]);
+    point.max_distance = static_cast<float>(in_camera.norm()) * view.scale(frame.keypoints[i]);
     point.static_probability = frame.static_probability[i];
     point.created_by = keyframe;
     observe(point, frame, i, keyframe, T_world_cam.translation);

@@ -40,9 +40,10 @@ struct Options {
   cfp::PoseOptions pose;
   MappingOptions mapping;
   LocalBundleOptions bundle;
-  double baseline_fx = 40;                                                // ORB-SLAM2's Camera.bf for this sensor
-  cfp::PoseHealthOptions first_health = first_pose_health();              // what a pose of the coarse weights must have
-  cfp::PoseHealthOptions health;                                          // what a tracked frame's pose must have
+  double keypoint_sigma_px = 1;                               // of one coordinate, at level 0 of the pyramid
+  double baseline_fx = 40;                                    // ORB-SLAM2's Camera.bf for this sensor
+  cfp::PoseHealthOptions first_health = first_pose_health();  // what a pose of the coarse weights must have
+  cfp::PoseHealthOptions health;                              // what a tracked frame's pose must have
   cfp::PoseHealthOptions relocalised_health = relocalised_pose_health();  // what one from the map alone must have
   cfp::DetectorHealthOptions detector_health;
   int max_idle = 30;                   // frames over which boxes are carried on while the detector is not believed

@@ -35,6 +35,7 @@ RunResult run_slam(const FrameSource& source, cfp_examples::Detector& detector, 
                   calibration.width,
                   calibration.height,
                   cfp_examples::level_sigmas(options.features),
+                  static_cast<float>(options.keypoint_sigma_px),
                   options.baseline_fx};
   FrontEnd front_end(camera, calibration.depth_units_per_metre, options, observer);
   Tracking tracking(camera, view, options, observer);

@@ -1,0 +1,92 @@
+// Options of a run in a text file: a line `name value` for each that is not to have its default, `#` starts a comment.
+// The names are those of cfp_slam::Options, dotted.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "../slam/loop/options.hpp"
+#include "../support/tum.hpp"
+
+namespace cfp_slam {
+
+using OptionValues = std::map<std::string, double>;
+
+// visit(name, value) for every option that a file can set.
+template <typename Visit>
+void for_each_option(Options& o, const Visit& visit) {
+  cfp::FrameOptions& p = o.probability;
+  visit("keypoint_sigma_px", o.keypoint_sigma_px);
+  visit("baseline_fx", o.baseline_fx);
+  visit("unproven_share", o.unproven_share);
+  visit("probability.object_threshold", p.object_threshold);
+  visit("probability.min_creation_probability", p.min_creation_probability);
+  visit("probability.min_inlier_weight", p.min_inlier_weight);
+  visit("probability.tracker.min_score", p.tracker.min_score);
+  visit("probability.tracker.birth_threshold", p.tracker.birth_threshold);
+  visit("probability.coarse.flow.motion.min_sigma_px", p.coarse.flow.motion.min_sigma_px);
+  visit("probability.coarse.flow.motion.max_sigma_px", p.coarse.flow.motion.max_sigma_px);
+  visit("probability.coarse.object.noise_factor", p.coarse.object.noise_factor);
+  visit("probability.fine.min_translation_m", p.fine.min_translation_m);
+  visit("probability.fine.min_parallax", p.fine.min_parallax);
+  visit("probability.fine.projection.quantile", p.fine.projection.quantile);
+  visit("probability.fine.projection.steepness", p.fine.projection.steepness);
+  visit("probability.fine.epipolar.quantile", p.fine.epipolar.quantile);
+  visit("probability.fine.epipolar.steepness", p.fine.epipolar.steepness);
+  visit("probability.map_point.rate", p.map_point.rate);
+  visit("probability.map_point.deletion_threshold", p.map_point.deletion_threshold);
+  visit("probability.map_point.constraint_power", p.map_point.constraint_power);
+  visit("probability.map_point.foreground_prior", p.map_point.foreground_prior);
+  visit("probability.map_point.background_prior", p.map_point.background_prior);
+}
+
+// False: no option has this name.
+inline bool set_option(Options& options, const std::string& name, double value) {
+  bool known = false;
+  for_each_option(options, [&](const char* option, double& field) {
+    if (name != option) return;
+    field = value;
+    known = true;
+  });
+  return known;
+}
+
+// Throws std::runtime_error that says file and line where a name is none, or comes twice, or a value is no number.
+inline OptionValues read_options(const std::filesystem::path& file) {
+  OptionValues values;
+  cfp_examples::for_each_line(file, [&](int line, const std::vector<std::string>& words) {
+    Options any;
+    if (words.size() != 2) cfp_examples::bad_line(file, line, "expected 'name value'");
+    const double value = cfp_examples::parse_number(file, line, words[1], words[0].c_str());
+    if (!set_option(any, words[0], value)) cfp_examples::bad_line(file, line, "no option '" + words[0] + "'");
+    if (!values.emplace(words[0], value).second) cfp_examples::bad_line(file, line, words[0] + " comes twice");
+  });
+  return values;
+}
+
+// On one line, `name=value` with blanks between; "none" without any.
+inline std::string options_text(const OptionValues& values) {
+  std::string text;
+  for (const auto& [name, value] : values)
+    text += (text.empty() ? "" : " ") + name + "=" + cfp_examples::general(value, 17);
+  return text.empty() ? "none" : text;
+}
+
+// The defaults with what that line says.
+inline Options options_from_text(const std::string& text) {
+  Options options;
+  std::istringstream words(text);
+  for (std::string word; words >> word;) {
+    const std::size_t sign = word.find('=');
+    const auto value = cfp_examples::read_number(sign < word.size() ? word.substr(sign + 1) : "");
+    if (word == "none") continue;
+    if (!value || !set_option(options, word.substr(0, sign), *value))
+      throw std::runtime_error("'" + word + "' is no option");
+  }
+  return options;
+}
+
+}  // namespace cfp_slam
