@@ -184,13 +184,17 @@ inline void calibrate(const CalibrationData& data, const std::filesystem::path& 
   const CalibratedOptions now = chosen(data.options), best = calibrated(data);
   std::printf("%zu labelled keypoints in boxes, %.1f %% of them static; %zu static residuals outside\n",
               data.samples.size(), 100 - 100 * double(moving) / double(data.samples.size()), data.residuals_px.size());
-  std::printf("noise of the flow: %.3f px (median of the frames, 95 %%: %.3f)\n", quantile(data.flow_sigmas_px, 0.5),
-              quantile(data.flow_sigmas_px, 0.95));
-  for (const std::size_t on : {0U, 1U})
-    std::printf(
-        "%s: %.1f %% static of %zu keypoints of which nothing was known (prior %g)\n",
-        on ? "on objects" : "behind objects", 100 * double(data.rest[on]) / double(data.news[on]), data.news[on],
-        on ? data.options.probability.map_point.foreground_prior : data.options.probability.map_point.background_prior);
+  if (!data.flow_sigmas_px.empty())
+    std::printf("noise of the flow: %.3f px (median of the frames, 95 %%: %.3f)\n", quantile(data.flow_sigmas_px, 0.5),
+                quantile(data.flow_sigmas_px, 0.95));
+  for (const std::size_t on : {0U, 1U}) {
+    if (data.news[on] > 0)
+      std::printf("%s: %.1f %% static of %zu keypoints of which nothing was known (prior %g)\n",
+                  on ? "on objects" : "behind objects", 100 * double(data.rest[on]) / double(data.news[on]),
+                  data.news[on],
+                  on ? data.options.probability.map_point.foreground_prior
+                     : data.options.probability.map_point.background_prior);
+  }
   std::printf("%-42s %8s %8s\n", "option", "run", "measured");
   std::string text = "# Measured by cfp_slam_report calibrate; for cfp_slam run --options.\n";
   const auto option = [&](const char* name, double before, double after) {
