@@ -51,7 +51,8 @@ inline CalibratedOptions chosen(const Options& o) {
           o.probability.map_point.constraint_power};
 }
 
-// The weight that the sample would have had with these options and the same M: as cfp's posterior_weight has it.
+// The weight that the sample would have had with these options and the same M: as constrain_keypoints and
+// posterior_weight have it.
 inline float weight_with(const CalibrationSample& sample, const CalibratedOptions& chosen, const Options& run) {
   const auto threshold = static_cast<float>(chosen.object_threshold);
   cfp::SecondStageKeypoint<float> known = sample.known;
@@ -61,8 +62,11 @@ inline float weight_with(const CalibrationSample& sample, const CalibratedOption
   cfp::MapPointOptions options = run.probability.map_point;
   options.constraint_power = chosen.constraint_power;
   const float e = cfp::first_stage_evidence(known.object_probability, known.foreground, threshold);
-  return cfp::posterior_probability(cfp::second_stage_probability(known, threshold), std::min(e, 0.5F),
-                                    sample.map_point, options);
+  const cfp::SecondStageRule rule = cfp::second_stage_rule(known, threshold);
+  const bool silent =
+      rule == cfp::SecondStageRule::unmatched_foreground || rule == cfp::SecondStageRule::unmatched_background;
+  const float k = silent ? 0.5F : cfp::second_stage_probability(known, threshold);
+  return cfp::posterior_probability(k, std::min(e, 0.5F), sample.map_point, options);
 }
 
 // Takes in a run that was read, and its decisions.
