@@ -56,22 +56,6 @@ void add_run_options(CLI::App& run, Arguments& a) {
   run.add_flag("--resume", a.resume, "leaves out runs that are there, whole and with the same settings");
 }
 
-// Folders that are recordings, or hold some.
-std::vector<fs::path> recordings(const std::vector<std::string>& folders) {
-  std::vector<fs::path> found;
-  for (const fs::path folder : folders) {
-    std::vector<fs::path> inside;
-    if (fs::exists(folder / "rgb.txt")) inside.push_back(folder);
-    for (const auto& entry : fs::directory_iterator(folder)) {
-      if (fs::exists(entry.path() / "rgb.txt")) inside.push_back(entry.path());
-    }
-    if (inside.empty()) throw std::runtime_error(folder.string() + ": neither a recording (rgb.txt) nor some in it");
-    std::sort(inside.begin(), inside.end());
-    for (const fs::path& recording : inside) found.push_back(fs::canonical(recording));
-  }
-  return found;
-}
-
 // What the arguments mean for a recording.
 cfp_slam::RunSettings settings_of(const fs::path& recording, const Arguments& a) {
   cfp_slam::RunSettings settings = a.settings;
@@ -81,10 +65,6 @@ cfp_slam::RunSettings settings_of(const fs::path& recording, const Arguments& a)
     settings.detector = fs::exists(own) ? own.string() : "hog";
   }
   return settings;
-}
-
-std::size_t frames_of(const cfp_examples::Sequence& sequence, const cfp_slam::RunSettings& settings) {
-  return settings.frames > 0 ? std::min(settings.frames, sequence.size()) : sequence.size();
 }
 
 std::unique_ptr<cfp_examples::Detector> detector_of(const cfp_slam::RunSettings& settings) {
@@ -98,13 +78,14 @@ void run_recording(const fs::path& recording, const Arguments& a) {
   for (const std::string& note : sequence.notes()) std::fprintf(stderr, "%s\n", note.c_str());
   cfp_slam::RunSettings settings = settings_of(recording, a);
   const auto detector = detector_of(settings);
-  const std::size_t frames = frames_of(sequence, settings);
   for (settings.seed = a.settings.seed; settings.seed < a.settings.seed + a.seeds; ++settings.seed) {
     for (const std::string& variant : a.variants) {
       settings.variant = variant;
       const fs::path out = cfp_slam::run_folder(a.out, settings);
       if (a.resume && cfp_slam::is_done(out, settings)) continue;
-      cfp_examples::Progress progress(sequence.name() + ' ' + variant, frames);
+      cfp_examples::Progress progress(
+          sequence.name() + ' ' + variant,
+          std::min(sequence.size(), settings.frames > 0 ? settings.frames : sequence.size()));
       const std::string said = cfp_slam::run_into(out, sequence, *detector, settings, a.threads > 1, progress);
       if (!said.empty()) std::fprintf(stderr, "%s %s: %s\n", sequence.name().c_str(), variant.c_str(), said.c_str());
       std::printf("%s\n", (out / "trajectory.txt").c_str());
@@ -112,30 +93,11 @@ void run_recording(const fs::path& recording, const Arguments& a) {
   }
 }
 
-// A table of what each stress does to the poses.
 void stress_recording(const fs::path& recording, const Arguments& a) {
   const cfp_examples::Sequence sequence(recording);
   const cfp_slam::RunSettings settings = settings_of(recording, a);
-  const std::size_t frames = frames_of(sequence, settings);
-  if (sequence.truth().empty() || frames < 30)
-    throw std::runtime_error(recording.string() + ": a stress test needs a truth and 30 frames");
-  const double seconds = sequence.time_s(frames - 1) - sequence.time_s(0);
-  std::printf("%s\n", sequence.name().c_str());
-  cfp_slam::print_stress_header();
-  for (const cfp_slam::Stress& stress :
-       cfp_slam::stresses(frames, static_cast<double>(frames - 1) / seconds, sequence.calibration())) {
-    if (!a.stresses.empty() && std::none_of(a.stresses.begin(), a.stresses.end(), [&](const std::string& part) {
-          return stress.name.find(part) != std::string::npos;
-        }))
-      continue;
-    const auto inner = detector_of(settings);
-    cfp_slam::StressedDetector detector(*inner, sequence, stress);
-    cfp_slam::FrameSource source = cfp_slam::stressed(sequence, stress, frames);
-    cfp_slam::StressObserver observer;
-    cfp_slam::Options options = cfp_slam::options_of(settings, a.threads > 1);
-    const cfp_slam::RunResult run = cfp_slam::run_slam(source, detector, options, observer);
-    cfp_slam::print(stress, cfp_slam::judge(sequence, stress, observer.records, run));
-  }
+  cfp_slam::print_stresses(sequence, options_of(settings, a.threads > 1), a.stresses,
+                           [&] { return detector_of(settings); });
 }
 
 }  // namespace
@@ -159,7 +121,7 @@ int main(int argc, char** argv) {
     for (const std::string& variant : a.variants) cfp_slam::variant_of(variant);
     if (!a.options.empty()) a.settings.options = cfp_slam::read_options(a.options);
     cv::setNumThreads(a.threads);
-    for (const fs::path& recording : recordings(a.folders))
+    for (const fs::path& recording : cfp_slam::recordings(a.folders))
       stress.parsed() ? stress_recording(recording, a) : run_recording(recording, a);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());

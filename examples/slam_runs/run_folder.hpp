@@ -1,6 +1,7 @@
 // A run of the loop in a folder of its own: where that is, whether it is done, and doing it.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -11,6 +12,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "../slam/loop/run.hpp"
 #include "../support/tum.hpp"
@@ -53,6 +55,22 @@ inline cfp::Variant variant_of(const std::string& name) {
 inline std::string file_text(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+// Folders that are recordings, or hold some: the recordings, whole paths.
+inline std::vector<std::filesystem::path> recordings(const std::vector<std::string>& folders) {
+  std::vector<std::filesystem::path> found;
+  for (const std::filesystem::path folder : folders) {
+    std::vector<std::filesystem::path> inside;
+    if (std::filesystem::exists(folder / "rgb.txt")) inside.push_back(folder);
+    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+      if (std::filesystem::exists(entry.path() / "rgb.txt")) inside.push_back(entry.path());
+    }
+    if (inside.empty()) throw std::runtime_error(folder.string() + ": neither a recording (rgb.txt) nor some in it");
+    std::sort(inside.begin(), inside.end());
+    for (const std::filesystem::path& recording : inside) found.push_back(std::filesystem::canonical(recording));
+  }
+  return found;
 }
 
 // OUT/<recording's name>/<variant>_<seed>. A second recording whose folder has the same name gets <name>_2, and so on:

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdio>
 #include <map>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -116,6 +117,28 @@ inline void print(const Stress& stress, const StressResult& r) {
                                : std::to_string(r.recovery).c_str(),
               r.rmse_m, r.reported.c_str());
   std::fflush(stdout);
+}
+
+// A table of what each stress, or each with one of the parts in its name, does to the poses. Throws for a recording
+// that is too short or has no truth. make_detector() gives a new detector, which has seen nothing.
+template <typename MakeDetector>
+void print_stresses(const cfp_examples::Sequence& sequence, const Options& options,
+                    const std::vector<std::string>& parts, const MakeDetector& make_detector) {
+  const std::size_t frames = options.max_frames > 0 ? std::min(options.max_frames, sequence.size()) : sequence.size();
+  if (sequence.truth().empty() || frames < 30)
+    throw std::runtime_error(sequence.name() + ": a stress test needs a truth and 30 frames");
+  const double seconds = sequence.time_s(frames - 1) - sequence.time_s(0);
+  std::printf("%s\n", sequence.name().c_str());
+  print_stress_header();
+  for (const Stress& stress : stresses(frames, static_cast<double>(frames - 1) / seconds, sequence.calibration())) {
+    const auto named = [&](const std::string& part) { return stress.name.find(part) != std::string::npos; };
+    if (!parts.empty() && std::none_of(parts.begin(), parts.end(), named)) continue;
+    const auto inner = make_detector();
+    StressedDetector detector(*inner, sequence, stress);
+    StressObserver observer;
+    const RunResult run = run_slam(stressed(sequence, stress, frames), detector, options, observer);
+    print(stress, judge(sequence, stress, observer.records, run));
+  }
 }
 
 }  // namespace cfp_slam

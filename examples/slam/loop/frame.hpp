@@ -67,47 +67,42 @@ class KeypointGrid {
   void build(const Frame& frame, const View& view) {
     columns_ = view.width / cell + 1;
     rows_ = view.height / cell + 1;
-    start_.assign(static_cast<std::size_t>(columns_ * rows_) + 1, 0);
-    items_.resize(frame.size());
-    for (const auto& p : frame.pixels) ++start_[cell_of(p) + 1];
-    for (std::size_t c = 1; c < start_.size(); ++c) start_[c] += start_[c - 1];
-    fill_ = start_;
-    for (std::size_t i = 0; i < frame.size(); ++i) items_[fill_[cell_of(frame.pixels[i])]++] = static_cast<int>(i);
-    pixels_ = &frame.pixels;
+    cells_.resize(static_cast<std::size_t>(columns_ * rows_));
+    for (auto& c : cells_) c.clear();
+    for (std::size_t i = 0; i < frame.size(); ++i) {
+      const std::array<float, 2>& p = frame.pixels[i];
+      cells_[index(column(p[0]), row(p[1]))].push_back({p[0], p[1], i});
+    }
   }
 
   // visit(index) for every keypoint within `radius` pixels along both axes.
   template <typename Visit>
   void near(float x, float y, float radius, const Visit& visit) const {
-    const int c0 = std::max(0, static_cast<int>((x - radius) / float(cell))),
-              c1 = std::min(columns_ - 1, static_cast<int>((x + radius) / float(cell)));
-    const int r0 = std::max(0, static_cast<int>((y - radius) / float(cell))),
-              r1 = std::min(rows_ - 1, static_cast<int>((y + radius) / float(cell)));
-    for (int r = r0; r <= r1; ++r) {
-      const std::size_t row = static_cast<std::size_t>(r * columns_);
-      for (std::size_t k = c0 <= c1 ? start_[row + static_cast<std::size_t>(c0)] : 0,
-                       end = c0 <= c1 ? start_[row + static_cast<std::size_t>(c1) + 1] : 0;
-           k < end; ++k) {
-        const auto& p = (*pixels_)[static_cast<std::size_t>(items_[k])];
-        if (std::abs(p[0] - x) <= radius && std::abs(p[1] - y) <= radius) visit(static_cast<std::size_t>(items_[k]));
+    for (int r = row(y - radius); r <= row(y + radius); ++r) {
+      for (int c = column(x - radius); c <= column(x + radius); ++c) {
+        for (const Entry& e : cells_[index(c, r)]) {
+          if (std::abs(e.x - x) <= radius && std::abs(e.y - y) <= radius) visit(e.keypoint);
+        }
       }
     }
   }
 
  private:
+  struct Entry {
+    float x, y;
+    std::size_t keypoint;
+  };
   static constexpr int cell = 20;
   // Undistorted pixels may lie outside the image; they belong to the border's cells, those without a ray to the first.
-  [[nodiscard]] std::size_t cell_of(const std::array<float, 2>& p) const {
-    const auto index = [](float x, int cells) {
-      return x > 0 ? static_cast<std::size_t>(std::min(x / float(cell), float(cells - 1))) : std::size_t{0};
-    };
-    return index(p[1], rows_) * static_cast<std::size_t>(columns_) + index(p[0], columns_);
+  static int within(float x, int cells) {
+    return x > 0 ? static_cast<int>(std::min(x / float(cell), float(cells - 1))) : 0;
   }
+  [[nodiscard]] int column(float x) const { return within(x, columns_); }
+  [[nodiscard]] int row(float y) const { return within(y, rows_); }
+  [[nodiscard]] std::size_t index(int c, int r) const { return static_cast<std::size_t>(r * columns_ + c); }
 
   int columns_ = 0, rows_ = 0;
-  std::vector<std::size_t> start_, fill_;
-  std::vector<int> items_;
-  const std::vector<std::array<float, 2>>* pixels_ = nullptr;
+  std::vector<std::vector<Entry>> cells_;
 };
 
 }  // namespace cfp_slam

@@ -20,12 +20,8 @@
 
 namespace cfp_slam {
 
-struct FrameFeatures {
-  double time_s = 0;
-  std::vector<cv::KeyPoint> keypoints;
-  std::vector<Descriptor> descriptors;
-  std::vector<std::array<float, 2>> pixels;  // without distortion; NaN where the lens model has no ray
-  std::vector<float> depths_m;               // -1: none
+struct FrontEndResult {
+  Frame frame;  // keypoints and depths; nothing of it is known
   std::vector<cv::Point2f> flow_from, flow_to;
   std::vector<float> flow_depths_m;                    // of flow_from
   std::optional<cfp_examples::Detections> detections;  // none: the detector did not run
@@ -41,9 +37,9 @@ class FrontEnd {
         flow_(options.flow),
         observer_(observer) {}
 
-  FrameFeatures operator()(const cfp_examples::SequenceFrame& images, cfp_examples::Detector& detector) {
-    FrameFeatures features;
-    features.time_s = images.time_s;
+  FrontEndResult operator()(const cfp_examples::SequenceFrame& images, cfp_examples::Detector& detector) {
+    FrontEndResult result;
+    result.frame.time_s = images.time_s;
     cv::Mat gray;
     cv::cvtColor(images.bgr, gray, cv::COLOR_BGR2GRAY);
     const auto launch = options_.threads ? std::launch::async : std::launch::deferred;
@@ -51,7 +47,7 @@ class FrontEnd {
     if (options_.use_detector())
       detection = std::async(launch, [&] {
         const Part part(observer_, Module::detection);
-        features.detections = detector.detect(images.bgr, images.time_s);
+        result.detections = detector.detect(images.bgr, images.time_s);
       });
     if (options_.use_flow())
       flow = std::async(launch, [&] {
@@ -60,19 +56,19 @@ class FrontEnd {
       });
     {
       const Part part(observer_, Module::features);
-      extract(gray, images.depth, features);
+      extract(gray, images.depth, result.frame);
     }
     if (flow.valid()) {
       flow.get();
-      features.flow_from = flow_.previous();
-      features.flow_to = flow_.current();
-      features.flow_depths_m.resize(features.flow_from.size());
-      cfp::sample_depth(last_depth_, cfp::view(features.flow_from), metres_per_unit_, features.flow_depths_m);
+      result.flow_from = flow_.previous();
+      result.flow_to = flow_.current();
+      result.flow_depths_m.resize(result.flow_from.size());
+      cfp::sample_depth(last_depth_, cfp::view(result.flow_from), metres_per_unit_, result.flow_depths_m);
     }
     if (detection.valid()) detection.get();
-    last_keypoints_ = features.keypoints;
+    last_keypoints_ = result.frame.keypoints;
     last_depth_ = images.depth;
-    return features;
+    return result;
   }
 
   // The boxes of the frame just made, as the tracker has them: the next call's flow starts in them.
@@ -82,14 +78,17 @@ class FrontEnd {
   }
 
  private:
-  void extract(const cv::Mat& gray, const cv::Mat& depth, FrameFeatures& features) {
-    extract_(gray, features.keypoints, features.descriptors);
-    const auto pixels = cfp::undistorted(camera_, cfp::view(features.keypoints), features.pixels);
-    features.depths_m.resize(features.keypoints.size());
-    cfp::sample_depth(depth, cfp::view(features.keypoints), metres_per_unit_, features.depths_m);
-    for (std::size_t i = 0; i < pixels.size(); ++i) {
-      if (!cfp::is_finite(pixels(i, 0))) features.depths_m[i] = -1;  // no ray, no point
+  void extract(const cv::Mat& gray, const cv::Mat& depth, Frame& frame) {
+    extract_(gray, frame.keypoints, frame.descriptors);
+    const auto pixels = cfp::undistorted(camera_, cfp::view(frame.keypoints), frame.pixels);
+    frame.depths_m.resize(frame.size());
+    cfp::sample_depth(depth, cfp::view(frame.keypoints), metres_per_unit_, frame.depths_m);
+    for (std::size_t i = 0; i < frame.size(); ++i) {
+      if (!cfp::is_finite(pixels(i, 0))) frame.depths_m[i] = -1;  // no ray, no point
     }
+    frame.static_probability.assign(frame.size(), 1.0F);
+    frame.map_point_probability.assign(frame.size(), -1.0F);
+    frame.map_point.assign(frame.size(), no_point);
   }
 
   Options options_;

@@ -13,12 +13,14 @@ namespace {
 Options fitted(Options options, const FrameSource& source, const cfp_examples::Detector& detector) {
   cfp::FrameOptions& probability = options.probability;
   probability = cfp::variant_options(options.variant, probability);
-  probability.tracker.image_width = source.calibration.width;
-  probability.tracker.image_height = source.calibration.height;
   if (probability.tracker.max_coast > 0) probability.tracker.max_idle = options.max_idle;
   probability.coarse.flow.ransac.seed = options.seed;
   probability.classes = {{detector.class_of("person"), true}};  // -1: nothing that it finds can move
   cfp::validate(probability);
+  const auto size = [&](auto&... health) {
+    ((health.image_width = source.calibration.width, health.image_height = source.calibration.height), ...);
+  };
+  size(options.first_health, options.health, options.relocalised_health, options.detector_health, probability.tracker);
   if (options.variant == cfp::Variant::plain) options.unproven_share = 1e9;  // no handling of what moves at all
   return options;
 }
@@ -60,12 +62,7 @@ RunResult run_slam(const FrameSource& source, cfp_examples::Detector& detector, 
     }
     observer.finished(record);
   }
-  RunResult result;
-  result.trajectory = tracking.finish();
-  result.world = tracking.worlds();
-  result.keyframes = tracking.map().keyframes.size();
-  result.map_points = tracking.map().alive_points();
-  return result;
+  return tracking.finish();
 }
 
 }  // namespace cfp_slam

@@ -21,6 +21,7 @@
 #include "motion.hpp"
 #include "pose.hpp"
 #include "relocalization.hpp"
+#include "run.hpp"
 
 namespace cfp_slam {
 
@@ -28,7 +29,7 @@ class Tracking {
  public:
   // The observer must stay.
   Tracking(const Camera& camera, const View& view, const Options& options, Observer& observer)
-      : options_(sized(options, view)),
+      : options_(options),
         view_(view),
         observer_(observer),
         probability_(camera, options.probability),
@@ -37,22 +38,22 @@ class Tracking {
         local_map_(options.features),
         mapping_(options),
         interval_(options.interval),
-        detector_(options_.detector_health) {}
+        detector_(options.detector_health) {}
 
   // `record` comes with time and image; the rest is filled in.
-  void track(FrameFeatures&& features, FrameRecord& record) {
+  void track(FrontEndResult&& input, FrameRecord& record) {
     take_bundle(false);
-    Frame frame = begin_frame(features);
+    Frame& frame = input.frame;
     relocalised_ = false;
     pose_ = {};
-    gap_ = interval_.is_gap(frame.time_s);
-    if (gap_) {
+    if (interval_.is_gap(frame.time_s)) {  // the last frame says nothing of where its points are now
       note(record, "gap before this frame: " + std::to_string(frame.time_s - last_.time_s) + " s");
-      features.flow_from.clear();
-      features.flow_to.clear();
-      features.flow_depths_m.clear();
+      input.flow_from.clear();
+      input.flow_to.clear();
+      input.flow_depths_m.clear();
+      last_.has_pose = false;
     }
-    estimate(frame, features, record);
+    estimate(input, record);
     const Part part(observer_, Module::mapping);
     record.keypoints = frame.size();
     record.matches = static_cast<std::size_t>(
@@ -81,22 +82,20 @@ class Tracking {
     last_ = std::move(frame);
   }
 
-  // Puts the last bundle adjustment's result into the map. The poses of the tracked frames, camera to world, relative
-  // to their reference keyframes after all bundle adjustment, as ORB-SLAM2 writes trajectories.
-  std::vector<cfp::StampedPose<double>> finish() {
+  // Puts the last bundle adjustment's result into the map. The poses of the tracked frames are relative to their
+  // reference keyframes after all bundle adjustment, as ORB-SLAM2 writes trajectories.
+  RunResult finish() {
     take_bundle(true);
-    std::vector<cfp::StampedPose<double>> trajectory;
-    for (const RelativePose& p : poses_)
-      trajectory.push_back({p.time_s, (p.T_cam_reference * map_.keyframe(p.reference).frame.T_cam_world).inverse()});
-    return trajectory;
+    RunResult result;
+    for (const RelativePose& p : poses_) {
+      const Keyframe& reference = map_.keyframe(p.reference);
+      result.trajectory.push_back({p.time_s, (p.T_cam_reference * reference.frame.T_cam_world).inverse()});
+      result.world.push_back(reference.world);
+    }
+    result.keyframes = map_.keyframes.size();
+    result.map_points = map_.alive_points();
+    return result;
   }
-  // Of each pose of that.
-  [[nodiscard]] std::vector<int> worlds() const {
-    std::vector<int> worlds;
-    for (const RelativePose& p : poses_) worlds.push_back(map_.keyframe(p.reference).world);
-    return worlds;
-  }
-  [[nodiscard]] const Map& map() const { return map_; }
 
  private:
   struct RelativePose {
@@ -105,44 +104,27 @@ class Tracking {
     cfp::SE3<double> T_cam_reference;
   };
 
-  static Options sized(Options options, const View& view) {
-    const auto set = [&](auto&... health) {
-      ((health.image_width = view.width, health.image_height = view.height), ...);
-    };
-    set(options.first_health, options.health, options.relocalised_health, options.detector_health);
-    return options;
-  }
   static void note(FrameRecord& record, const std::string& what) {
     record.note += (record.note.empty() ? "" : "; ") + what;
   }
 
-  Frame begin_frame(FrameFeatures& features) const {
-    Frame frame;
-    const std::size_t n = features.keypoints.size();
-    frame.time_s = features.time_s;
-    frame.keypoints = std::move(features.keypoints);
-    frame.pixels = std::move(features.pixels);
-    frame.depths_m = std::move(features.depths_m);
-    frame.descriptors = std::move(features.descriptors);
-    frame.static_probability.assign(n, 1.0F);
-    frame.map_point_probability.assign(n, -1.0F);
-    frame.map_point.assign(n, no_point);
-    return frame;
-  }
-
   // Matches, probabilities, weights and the pose, each twice.
-  void estimate(Frame& frame, const FrameFeatures& features, FrameRecord& record) {
-    predicted_ = gap_ ? MotionModel::Prediction{} : motion_.predict(last_, frame.time_s, view_);
+  void estimate(FrontEndResult& input, FrameRecord& record) {
+    Frame& frame = input.frame;
+    predicted_ = motion_.predict(last_, frame.time_s, view_);
     {
       const Part part(observer_, Module::matching);
       grid_.build(frame, view_);
       match_last(frame, predicted_.T_cam_world);
     }
-    cfp::StageResult<float> stage = coarse(frame, features, record);
+    cfp::StageResult<float> stage = coarse(input, record);
     observer_.weighted(stage, probability_.state(), frame);
     note_boxes(record);
     if (const std::optional<cfp::PoseEstimate> pose = first_pose(frame, stage.weight)) {
-      stage = fine(frame, *pose);
+      {
+        const Part part(observer_, Module::fine);
+        stage = probability_.fine(*pose, from_last_.match, frame.map_point_probability);
+      }
       observer_.weighted(stage, probability_.state(), frame);
     }
     record.health = stage.report.health;
@@ -152,28 +134,22 @@ class Tracking {
     observer_.decided(probability_, frame, map_);
   }
 
-  // Over a gap the last frame says nothing of where its points are now.
   void match_last(Frame& frame, const cfp::SE3<double>& T_cam_world) {
-    if (gap_) {
-      from_last_.match.assign(frame.size(), cfp::no_match);
-      from_last_.expected_proven = 0;
-    } else {
-      match_last_(frame, grid_, last_, map_, T_cam_world, view_, options_.search_radius, options_.enough_matches,
-                  from_last_);
-    }
+    match_last_(frame, grid_, last_, map_, T_cam_world, view_, options_.search_radius, options_.enough_matches,
+                from_last_);
   }
 
-  cfp::StageResult<float> coarse(const Frame& frame, const FrameFeatures& features, FrameRecord& record) {
-    cfp::Frame<float> input;
-    input.timestamp_s = frame.time_s;
-    input.keypoints = cfp::view(frame.keypoints);
-    input.depths = frame.depths_m;
-    if (features.detections) input.detections = believed_detections(*features.detections, record);
-    input.flow = {cfp::view(features.flow_from), cfp::view(features.flow_to), features.flow_depths_m};
-    input.map_point_probability = frame.map_point_probability;
-    input.image_motion = predicted_.image_motion;
+  cfp::StageResult<float> coarse(const FrontEndResult& input, FrameRecord& record) {
+    cfp::Frame<float> frame;
+    frame.timestamp_s = input.frame.time_s;
+    frame.keypoints = cfp::view(input.frame.keypoints);
+    frame.depths = input.frame.depths_m;
+    if (input.detections) frame.detections = believed_detections(*input.detections, record);
+    frame.flow = {cfp::view(input.flow_from), cfp::view(input.flow_to), input.flow_depths_m};
+    frame.map_point_probability = input.frame.map_point_probability;
+    frame.image_motion = predicted_.image_motion;
     const Part part(observer_, Module::coarse);
-    return probability_.coarse(input);
+    return probability_.coarse(frame);
   }
 
   // Nothing, as if it had not run, of a detector that is silent or stuck: its boxes are carried on. Where they have
@@ -196,11 +172,6 @@ class Tracking {
     return cfp::span<const cfp::Detection<float>>(detections_);
   }
 
-  cfp::StageResult<float> fine(const Frame& frame, const cfp::PoseEstimate& pose) {
-    const Part part(observer_, Module::fine);
-    return probability_.fine(pose, from_last_.match, frame.map_point_probability);
-  }
-
   void note_boxes(FrameRecord& record) const {
     const auto& state = probability_.state();
     for (std::size_t b = 0; b < state.boxes.size(); ++b) {
@@ -217,8 +188,7 @@ class Tracking {
     if (map_.keyframes.empty()) return std::nullopt;
     const Part part(observer_, Module::pose);
     frame.T_cam_world = predicted_.T_cam_world;
-    if (last_.has_pose && !gap_)
-      pose_ = refine(frame, weight, from_last_.expected_proven, false, options_.first_health);
+    if (last_.has_pose) pose_ = refine(frame, weight, from_last_.expected_proven, false, options_.first_health);
     if (!pose_.health.ok()) {
       relocalised_ = relocalize_(frame, map_, local_map_.points(), probability_, view_.camera);
       if (relocalised_) {
@@ -227,7 +197,7 @@ class Tracking {
       }
     }
     frame.has_pose = pose_.health.ok();
-    if (!frame.has_pose || !last_.has_pose || gap_) return std::nullopt;
+    if (!frame.has_pose || !last_.has_pose) return std::nullopt;
     return cfp::PoseEstimate{frame.T_cam_world * last_.T_cam_world.inverse(), pose_.inliers};
   }
 
@@ -398,8 +368,8 @@ class Tracking {
   Frame last_;
   MotionModel::Prediction predicted_;
   LastFrameMatches from_last_;
-  bool relocalised_ = false, gap_ = false;  // in this frame, before it
-  RefinedPose pose_;                        // of this frame
+  bool relocalised_ = false;  // in this frame
+  RefinedPose pose_;          // of this frame
   cfp::FrameInterval interval_;
   cfp::DetectorHealth<float> detector_;
   bool detector_ok_ = true;
