@@ -188,6 +188,40 @@ TEST_CASE("A dominant plane with parallax beside it gives F", "[robust]") {
   }
 }
 
+TEST_CASE("Little parallax beside a plane is found below mismatches, at the noise of the plane's pairs", "[robust]") {
+  // Three mismatches in ten, parallax in seven of a hundred: under the threshold chance lines pass near as many pairs.
+  cfp::Random random(50, "few off the plane");
+  FundamentalRansacWorkspace workspace;
+  int found = 0, wrong = 0;
+  for (const double noise_px : {0.0, 0.05}) {
+    for (const double outliers : {0.2, 0.3}) {
+      for (int trial = 0; trial < 30; ++trial) {
+        TwoViewOptions options = noisy(300, outliers);
+        options.noise_px = noise_px;
+        options.shape = SceneShape::volume_and_plane;
+        options.plane_share = 0.9;
+        const auto scene = make_two_view_scene<double>(random, options);
+        const auto result =
+            fundamental_ransac(PointPairs{scene.prev, scene.cur}, FundamentalRansacOptions{}, workspace);
+        if (!result.found()) continue;
+        ++found;
+        std::vector<double> distances;  // of points everywhere, as those of the plane know no wrong epipole
+        for (int k = 0; k < 201; ++k) {
+          const cfp::Vector3<double> ray(0.3 * random.normal(), 0.3 * random.normal(), 1);
+          const cfp::Vector3<double> point = random.uniform(0.6, 5) * ray;
+          cfp::Vector2<double> u, v;
+          REQUIRE((scene.camera.project(point, u) && scene.camera.project(scene.T_cur_prev * point, v)));
+          distances.push_back(cfp::sampson_distance<double>(result.F, u, v));
+        }
+        std::nth_element(distances.begin(), distances.begin() + 100, distances.end());
+        wrong += distances[100] < 0.05 + noise_px ? 0 : 1;
+      }
+    }
+  }
+  CHECK(found >= 111);
+  CHECK(wrong == 0);
+}
+
 TEST_CASE("Same input and seed give the same bits, in a fresh or a used workspace", "[robust]") {
   cfp::Random random(35, "bits");
   FundamentalRansacWorkspace used;

@@ -65,7 +65,9 @@ struct DegeneracyCheck {
   }
 
   // Plane and parallax: with H known, two pairs off the plane give the epipole and F = [e']x H. Improves candidate when
-  // it can. Source: Chum, Werner, Matas: "Two-view geometry estimation unaffected by a dominant plane", CVPR 2005.
+  // it can, judged by the noise that the pairs of the plane show: mismatches that happen to lie near some F's lines
+  // outnumber little parallax under a threshold far above the noise. Source: Chum, Werner, Matas: "Two-view geometry
+  // estimation unaffected by a dominant plane", CVPR 2005.
   void complete_from_plane(RansacCandidate<Matrix3<T>>& candidate) noexcept {
     search.list.clear();
     for (std::size_t i = 0; i < pairs.size; ++i) {
@@ -73,6 +75,8 @@ struct DegeneracyCheck {
     }
     if (search.list.size() < 2) return;
     constexpr int samples = 100;  // 99 % for parallax in a fifth of the pairs off the plane
+    FundamentalSearch<T> fine = search;
+    fine.limit = (std::min)(search.limit, 4 * search.noise_limit());
     RansacCandidate<Matrix3<T>> best;
     for (int k = 0; k < samples; ++k) {
       Vector3<T> lines[2];
@@ -83,12 +87,13 @@ struct DegeneracyCheck {
       const Matrix3<T> F = hat(cross(lines[0], lines[1])) * H;
       const T norm = F.norm();
       if (!(norm > T(1e-12) * H.norm()) || !is_finite(norm)) continue;
-      const double cost = msac_cost(thinned_columns(pairs), F / norm, search.limit, best.cost);
+      const double cost = msac_cost(thinned_columns(pairs), F / norm, fine.limit, best.cost);
       if (cost < best.cost) best = {F / norm, cost};
     }
     if (!is_finite(best.cost)) return;
-    best.cost = search.cost(best.model, std::numeric_limits<double>::infinity());
-    search.optimize(best);
+    best.cost = fine.cost(best.model, std::numeric_limits<double>::infinity());
+    fine.optimize(best);
+    candidate.cost = fine.cost(candidate.model, std::numeric_limits<double>::infinity());
     if (best.cost < candidate.cost) candidate = best;
   }
 
