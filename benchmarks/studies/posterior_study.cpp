@@ -312,7 +312,7 @@ int main(int argc, char** argv) {
   std::vector<Scores> scores(all.size());
   for (int seed = first; seed < first + seeds; ++seed) {
     for (std::size_t act = 0; act < cfp_study::acting_names.size(); ++act) {
-      for (std::size_t motion = 0; motion < synthetic::motion_names.size(); ++motion) {
+      for (std::size_t motion = 0; motion < (smoke ? 1 : synthetic::motion_names.size()); ++motion) {
         PeopleScene scene(static_cast<cfp_study::Acting>(act), static_cast<synthetic::Motion>(motion),
                           frames / PeopleScene::rate_hz, static_cast<std::uint64_t>(seed));
         const std::vector<SeenFrame> recording = scene.record(frames);
