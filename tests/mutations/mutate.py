@@ -101,6 +101,7 @@ def main():
         mine = [rows[m.id] for m in order if m.id in rows]
         return [row for row in mine if row["outcome"] != "not compiled"][: asked.count]
 
+    known = equivalents()
     waiting = iter([m for m in order if m.id not in rows])
 
     def worker(number):
@@ -108,7 +109,10 @@ def main():
             mutant = next(waiting, None)
             if mutant is None:
                 return
-            outcome, test, seconds = tried(mutant, build / f"worker{number}", plain, sanitized, asked.tests)
+            if (mutant.header, mutant.after or ";") in known:
+                outcome, test, seconds = "equivalent", "", 0
+            else:
+                outcome, test, seconds = tried(mutant, build / f"worker{number}", plain, sanitized, asked.tests)
             rows[mutant.id] = dict(mutant._asdict(), line=mutant.line, outcome=outcome, test=test, seconds=f"{seconds:.1f}")
             print(f"{outcome:12} {seconds:6.1f} s  {mutant.header}:{mutant.line + 1}  {mutant.after[:90]}  {test}", flush=True)
             with table.open("w", newline="") as file:
