@@ -11,7 +11,7 @@
 #include "cfp/math/matrix3.hpp"
 #include "cfp/math/so3.hpp"
 #include "cfp/optimization/least_squares.hpp"
-#include "cfp/robust/fundamental_pairs_impl.hpp"
+#include "cfp/robust/fundamental_sampson_impl.hpp"
 
 namespace cfp::detail {
 inline namespace CFP_ISA {
