@@ -49,7 +49,7 @@ class Suite:
         self.flags += [f"-I{TESTS}", f"-I{ROOT}/include", f"-I{ROOT}/examples", "-isystem", str(apart)]
         self.flags += [f'-DCFP_TEST_DATA_DEFAULT="{ROOT.parent}/shared/data"', f'-DCFP_SOURCE_DIR="{ROOT}"']
         self.flags += ["-DCFP_TEST_CATCH2_V2"] if version[-1:] == ["2"] else []
-        self.flags += output_of("pkg-config", "--cflags", "eigen3") or ["-I/usr/include/eigen3"]
+        self.flags += [f.replace("-I", "-isystem") for f in output_of("pkg-config", "--cflags", "eigen3") or ["-I/usr/include/eigen3"]]
         self.opencv = [output_of("pkg-config", kind, "opencv4") for kind in ("--cflags", "--libs")]
         self.baseline = {}
 
