@@ -26,6 +26,7 @@ namespace cfp_slam {
 struct CalibrationSample {
   cfp::SecondStageKeypoint<float> known;
   float map_point = 1;     // M
+  float flow = -1;         // what stands for O in the weight: the flow at its place; negative: nothing does
   double step_m = 0;       // |t| since the frame before
   float weight = 0;        // as the run had it
   bool is_static = false;  // the label
@@ -61,7 +62,9 @@ inline float weight_with(const CalibrationSample& sample, const CalibratedOption
   if (known.foreground && !known.box_associated) return 0;
   cfp::MapPointOptions options = run.probability.map_point;
   options.constraint_power = chosen.constraint_power;
-  const float e = cfp::first_stage_evidence(known.object_probability, known.foreground, threshold);
+  const bool judged = sample.flow >= 0;
+  const float o = judged ? sample.flow : known.object_probability;
+  const float e = cfp::first_stage_evidence(o, judged || known.foreground, threshold);
   const cfp::SecondStageRule rule = cfp::second_stage_rule(known, threshold);
   const bool silent =
       rule == cfp::SecondStageRule::unmatched_foreground || rule == cfp::SecondStageRule::unmatched_background;
@@ -120,6 +123,7 @@ inline void add_run(const std::filesystem::path& folder, const RunRecord& run, C
                e.match != cfp::no_match,
                e.associated};
     s.map_point = float(e.map_point_probability);
+    s.flow = float(e.flow_probability);
     s.step_m = step_m;
     s.weight = float(e.weight);
     s.is_static = is_static;

@@ -56,6 +56,7 @@ void for_each_column(D& d, const Visit& visit) {
   visit("high_dynamic", e.high_dynamic);
   visit("flow_model", e.flow_model);
   visit("flow_sigma_px", e.flow_sigma_px);
+  visit("flow_probability", e.flow_probability);
   visit("K_coarse", e.coarse_probability);
   visit("match", e.match);
   visit("rule", e.rule);
