@@ -1,4 +1,4 @@
-// Pose from matches with mismatches: samples drawn, time and accuracy; uniform, weighted and progressive sampling
+// Pose from matches with mismatches: samples drawn, time and accuracy; uniform and weighted sampling
 // beside OpenCV's solvePnPRansac, interleaved over rotating problems. 1 px noise, depth 0.6 to 5 m, threshold 2.5 px,
 // confidence 0.99. Weights: inliers uniform in [0.5, 1], mismatches in [0, 0.5], and a weak variant where they are only
 // [0, 1] against [0, 0.7]. Arguments: [problems, default 40] [repetitions, default 5].
@@ -89,8 +89,7 @@ int main(int argc, char* argv[]) {
         }
         std::vector<Method> methods{ours("cfp, no weights", cfp::Sampling::uniform, false),
                                     ours("cfp, uniform sampling", cfp::Sampling::uniform, true),
-                                    ours("cfp, weighted sampling", cfp::Sampling::weighted, true),
-                                    ours("cfp, progressive", cfp::Sampling::progressive, true)};
+                                    ours("cfp, weighted sampling", cfp::Sampling::weighted, true)};
 #ifdef CFP_HAVE_OPENCV
         if (!weak) {
           methods.push_back(opencv("cv P3P", cv::SOLVEPNP_P3P));

@@ -85,7 +85,7 @@ class Experiment {
 
   cfp::FundamentalRansacOptions options_;
   cfp::detail::PairArrays pairs_;
-  cfp::SamplingWorkspace sampling_;
+  std::vector<double> sampling_;
   std::vector<std::uint32_t> list_;
   std::vector<double> distances_sq_;
 };

@@ -42,7 +42,7 @@ TEST_CASE("fundamental_ransac ends with finite numbers, consistent counts and th
     }
     cfp::FundamentalRansacOptions options;
     options.max_iterations = 50;
-    options.sampling = *rc::gen::element(cfp::Sampling::uniform, cfp::Sampling::weighted, cfp::Sampling::progressive);
+    options.sampling = *rc::gen::element(cfp::Sampling::uniform, cfp::Sampling::weighted);
     cfp::FundamentalRansacWorkspace workspace;
     std::vector<char> mask(n), again_mask(n);
     const auto result = cfp::fundamental_ransac(cfp::PointPairs{prev, cur, weights}, options, workspace, mask);

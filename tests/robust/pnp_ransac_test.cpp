@@ -122,7 +122,7 @@ TEST_CASE("A distorted camera is served through the same interface", "[robust]")
 TEST_CASE("Weights at least halve the samples at 60 % mismatches, with the same accuracy", "[robust]") {
   cfp::Random random(54, "pnp");
   PnpRansacWorkspace workspace;
-  double uniform = 0, guided[2] = {0, 0}, uniform_error = 0, guided_error[2] = {0, 0};
+  double uniform = 0, guided = 0, uniform_error = 0, guided_error = 0;
   constexpr int trials = 50;
   for (int trial = 0; trial < trials; ++trial) {
     const auto scene = make_absolute_pose_scene<double>(random, camera<double>, scene_options(300, 0.6));
@@ -135,14 +135,11 @@ TEST_CASE("Weights at least halve the samples at 60 % mismatches, with the same 
       error += cfp_test::pose_distance(result.T_cam_world, scene.T_cam_world)[0] / trials;
     };
     run(Sampling::uniform, uniform, uniform_error);
-    run(Sampling::weighted, guided[0], guided_error[0]);
-    run(Sampling::progressive, guided[1], guided_error[1]);
+    run(Sampling::weighted, guided, guided_error);
   }
-  INFO("iterations: uniform " << uniform << ", weighted " << guided[0] << ", progressive " << guided[1]);
-  for (int k = 0; k < 2; ++k) {
-    CHECK(2 * guided[k] <= uniform);
-    CHECK(guided_error[k] < 1.1 * uniform_error);
-  }
+  INFO("iterations: uniform " << uniform << ", weighted " << guided);
+  CHECK(2 * guided <= uniform);
+  CHECK(guided_error < 1.1 * uniform_error);
 }
 
 TEST_CASE("Absent matches change nothing", "[robust]") {
@@ -190,7 +187,7 @@ TEST_CASE("A rigid motion of the world moves the pose with it", "[robust]") {
 TEST_CASE("Same matches and seed give the same bits", "[robust]") {
   cfp::Random random(57, "pnp");
   PnpRansacWorkspace used;
-  for (const Sampling sampling : {Sampling::uniform, Sampling::weighted, Sampling::progressive}) {
+  for (const Sampling sampling : {Sampling::uniform, Sampling::weighted}) {
     const auto scene = make_absolute_pose_scene<double>(random, camera<double>, scene_options(250, 0.5));
     PnpRansacWorkspace fresh;
     PnpRansacOptions options;
@@ -247,7 +244,7 @@ TEST_CASE("RANSAC options outside their range are named; a second call allocates
   const auto scene = make_absolute_pose_scene<double>(random, camera<double>, scene_options(300, 0.5));
   std::vector<char> mask(300);
   PnpRansacWorkspace workspace;
-  for (const Sampling sampling : {Sampling::weighted, Sampling::progressive}) {
+  for (const Sampling sampling : {Sampling::weighted, Sampling::uniform}) {
     options = {};
     options.sampling = sampling;
     (void)pnp_ransac(scene.world, scene.pixels, scene.weights, camera<double>, options, workspace, mask);

@@ -33,7 +33,7 @@ struct FundamentalResult : RansacReport {
 /// nothing.
 struct FundamentalRansacWorkspace {
   detail::PairArrays pairs;
-  SamplingWorkspace sampling;
+  std::vector<double> sampling;
   std::vector<std::uint32_t> list;
   std::vector<double> distances_sq, scratch;
 };

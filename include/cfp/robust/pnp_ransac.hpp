@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <vector>
 
 #include "cfp/core/span.hpp"
 #include "cfp/math/se3.hpp"
@@ -35,7 +36,7 @@ struct PnpRansacResult : RansacReport {
 /// nothing.
 struct PnpRansacWorkspace {
   detail::ObservationArrays observations;
-  SamplingWorkspace sampling;
+  std::vector<double> sampling;
 };
 
 inline namespace CFP_ISA {

@@ -16,6 +16,11 @@
 
 namespace cfp {
 
+enum class Sampling : std::uint8_t {
+  uniform,  ///< every datum equally likely
+  weighted  ///< each draw in proportion to the weight
+};
+
 struct RansacOptions {
   double threshold_px = 1;                 ///< distance up to which a datum is an inlier, (0, 1e4)
   double confidence = 0.99;                ///< of having drawn a sample without mismatches, (0, 1)
@@ -40,27 +45,9 @@ enum class RansacStatus : std::uint8_t {
 
 /// The enumerator's name, for reports.
 [[nodiscard]] constexpr const char* to_string(RansacStatus status) noexcept {
-  switch (status) {
-    case RansacStatus::ok:
-      return "ok";
-    case RansacStatus::iteration_limit:
-      return "iteration limit";
-    case RansacStatus::not_enough_data:
-      return "not enough data";
-    case RansacStatus::no_consensus:
-      return "no consensus";
-    case RansacStatus::degenerate:
-      return "degenerate";
-    case RansacStatus::no_motion:
-      return "no motion";
-    case RansacStatus::pure_rotation:
-      return "pure rotation";
-    case RansacStatus::planar:
-      return "planar";
-    case RansacStatus::homography:
-      return "homography";
-  }
-  return "unknown";
+  constexpr const char* names[] = {"ok",        "iteration limit", "not enough data", "no consensus", "degenerate",
+                                   "no motion", "pure rotation",   "planar",          "homography"};
+  return status <= RansacStatus::homography ? names[static_cast<int>(status)] : "unknown";
 }
 
 /// What every estimate reports beside its model.
@@ -111,26 +98,23 @@ struct RansacSearch {
 ///   double cost(model, bound)                   may give up with any value above the bound
 ///   void optimize(candidate)                    local optimisation; keeps the better of both
 ///   auto inlier_test(model)                     a predicate of indices
-/// weighted: whether samples may follow the weights.
+/// weighted: whether samples may follow the weights. sums: scratch memory.
 template <typename Problem>
 [[nodiscard]] RansacSearch<typename Problem::Model> lo_ransac(Problem& problem, bool weighted,
                                                               const RansacOptions& options, Random& random,
-                                                              SamplingWorkspace& workspace) {
+                                                              std::vector<double>& sums) {
   using Model = typename Problem::Model;
   constexpr std::size_t sample_size = Problem::sample_size;
-  MinimalSampler<sample_size> sampler(problem.size(), weighted ? problem.weights() : span<const double>(),
-                                      options.sampling, options.max_iterations, workspace);
+  weighted = weighted && options.sampling == Sampling::weighted;
+  MinimalSampler<sample_size> sampler(problem.size(), weighted ? problem.weights() : span<const double>(), sums);
   RansacSearch<Model> search;
   std::size_t needed = options.max_iterations;
   double best_sample_cost = problem.total_weight();
   const auto count_needed = [&] {
     const auto is_inlier = problem.inlier_test(search.best.model);
-    if (sampler.sampling() == Sampling::progressive)
-      return progressive_ransac_iterations(sampler.order(), is_inlier, sample_size, options.confidence,
-                                           options.max_iterations);
     double inliers = 0, all = 0;
     for (std::size_t i = 0; i < problem.size(); ++i) {
-      const double one = sampler.sampling() == Sampling::weighted ? problem.weights()[i] : 1.0;
+      const double one = weighted ? problem.weights()[i] : 1.0;
       inliers += is_inlier(i) ? one : 0.0;
       all += one;
     }
