@@ -124,7 +124,6 @@ static void instantiate_clustering() noexcept {
   use(&cfp::adaptive_options<Scalar>);
   use(&cfp::dbscan_sorted<Scalar>);
   use(&cfp::dbscan<Scalar>);
-  use(&cfp::verify_dbscan<cfp::span<const Scalar>>);
   use(&cfp::depth_foreground<Scalar>);
 }
 

@@ -17,8 +17,6 @@
   CFP_LAYOUT(cfp::DbscanResult, invalid)                                 \
   CFP_LAYOUT(cfp::DbscanWorkspace<float>, neighbours)                    \
   CFP_LAYOUT(cfp::DbscanWorkspace<double>, neighbours)                   \
-  CFP_LAYOUT(cfp::DbscanVerifierOptions, ascending_numbers)              \
-  CFP_LAYOUT(cfp::DbscanVerdict, index)                                  \
   CFP_LAYOUT(cfp::ForegroundInput<float>, previous_depth_m)              \
   CFP_LAYOUT(cfp::ForegroundInput<double>, previous_depth_m)             \
   CFP_LAYOUT(cfp::ObjectDepth<float>, depth_m)                           \
@@ -52,10 +50,6 @@
   CFP_LAYOUT(cfp::BoxTrackerResult<double>, unwarped)                    \
   CFP_LAYOUT_OPAQUE(cfp::BoxTracker<float>)                              \
   CFP_LAYOUT_OPAQUE(cfp::BoxTracker<double>)                             \
-  CFP_LAYOUT_OPAQUE(cfp::EkfState<float, 8>)                             \
-  CFP_LAYOUT_OPAQUE(cfp::EkfState<double, 2>)                            \
-  CFP_LAYOUT_OPAQUE(cfp::EkfState<double, 8>)                            \
-  CFP_LAYOUT(cfp::EkfUpdate, mahalanobis_sq)                             \
   CFP_LAYOUT(cfp::Similarity, translation)                               \
   CFP_LAYOUT(cfp::AlignmentResult, status)                               \
   CFP_LAYOUT(cfp::RankedLabel, is_static)                                \

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "cfp/clustering/dbscan.hpp"
-#include "cfp/clustering/dbscan_verifier.hpp"
+#include "cfp_testing/dbscan_verifier.hpp"
 #include "support/catch.hpp"
 
 TEMPLATE_TEST_CASE("DBSCAN gives scikit-learn's clusters", "[clustering]", float, double) {
@@ -29,8 +29,8 @@ TEMPLATE_TEST_CASE("DBSCAN gives scikit-learn's clusters", "[clustering]", float
     INFO("case " << cases << " n " << n << " eps " << options.eps << " min_pts " << options.min_pts);
     // Theirs is a DBSCAN labelling but for the freedoms of the definition: numbering, and which cluster gets a border
     // point.
-    CHECK(cfp::verify_dbscan(values, options, theirs, {false, false}).fault == cfp::DbscanFault::none);
-    CHECK(cfp::verify_dbscan(values, options, ours).fault == cfp::DbscanFault::none);
+    CHECK(cfp_testing::verify_dbscan(values, options, theirs, {false, false}).fault == cfp_testing::DbscanFault::none);
+    CHECK(cfp_testing::verify_dbscan(values, options, ours).fault == cfp_testing::DbscanFault::none);
     std::map<int, int> partner;
     std::size_t their_core = 0;
     for (std::size_t i = 0; i < n; ++i) {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "cfp/clustering/dbscan_verifier.hpp"
 #include "cfp/core/random.hpp"
+#include "cfp_testing/dbscan_verifier.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
 
@@ -52,9 +52,9 @@ TEMPLATE_TEST_CASE("DBSCAN agrees with the definition", "[clustering]", float, d
     const double eps = random.index(2) == 0 ? random.index(8) / 16.0 : random.uniform(0, 0.5);
     const std::size_t min_pts = 1 + random.index(12);
     const auto out = cluster(values, eps, min_pts);
-    const cfp::DbscanVerdict verdict = cfp::verify_dbscan(values, {eps, min_pts}, out.labels);
+    const cfp_testing::DbscanVerdict verdict = cfp_testing::verify_dbscan(values, {eps, min_pts}, out.labels);
     INFO("round " << round << " n " << n << " eps " << eps << " min_pts " << min_pts << " at " << verdict.index);
-    REQUIRE(verdict.fault == cfp::DbscanFault::none);
+    REQUIRE(verdict.fault == cfp_testing::DbscanFault::none);
     REQUIRE(out.result.status == cfp::Status::ok);
     REQUIRE(out.result.noise ==
             static_cast<std::size_t>(std::count(out.labels.begin(), out.labels.end(), cfp::dbscan_noise)));
@@ -70,7 +70,7 @@ TEMPLATE_TEST_CASE("DBSCAN agrees with the definition for many values and a wild
     std::vector<TestType> values = random_values<TestType>(random, n);
     if (n == 300) values[7] = static_cast<TestType>(1e30);  // presses all others into one bucket
     const auto out = cluster(values, 0.05, 4);
-    CHECK(cfp::verify_dbscan(values, {0.05, 4}, out.labels).fault == cfp::DbscanFault::none);
+    CHECK(cfp_testing::verify_dbscan(values, {0.05, 4}, out.labels).fault == cfp_testing::DbscanFault::none);
   }
 }
 
@@ -100,12 +100,13 @@ TEMPLATE_TEST_CASE("DBSCAN survives hostile input", "[clustering]", float, doubl
                                      tiny, -tiny, 1,   nan, big,  2};
   const auto out = cluster(values, 0.5, 2);
   CHECK(out.result.invalid == 4);
-  CHECK(cfp::verify_dbscan(values, {0.5, 2}, out.labels).fault == cfp::DbscanFault::none);
+  CHECK(cfp_testing::verify_dbscan(values, {0.5, 2}, out.labels).fault == cfp_testing::DbscanFault::none);
   CHECK(out.labels == std::vector<int>({-1, 1, -1, 2, -1, -1, 1, 0, 0, 0, 0, 1, -1, 2, -1}));
 
   std::vector<TestType> repeated;
   for (int i = 0; i < 20; ++i) repeated.insert(repeated.end(), values.begin(), values.end());
-  CHECK(cfp::verify_dbscan(repeated, {0.5, 30}, cluster(repeated, 0.5, 30).labels).fault == cfp::DbscanFault::none);
+  CHECK(cfp_testing::verify_dbscan(repeated, {0.5, 30}, cluster(repeated, 0.5, 30).labels).fault ==
+        cfp_testing::DbscanFault::none);
   const std::vector<TestType> equal(500, TestType(1.7));
   CHECK(cluster(equal, 0.0, 500).labels == std::vector<int>(500, 0));
   CHECK(cluster(equal, 0.0, 501).result.noise == 500);

@@ -1,4 +1,4 @@
-#include "cfp/clustering/dbscan_verifier.hpp"
+#include "cfp_testing/dbscan_verifier.hpp"
 
 #include <limits>
 #include <vector>
@@ -7,7 +7,7 @@
 
 namespace {
 
-using cfp::DbscanFault;
+using cfp_testing::DbscanFault;
 
 // Core points at 0, 0.25, 0.5 and 2, 2.25, 2.5; border points 0.75 and 1.75; noise 1.25 and 9; eps 0.25, min_pts 3
 // counts the point itself.
@@ -16,8 +16,8 @@ const std::vector<double> values{
 const std::vector<int> right{0, 0, 0, 0, -1, 1, 1, 1, 1, -1, 0, 1, -1};
 const cfp::DbscanOptions options{0.25, 3};
 
-DbscanFault fault(std::vector<int> labels, const cfp::DbscanVerifierOptions& strictness = {}) {
-  return cfp::verify_dbscan(values, options, labels, strictness).fault;
+DbscanFault fault(std::vector<int> labels, const cfp_testing::DbscanVerifierOptions& strictness = {}) {
+  return cfp_testing::verify_dbscan(values, options, labels, strictness).fault;
 }
 DbscanFault fault_with(std::size_t at, int label) {
   std::vector<int> labels = right;
@@ -56,7 +56,7 @@ TEST_CASE("The verifier knows the nearest core point and the lower one of two", 
   std::vector<double> between{-0.375, -0.375, -0.125, 0, 0.5, 1, 1.125, 1.375, 1.375};
   const std::vector<int> lower{0, 0, 0, 0, 0, 1, 1, 1, 1}, upper{0, 0, 0, 0, 1, 1, 1, 1, 1};
   const cfp::DbscanOptions wide{0.5, 5};
-  CHECK(cfp::verify_dbscan(between, wide, lower).fault == DbscanFault::none);
-  CHECK(cfp::verify_dbscan(between, wide, upper).fault == DbscanFault::border_not_nearest);
-  CHECK(cfp::verify_dbscan(between, wide, upper, {false, true}).fault == DbscanFault::none);
+  CHECK(cfp_testing::verify_dbscan(between, wide, lower).fault == DbscanFault::none);
+  CHECK(cfp_testing::verify_dbscan(between, wide, upper).fault == DbscanFault::border_not_nearest);
+  CHECK(cfp_testing::verify_dbscan(between, wide, upper, {false, true}).fault == DbscanFault::none);
 }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "cfp/core/random.hpp"
+#include "cfp_testing/assignment_gap.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/brute_force_assignment.hpp"
 #include "support/catch.hpp"
@@ -76,7 +77,7 @@ TEMPLATE_TEST_CASE("The assignment is optimal: brute force up to 6 x 7, all gate
         } else {
           REQUIRE(result.pairs == 0);
         }
-        REQUIRE(std::abs(cfp::assignment_gap(costs, gate, columns, workspace.column_saving)) < 1e-12);
+        REQUIRE(std::abs(cfp_testing::assignment_gap(costs, gate, columns, workspace.column_saving)) < 1e-12);
         double cost = 0;
         for (std::size_t i = 0; i < rows; ++i) {
           if (columns[i] == cfp::unassigned) continue;
@@ -128,7 +129,7 @@ TEST_CASE("Large assignments carry a proof: the duality gap vanishes", "[detecti
         std::vector<int> columns(rows);
         const cfp::AssignmentResult result = cfp::solve_assignment(costs, gate, workspace, columns);
         CAPTURE(rows, cols, static_cast<int>(kind), gate);
-        CHECK(std::abs(cfp::assignment_gap(costs, gate, columns, workspace.column_saving)) < 1e-9);
+        CHECK(std::abs(cfp_testing::assignment_gap(costs, gate, columns, workspace.column_saving)) < 1e-9);
         if (kind == Kind::uniform && gate == inf) CHECK(result.pairs == (std::min)(rows, cols));
       }
     }
@@ -142,9 +143,9 @@ TEST_CASE("The verifier refuses what is not optimal or not an assignment", "[det
   std::array<int, 2> columns{};
   cfp::solve_assignment(costs, 1.0, workspace, columns);
   CHECK(columns == std::array<int, 2>{0, 1});  // 0.1 + 0.8 equals 0.2 + 0.9 - 0.2
-  CHECK(cfp::assignment_gap(costs, 1.0, columns, workspace.column_saving) < 1e-15);
+  CHECK(cfp_testing::assignment_gap(costs, 1.0, columns, workspace.column_saving) < 1e-15);
   const auto gap = [&](int a, int b) {
-    return cfp::assignment_gap(costs, 1.0, std::array<int, 2>{a, b}, workspace.column_saving);
+    return cfp_testing::assignment_gap(costs, 1.0, std::array<int, 2>{a, b}, workspace.column_saving);
   };
   CHECK_THAT(gap(0, -1), WithinAbs(0.2, 1e-12));
   CHECK_THAT(gap(1, 0), WithinAbs(0.5, 1e-12));
@@ -155,7 +156,7 @@ TEST_CASE("The verifier refuses what is not optimal or not an assignment", "[det
   CHECK(gap(-2, 0) == inf);
   // Any savings give a valid bound: never below the true gap.
   for (const std::vector<double>& saving : {std::vector<double>{0, 0, 0}, {nan_value, -1, 5}, {0.3, 0.3, 0.3}}) {
-    CHECK(cfp::assignment_gap(costs, 1.0, std::array<int, 2>{0, -1}, saving) >= 0.2 - 1e-12);
+    CHECK(cfp_testing::assignment_gap(costs, 1.0, std::array<int, 2>{0, -1}, saving) >= 0.2 - 1e-12);
   }
 }
 
@@ -192,7 +193,7 @@ TEST_CASE("Hostile costs end: NaN, infinities, extremes, empty", "[detection]") 
       const double c = costs(i, static_cast<std::size_t>(columns[i]));
       REQUIRE((c < gate && std::abs(c) <= 1e200));
     }
-    if (gate == gate) REQUIRE(cfp::assignment_gap(costs, gate, columns, workspace.column_saving) < 1e186);
+    if (gate == gate) REQUIRE(cfp_testing::assignment_gap(costs, gate, columns, workspace.column_saving) < 1e186);
     REQUIRE(cfp::is_finite(result.cost));
     const std::size_t most = cfp_test::brute_force_assignment(costs, inf).pairs;
     cfp::solve_assignment(costs, inf, workspace, columns);
@@ -209,8 +210,8 @@ TEST_CASE("Empty matrices need no memory", "[detection]") {
         cfp::solve_assignment(cfp::CostMatrix(std::vector<double>{}, rows, cols), 1.0, fresh, columns);
     CHECK(result.status == cfp::Status::ok);
     CHECK(columns == std::vector<int>(rows, cfp::unassigned));
-    CHECK(cfp::assignment_gap(cfp::CostMatrix(std::vector<double>{}, rows, cols), 1.0, columns, fresh.column_saving) ==
-          0);
+    CHECK(cfp_testing::assignment_gap(cfp::CostMatrix(std::vector<double>{}, rows, cols), 1.0, columns,
+                                      fresh.column_saving) == 0);
   }
 }
 

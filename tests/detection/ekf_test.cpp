@@ -1,4 +1,4 @@
-#include "cfp/detection/ekf.hpp"
+#include "cfp_testing/ekf.hpp"
 
 #include <cmath>
 #include <limits>
@@ -40,7 +40,7 @@ TEMPLATE_TEST_CASE("On a linear model the EKF is the textbook Kalman filter", "[
     const Matrix24 H = random_matrix<TestType, 2, 4>(random);
     const Eigen::Matrix<TestType, 2, 2> R = random_covariance<TestType, 2>(random);
     const Eigen::Matrix<TestType, 2, 1> z = random_matrix<TestType, 2, 1>(random);
-    cfp::EkfState<TestType, 4> state;
+    cfp_testing::EkfState<TestType, 4> state;
     state.mean = random_matrix<TestType, 4, 1>(random);
     state.covariance = random_covariance<TestType, 4>(random);
 
@@ -64,8 +64,8 @@ TEMPLATE_TEST_CASE("On a linear model the EKF is the textbook Kalman filter", "[
       J = H;
       return H * m;
     };
-    REQUIRE(cfp::ekf_predict(state, motion, Q));
-    const cfp::EkfUpdate update = cfp::ekf_update(state, z, measure, R);
+    REQUIRE(cfp_testing::ekf_predict(state, motion, Q));
+    const cfp_testing::EkfUpdate update = cfp_testing::ekf_update(state, z, measure, R);
     REQUIRE(update.status == cfp::Status::ok);
     CHECK((state.mean.template cast<double>() - x).norm() <= tolerance * (1 + x.norm()));
     CHECK((state.covariance.template cast<double>() - posterior).norm() <= tolerance * (1 + posterior.norm()));
@@ -75,20 +75,20 @@ TEMPLATE_TEST_CASE("On a linear model the EKF is the textbook Kalman filter", "[
 }
 
 TEST_CASE("The covariance stays positive semi-definite over thousands of nearly exact measurements", "[detection]") {
-  cfp::EkfState<float, 2> state;
+  cfp_testing::EkfState<float, 2> state;
   state.covariance *= 1e6F;
   Eigen::Matrix2f F, Q = Eigen::Matrix2f::Zero();
   F << 1, 0.1F, 0, 1;
   Q(1, 1) = 1e-6F;
   const Eigen::Matrix<float, 1, 1> R(1e-6F), z(1.0F);
   for (int k = 0; k < 5000; ++k) {
-    REQUIRE(cfp::ekf_predict(
+    REQUIRE(cfp_testing::ekf_predict(
         state, [&](const Eigen::Vector2f& m, Eigen::Matrix2f& J) -> Eigen::Vector2f { return (J = F) * m; }, Q));
     const auto measure = [](const Eigen::Vector2f& m, Eigen::Matrix<float, 1, 2>& H) {
       H << 1, 0;
       return Eigen::Matrix<float, 1, 1>(m[0]);
     };
-    REQUIRE(cfp::ekf_update(state, z, measure, R).status == cfp::Status::ok);
+    REQUIRE(cfp_testing::ekf_update(state, z, measure, R).status == cfp::Status::ok);
     REQUIRE(
         Eigen::SelfAdjointEigenSolver<Eigen::Matrix2f>(Eigen::Matrix2f(state.covariance)).eigenvalues().minCoeff() >=
         -1e-9F);
@@ -97,25 +97,28 @@ TEST_CASE("The covariance stays positive semi-definite over thousands of nearly 
 
 TEST_CASE("The EKF leaves the state alone when it cannot use a measurement, and allocates nothing", "[detection]") {
   using Measured = Eigen::Matrix<double, 1, 1>;
-  cfp::EkfState<double, 2> state;
+  cfp_testing::EkfState<double, 2> state;
   const auto measure = [](const Eigen::Vector2d& m, Eigen::Matrix<double, 1, 2>& H) {
     H << 1, 0;
     return Measured(m[0]);
   };
   const auto before = state;
   const double nan_value = std::numeric_limits<double>::quiet_NaN();
-  CHECK(cfp::ekf_update(state, Measured(nan_value), measure, Measured(1.0)).status == cfp::Status::invalid_input);
-  CHECK(cfp::ekf_update(state, Measured(1.0), measure, Measured(nan_value)).status == cfp::Status::invalid_input);
-  CHECK(cfp::ekf_update(state, Measured(1.0), measure, Measured(-1.0)).status == cfp::Status::degenerate);
-  CHECK(cfp::ekf_update(state, Measured(1.0), measure, Measured(-2.0)).status == cfp::Status::degenerate);
+  CHECK(cfp_testing::ekf_update(state, Measured(nan_value), measure, Measured(1.0)).status ==
+        cfp::Status::invalid_input);
+  CHECK(cfp_testing::ekf_update(state, Measured(1.0), measure, Measured(nan_value)).status ==
+        cfp::Status::invalid_input);
+  CHECK(cfp_testing::ekf_update(state, Measured(1.0), measure, Measured(-1.0)).status == cfp::Status::degenerate);
+  CHECK(cfp_testing::ekf_update(state, Measured(1.0), measure, Measured(-2.0)).status == cfp::Status::degenerate);
   const auto explode = [&](const Eigen::Vector2d& m, Eigen::Matrix2d& J) -> Eigen::Vector2d {
     J.setConstant(1e200);
     return m;
   };
-  CHECK_FALSE(cfp::ekf_predict(state, explode, Eigen::Matrix2d(Eigen::Matrix2d::Zero())));
+  CHECK_FALSE(cfp_testing::ekf_predict(state, explode, Eigen::Matrix2d(Eigen::Matrix2d::Zero())));
   CHECK(state.mean == before.mean);
   CHECK(state.covariance == before.covariance);
-  CHECK(cfp_test::allocations_in([&] { (void)cfp::ekf_update(state, Measured(1.0), measure, Measured(1.0)); }) == 0);
+  CHECK(cfp_test::allocations_in(
+            [&] { (void)cfp_testing::ekf_update(state, Measured(1.0), measure, Measured(1.0)); }) == 0);
   CHECK_THAT(state.mean[0], WithinAbs(0.5, 1e-15));  // prior 0 +- 1 and measurement 1 +- 1
   CHECK_THAT(state.covariance(0, 0), WithinAbs(0.5, 1e-15));
 }

@@ -1,7 +1,7 @@
 // Assignment, clustering, foreground and box tracker under hostile numbers.
-#include "cfp/clustering/dbscan_verifier.hpp"
 #include "cfp/clustering/depth_foreground.hpp"
 #include "cfp/detection/box_tracker.hpp"
+#include "cfp_testing/dbscan_verifier.hpp"
 #include "fuzz_input.hpp"
 
 namespace {
@@ -36,7 +36,7 @@ void clustering(FuzzInput& in) {
   std::vector<int> labels(depths.size());
   const cfp::DbscanResult result = cfp::dbscan(depths, options, workspace, labels);
   if (result.status == cfp::Status::ok)
-    CFP_PROMISE(cfp::verify_dbscan(depths, options, labels).fault == cfp::DbscanFault::none);
+    CFP_PROMISE(cfp_testing::verify_dbscan(depths, options, labels).fault == cfp_testing::DbscanFault::none);
 
   cfp::ForegroundOptions foreground;
   foreground.rule = in.flag() ? cfp::ForegroundRule::dbscan : cfp::ForegroundRule::depth_window;

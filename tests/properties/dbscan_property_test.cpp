@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "cfp/clustering/dbscan_verifier.hpp"
 #include "cfp/clustering/depth_foreground.hpp"
 #include "cfp/core/random.hpp"
+#include "cfp_testing/dbscan_verifier.hpp"
 #include "support/catch.hpp"
 
 #include <rapidcheck/catch.h>
@@ -75,7 +75,8 @@ TEST_CASE("DBSCAN properties", "[properties]") {
   rc::prop("the verifier accepts every labelling", [] {
     const std::vector<double> values = grid_values();
     const cfp::DbscanOptions options = any_options();
-    RC_ASSERT(cfp::verify_dbscan(values, options, labels_of(values, options)).fault == cfp::DbscanFault::none);
+    RC_ASSERT(cfp_testing::verify_dbscan(values, options, labels_of(values, options)).fault ==
+              cfp_testing::DbscanFault::none);
   });
   rc::prop("permuting the values permutes the labels", [] {
     const std::vector<double> values = grid_values();

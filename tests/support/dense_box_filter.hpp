@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "cfp/detection/box_motion.hpp"
-#include "cfp/detection/ekf.hpp"
+#include "cfp_testing/ekf.hpp"
 
 namespace cfp_test {
 
@@ -28,7 +28,7 @@ template <typename Scalar>
 struct DenseBoxFilter {
   using Vector8 = Eigen::Matrix<Scalar, 8, 1>;
   using Matrix8 = Eigen::Matrix<Scalar, 8, 8>;
-  cfp::EkfState<Scalar, 8> state;
+  cfp_testing::EkfState<Scalar, 8> state;
 
   explicit DenseBoxFilter(const cfp::BoxFilter<Scalar>& f) {
     state.covariance.setZero();
@@ -58,7 +58,7 @@ struct DenseBoxFilter {
       F.template topRightCorner<4, 4>() = dt * Eigen::Matrix<Scalar, 4, 4>::Identity();
       return F * m;
     };
-    return cfp::ekf_predict(state, motion, Q);
+    return cfp_testing::ekf_predict(state, motion, Q);
   }
   [[nodiscard]] bool correct(const cfp::Box<Scalar>& b, const cfp::BoxMotionOptions& o) {
     const Scalar sx = Scalar(o.edge_noise) * std::exp(state.mean[2]),
@@ -66,7 +66,7 @@ struct DenseBoxFilter {
     const Eigen::Matrix<Scalar, 4, 4> R = Eigen::Matrix<Scalar, 4, 1>(sx * sx, sx * sx, sy * sy, sy * sy).asDiagonal();
     const Eigen::Matrix<Scalar, 4, 1> z(b.x1, b.x2, b.y1, b.y2);
     const auto measure = [](const Vector8& m, Eigen::Matrix<Scalar, 4, 8>& H) { return box_edges(m, H); };
-    return cfp::ekf_update(state, z, measure, R).status == cfp::Status::ok;
+    return cfp_testing::ekf_update(state, z, measure, R).status == cfp::Status::ok;
   }
 };
 

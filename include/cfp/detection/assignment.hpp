@@ -45,10 +45,9 @@ struct AssignmentResult {
   double cost = 0;  ///< sum of the costs of the pairs
 };
 
-/// Grows to the largest problem seen, then allocates nothing. After a call `row_saving` and `column_saving` are the
-/// dual solution, with which `assignment_gap` proves the optimum.
+/// Grows to the largest problem seen, then allocates nothing. After a call `column_saving` is the dual solution, with
+/// which cfp_testing/assignment_gap.hpp proves the optimum.
 struct AssignmentWorkspace {
-  std::vector<double> row_saving;     ///< a_i >= 0, one per row
   std::vector<double> column_saving;  ///< b_j >= 0, one per column
 
   struct Visit {
@@ -77,14 +76,6 @@ inline namespace CFP_ISA {
 template <typename Scalar>
 AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_cost, AssignmentWorkspace& workspace,
                                   span<int> column_of_row);
-
-/// How far an assignment may be from the optimum: its objective minus a lower bound that holds by duality for any
-/// `column_saving` (negative or NaN entries count as 0). 0, up to rounding, proves the optimum; the savings that
-/// solve_assignment leaves in its workspace do. Infinite for an assignment that uses a column twice, a column that does
-/// not exist, or a forbidden pair. O(rows * cols + cols^2); allocates nothing.
-template <typename Scalar>
-[[nodiscard]] double assignment_gap(const CostMatrix<Scalar>& costs, double max_cost, span<const int> column_of_row,
-                                    span<const double> column_saving) noexcept;
 
 }  // namespace CFP_ISA
 }  // namespace cfp

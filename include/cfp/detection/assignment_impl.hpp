@@ -178,7 +178,6 @@ AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_co
                                   span<int> column_of_row) {
   CFP_ASSERT(column_of_row.size() == costs.rows);
   std::fill(column_of_row.begin(), column_of_row.end(), unassigned);
-  workspace.row_saving.assign(costs.rows, 0.0);
   workspace.column_saving.assign(costs.cols, 0.0);
   AssignmentResult result;
   if (!(max_cost == max_cost)) {
@@ -193,41 +192,11 @@ AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_co
   detail::AssignmentSearch<AssignmentWorkspace> search(workspace, costs.cols, gate, column_of_row);
   if (costs.cols > 0) search.solve();
   for (std::size_t i = 0; i < costs.rows; ++i) {
-    workspace.row_saving[i] = (std::max)(gate - search.row_value(i), 0.0);
     if (column_of_row[i] == unassigned) continue;
     result.cost += static_cast<double>(costs(i, static_cast<std::size_t>(column_of_row[i])));
     ++result.pairs;
   }
   return result;
-}
-
-template <typename Scalar>
-double assignment_gap(const CostMatrix<Scalar>& costs, double max_cost, span<const int> column_of_row,
-                      span<const double> column_saving) noexcept {
-  CFP_ASSERT(column_of_row.size() == costs.rows && column_saving.size() == costs.cols);
-  if (!(max_cost == max_cost)) return detail::infinity;
-  const Eigen::Map<const Eigen::Array<Scalar, Eigen::Dynamic, 1>> values(costs.values.data(),
-                                                                         Eigen::Index(costs.rows * costs.cols));
-  const auto allowed = values.unaryExpr([=](Scalar cost) { return detail::allowed_cost(cost, max_cost); });
-  const double gate = detail::effective_gate(allowed, max_cost, (std::min)(costs.rows, costs.cols));
-  const auto saving_of = [&](std::size_t i, std::size_t j) {
-    return gate - detail::allowed_cost(costs(i, j), max_cost);
-  };
-  const auto price = [&](std::size_t j) { return column_saving[j] > 0 ? column_saving[j] : 0.0; };
-  double gap = 0;  // weak duality: sum a_i + sum b_j >= saved, for a_i = max(0, max_j saving_ij - b_j)
-  for (std::size_t j = 0; j < costs.cols; ++j) gap += price(j);
-  for (std::size_t i = 0; i < costs.rows; ++i) {
-    double row = 0;
-    for (std::size_t j = 0; j < costs.cols; ++j) row = (std::max)(row, saving_of(i, j) - price(j));
-    gap += row;
-    const int j = column_of_row[i];
-    if (j == unassigned) continue;
-    if (j < 0 || static_cast<std::size_t>(j) >= costs.cols) return detail::infinity;
-    if (std::find(column_of_row.begin(), column_of_row.begin() + i, j) != column_of_row.begin() + i)
-      return detail::infinity;
-    gap -= saving_of(i, static_cast<std::size_t>(j));  // +infinity for a forbidden pair
-  }
-  return gap;
 }
 
 }  // namespace CFP_ISA

@@ -11,7 +11,7 @@
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 
-namespace cfp {
+namespace cfp_testing {
 
 /// What is wrong with a labelling; the first fault in this order is reported.
 enum class DbscanFault : std::uint8_t {
@@ -39,23 +39,22 @@ struct DbscanVerdict {
 };
 
 namespace detail {
-inline namespace CFP_ISA {
 
 // The definition, by comparing every value with every other one.
 template <typename Scalar>
 struct DbscanOracle {
-  span<const Scalar> values;
+  cfp::span<const Scalar> values;
   Scalar eps;
   std::vector<char> core;
   std::vector<std::size_t> component;  // of core points: equal for density-connected ones
 
-  DbscanOracle(span<const Scalar> v, const DbscanOptions& options)
-      : values(v), eps(radius<Scalar>(options.eps)), core(v.size(), 0), component(v.size()) {
+  DbscanOracle(cfp::span<const Scalar> v, const cfp::DbscanOptions& options)
+      : values(v), eps(cfp::detail::radius<Scalar>(options.eps)), core(v.size(), 0), component(v.size()) {
     const std::size_t n = values.size();
     for (std::size_t i = 0; i < n; ++i) {
       std::size_t count = 0;
       for (std::size_t j = 0; j < n; ++j) count += near(i, j) ? 1U : 0U;
-      core[i] = count >= options.min_pts && is_finite(values[i]) ? 1 : 0;
+      core[i] = count >= options.min_pts && cfp::is_finite(values[i]) ? 1 : 0;
       component[i] = i;
     }
     for (std::size_t i = 0; i < n; ++i) {
@@ -69,12 +68,13 @@ struct DbscanOracle {
     return values[a] < values[b] ? values[b] - values[a] : values[a] - values[b];
   }
   [[nodiscard]] bool near(std::size_t a, std::size_t b) const {
-    return is_finite(values[a]) && is_finite(values[b]) && distance(a, b) <= eps;
+    return cfp::is_finite(values[a]) && cfp::is_finite(values[b]) && distance(a, b) <= eps;
   }
 };
 
 template <typename Scalar>
-DbscanFault fault_of_core(const DbscanOracle<Scalar>& oracle, span<const int> labels, std::size_t i, bool ordered) {
+DbscanFault fault_of_core(const DbscanOracle<Scalar>& oracle, cfp::span<const int> labels, std::size_t i,
+                          bool ordered) {
   if (labels[i] < 0) return DbscanFault::core_is_noise;
   DbscanFault worst = DbscanFault::none;
   const auto report = [&worst](DbscanFault fault) {
@@ -91,7 +91,8 @@ DbscanFault fault_of_core(const DbscanOracle<Scalar>& oracle, span<const int> la
 }
 
 template <typename Scalar>
-DbscanFault fault_of_other(const DbscanOracle<Scalar>& oracle, span<const int> labels, std::size_t i, bool to_nearest) {
+DbscanFault fault_of_other(const DbscanOracle<Scalar>& oracle, cfp::span<const int> labels, std::size_t i,
+                           bool to_nearest) {
   const std::size_t n = labels.size();
   std::size_t nearest = n;
   bool own = false;
@@ -103,23 +104,20 @@ DbscanFault fault_of_other(const DbscanOracle<Scalar>& oracle, span<const int> l
         (oracle.distance(i, j) == oracle.distance(i, nearest) && oracle.values[j] < oracle.values[nearest]);
     if (better) nearest = j;
   }
-  if (nearest == n) return labels[i] != dbscan_noise ? DbscanFault::noise_labelled : DbscanFault::none;
-  if (labels[i] == dbscan_noise) return DbscanFault::border_is_noise;
+  if (nearest == n) return labels[i] != cfp::dbscan_noise ? DbscanFault::noise_labelled : DbscanFault::none;
+  if (labels[i] == cfp::dbscan_noise) return DbscanFault::border_is_noise;
   if (!own) return DbscanFault::border_foreign;
   return to_nearest && labels[i] != labels[nearest] ? DbscanFault::border_not_nearest : DbscanFault::none;
 }
 
-}  // namespace CFP_ISA
 }  // namespace detail
-
-inline namespace CFP_ISA {
 
 /// Whether `labels` is a DBSCAN labelling of `values` (any contiguous container of float or double); distances are
 /// differences as rounded in the values' type, as in `dbscan`.
 template <typename Values>
-[[nodiscard]] DbscanVerdict verify_dbscan(const Values& values, const DbscanOptions& options, span<const int> labels,
-                                          const DbscanVerifierOptions& strictness = {}) {
-  using Scalar = range_value_t<Values>;
+[[nodiscard]] DbscanVerdict verify_dbscan(const Values& values, const cfp::DbscanOptions& options,
+                                          cfp::span<const int> labels, const DbscanVerifierOptions& strictness = {}) {
+  using Scalar = cfp::range_value_t<Values>;
   if (labels.size() != values.size()) return {DbscanFault::label_count, 0};
   const detail::DbscanOracle<Scalar> oracle(values, options);
   DbscanVerdict verdict;
@@ -127,14 +125,14 @@ template <typename Values>
     if (fault != DbscanFault::none && (verdict.fault == DbscanFault::none || fault < verdict.fault))
       verdict = {fault, at};
   };
-  int highest = dbscan_noise;
+  int highest = cfp::dbscan_noise;
   for (std::size_t i = 0; i < labels.size(); ++i) {
     highest = (std::max)(highest, labels[i]);
     if (oracle.core[i] != 0) {
       report(detail::fault_of_core(oracle, labels, i, strictness.ascending_numbers), i);
-    } else if (is_finite(oracle.values[i])) {
+    } else if (cfp::is_finite(oracle.values[i])) {
       report(detail::fault_of_other(oracle, labels, i, strictness.nearest_border), i);
-    } else if (labels[i] != dbscan_noise) {
+    } else if (labels[i] != cfp::dbscan_noise) {
       report(DbscanFault::invalid_labelled, i);
     }
   }
@@ -146,5 +144,4 @@ template <typename Values>
   return verdict;
 }
 
-}  // namespace CFP_ISA
-}  // namespace cfp
+}  // namespace cfp_testing

@@ -1,6 +1,6 @@
 /// @file ekf.hpp
-/// A small extended Kalman filter with fixed sizes (paper IV-A names an EKF and neither state nor noise). Nothing
-/// allocates.
+/// A small extended Kalman filter with fixed sizes and any model: what cfp/detection/box_motion.hpp, which knows its
+/// model, is held equal to. Nothing allocates.
 #pragma once
 
 #include <cmath>
@@ -10,7 +10,7 @@
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/status.hpp"
 
-namespace cfp {
+namespace cfp_testing {
 
 /// Mean and covariance of n states. Stored without alignment demands, so that the layout does not depend on vector
 /// flags.
@@ -21,19 +21,19 @@ struct EkfState {
 };
 
 struct EkfUpdate {
-  Status status = Status::ok;  ///< invalid_input: something was not finite; degenerate: S was not positive definite
+  cfp::Status status =
+      cfp::Status::ok;  ///< invalid_input: something was not finite; degenerate: S was not positive definite
   /// r' S^-1 r of the innovation r; chi-squared with m degrees of freedom when the model holds
   double mahalanobis_sq = 0;
 };
 
 namespace detail {
-inline namespace CFP_ISA {
 
 // S = L L' in place, L in the lower triangle. False unless every pivot stands out of the rounding of the diagonal.
 template <typename Scalar, int m>
 [[nodiscard]] bool factor_innovation(Eigen::Matrix<Scalar, m, m>& S) noexcept {
   using std::sqrt;
-  const Scalar least = Scalar(Tolerance<Scalar>::degenerate) * S.diagonal().maxCoeff();
+  const Scalar least = Scalar(cfp::Tolerance<Scalar>::degenerate) * S.diagonal().maxCoeff();
   for (int j = 0; j < m; ++j) {
     const Scalar pivot = S(j, j) - S.row(j).head(j).squaredNorm();
     if (!(pivot > least) || !(pivot > Scalar(0))) return false;
@@ -43,10 +43,7 @@ template <typename Scalar, int m>
   return true;
 }
 
-}  // namespace CFP_ISA
 }  // namespace detail
-
-inline namespace CFP_ISA {
 
 /// Prediction: mean <- f(mean), P <- F P F' + Q, symmetrised. `motion(mean, F)` returns f(mean) and writes its Jacobian
 /// F at the mean (n x n). Returns false, and leaves the state as it was, when the result is not finite.
@@ -78,8 +75,8 @@ EkfUpdate ekf_update(EkfState<Scalar, n>& state, const Eigen::Matrix<Scalar, m, 
   const Eigen::Matrix<Scalar, m, 1> r = z - measure(before, H);
   Eigen::Matrix<Scalar, m, n> K_transposed = H * P;
   Eigen::Matrix<Scalar, m, m> S = K_transposed * H.transpose() + R;
-  if (!r.allFinite() || !S.allFinite()) return {Status::invalid_input, 0};
-  if (!detail::factor_innovation(S)) return {Status::degenerate, 0};
+  if (!r.allFinite() || !S.allFinite()) return {cfp::Status::invalid_input, 0};
+  if (!detail::factor_innovation(S)) return {cfp::Status::degenerate, 0};
   const auto L = S.template triangularView<Eigen::Lower>();
   L.solveInPlace(K_transposed);
   S.transpose().template triangularView<Eigen::Upper>().solveInPlace(K_transposed);
@@ -87,11 +84,10 @@ EkfUpdate ekf_update(EkfState<Scalar, n>& state, const Eigen::Matrix<Scalar, m, 
   const Eigen::Matrix<Scalar, n, 1> mean = before + K * r;
   const Square A = Square::Identity() - K * H;
   const Square joseph = A * P * A.transpose() + K * R * K.transpose();
-  if (!mean.allFinite() || !joseph.allFinite()) return {Status::invalid_input, 0};
+  if (!mean.allFinite() || !joseph.allFinite()) return {cfp::Status::invalid_input, 0};
   state.mean = mean;
   state.covariance = Scalar(0.5) * (joseph + joseph.transpose());
-  return {Status::ok, static_cast<double>(L.solve(r).squaredNorm())};
+  return {cfp::Status::ok, static_cast<double>(L.solve(r).squaredNorm())};
 }
 
-}  // namespace CFP_ISA
-}  // namespace cfp
+}  // namespace cfp_testing
