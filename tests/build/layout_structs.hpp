@@ -128,7 +128,6 @@
   CFP_LAYOUT_OPAQUE(cfp::SingleThread)                                   \
   CFP_LAYOUT(cfp::LevenbergMarquardtOptions, min_absolute_decrease)      \
   CFP_LAYOUT(cfp::LeastSquaresResult, accepted)                          \
-  CFP_LAYOUT_OPAQUE(cfp::Damping)                                        \
   CFP_LAYOUT(cfp::PnpRansacWorkspace, sampling)                          \
   CFP_LAYOUT(cfp::PnpRansacOptions, seed)                                \
   CFP_LAYOUT_OPAQUE(cfp::PnpRansacResult<float>)                         \

@@ -2,45 +2,59 @@
 
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "cfp/core/types.hpp"
 #include "support/catch.hpp"
 
+namespace {
+
+// A problem whose steps have the gains it is told, and which writes down the dampings it is asked for.
+struct Script {
+  std::vector<double> gains, dampings;
+  double cost = 1e6;
+
+  double linearize() const { return cost; }
+  double propose(double damping) {
+    dampings.push_back(damping);
+    return 1;
+  }
+  double linearize_trial() const { return cost - gains[dampings.size() - 1]; }
+  void accept() { cost = linearize_trial(); }
+};
+
+cfp::LeastSquaresResult follow(Script& script, cfp::LevenbergMarquardtOptions options) {
+  options.max_iterations = static_cast<int>(script.gains.size());
+  options.min_relative_decrease = options.min_absolute_decrease = 0;
+  return minimize_least_squares(script, options);
+}
+
+const double nan_gain = std::numeric_limits<double>::quiet_NaN();
+
+}  // namespace
+
 TEST_CASE("The damping follows Nielsen's rule", "[optimization][least_squares]") {
   cfp::LevenbergMarquardtOptions options;
   options.initial_damping = 1;
-  cfp::Damping damping(options);
-  CHECK(damping.accept(1.0));
-  CHECK_THAT(damping.value(), WithinAbs(1.0 / 3, 1e-15));
-  CHECK(damping.accept(0.5));
-  CHECK_THAT(damping.value(), WithinAbs(1.0 / 3, 1e-15));
-  CHECK(damping.accept(0.25));
-  CHECK_THAT(damping.value(), WithinAbs(1.125 / 3, 1e-15));
-  CHECK_FALSE(damping.accept(0));
-  CHECK_FALSE(damping.accept(std::numeric_limits<double>::quiet_NaN()));
-  damping.reject();
-  CHECK_THAT(damping.value(), WithinAbs(1.125 / 3 * 2 * 4 * 8, 1e-12));
-  CHECK(damping.last_step_rejected());
-  CHECK(damping.accept(1e300));
-  CHECK_FALSE(damping.last_step_rejected());
+  Script script{{1, 0.5, 0.25, 0, nan_gain, -1, 1e5, 1}, {}};
+  const cfp::LeastSquaresResult result = follow(script, options);
+  const double peak = 1.125 / 3 * 2 * 4 * 8,
+               expected[] = {1, 1.0 / 3, 1.0 / 3, 1.125 / 3, 1.125 / 3 * 2, 1.125 / 3 * 2 * 4, peak, peak / 3};
+  REQUIRE(script.dampings.size() == 8);
+  for (std::size_t i = 0; i < 8; ++i) CHECK_THAT(script.dampings[i], WithinAbs(expected[i], 1e-12));
+  CHECK(result.accepted == 5);
+  CHECK(result.status == cfp::SolverStatus::iteration_limit);
 }
 
-TEST_CASE("The damping stays in its range and is exhausted only after a refusal at the limit",
-          "[optimization][least_squares]") {
+TEST_CASE("The damping stays in its range, and a refusal at the limit ends the loop", "[optimization][least_squares]") {
   cfp::LevenbergMarquardtOptions options;
   options.min_damping = 0.5;
   options.initial_damping = 1;
   options.max_damping = 4;
-  cfp::Damping damping(options);
-  for (int i = 0; i < 5; ++i) CHECK(damping.accept(1));
-  CHECK(damping.value() == 0.5);
-  damping.reject();
-  damping.reject();
-  CHECK(damping.value() == 4);
-  CHECK_FALSE(damping.exhausted());
-  damping.reject();
-  CHECK(damping.exhausted());
-  CHECK(damping.value() == 4);
+  Script script{{1, 1, 1, 1, 1, -1, -1, -1, 1, 1}, {}};
+  const cfp::LeastSquaresResult result = follow(script, options);
+  CHECK(script.dampings == std::vector<double>{1, 0.5, 0.5, 0.5, 0.5, 0.5, 1, 4});
+  CHECK(result.status == cfp::SolverStatus::no_decrease);
 }
 
 TEST_CASE("A refused step raises the damping to its floor, and small damping falls to the minimum",
@@ -49,16 +63,9 @@ TEST_CASE("A refused step raises the damping to its floor, and small damping fal
   options.initial_damping = 0;
   options.min_damping = 0;
   options.rejected_damping = 1e-3;
-  cfp::Damping damping(options);
-  CHECK(damping.value() == 0);
-  damping.reject();
-  CHECK(damping.value() == 1e-3);
-  damping.reject();
-  CHECK(damping.value() == 4e-3);
-  CHECK(damping.accept(1));
-  CHECK_THAT(damping.value(), WithinAbs(4e-3 / 3, 1e-15));
-  CHECK(damping.accept(1));
-  CHECK(damping.value() == 0);
+  Script script{{-1, -1, 1, 1, 1}, {}};
+  (void)follow(script, options);
+  CHECK(script.dampings == std::vector<double>{0, 1e-3, 4e-3, 4e-3 * (1.0 / 3), 0});
 }
 
 namespace {

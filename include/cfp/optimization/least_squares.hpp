@@ -59,53 +59,12 @@ inline namespace CFP_ISA {
   return {};
 }
 
-/// The damping factor lambda of (H + lambda D) h = -g, and the decision about each step.
-class Damping {
- public:
-  explicit Damping(const LevenbergMarquardtOptions& options) noexcept
-      : min_(options.min_damping),
-        rejected_((std::min)(options.rejected_damping, options.max_damping)),
-        max_(options.max_damping),
-        value_(clamped(options.initial_damping)) {}
-
-  [[nodiscard]] double value() const noexcept { return value_; }
-  /// Whether the last step was refused; then a small promise means a short step, not an optimum.
-  [[nodiscard]] bool last_step_rejected() const noexcept { return growth_ > 2; }
-  /// True once the damping was at its limit and the step was refused there, too.
-  [[nodiscard]] bool exhausted() const noexcept { return exhausted_; }
-
-  /// Judges a step by gain = (cost before - cost after) / (predicted decrease); NaN is refused. Accepted (gain above
-  /// 1e-3): lambda shrinks by max(1/3, 1 - (2 gain - 1)^3), and does not grow for gain >= 1/2; below
-  /// rejected_damping it falls to min_damping at once. Refused: lambda grows 2, 4, 8, … times.
-  bool accept(double gain) noexcept {
-    if (!(gain > 1e-3)) {
-      reject();
-      return false;
-    }
-    const double t = 2 * (std::min)(gain, 1.0) - 1;
-    value_ = clamped(value_ * (std::max)(1.0 / 3, 1 - t * t * t));
-    if (value_ < rejected_) value_ = min_;
-    growth_ = 2;
-    return true;
-  }
-  /// The step could not be computed or evaluated.
-  void reject() noexcept {
-    exhausted_ = value_ >= max_;
-    value_ = clamped((std::max)(value_ * growth_, rejected_));
-    growth_ *= 2;
-  }
-
- private:
-  [[nodiscard]] double clamped(double value) const noexcept { return (std::min)((std::max)(value, min_), max_); }
-
-  double min_, rejected_, max_;
-  double value_;
-  double growth_ = 2;
-  bool exhausted_ = false;
-};
-
 /// Runs the loop. The cost never rises; what the problem holds at the end belongs to the last accepted step. A system
 /// that is not positive definite is damped, or, with damping 0, ends as degenerate.
+///
+/// A step is judged by its gain = (cost before - cost after) / (predicted decrease); NaN is refused. Accepted (gain
+/// above 1e-3): the damping shrinks by max(1/3, 1 - (2 gain - 1)^3), and does not grow for gain >= 1/2; below
+/// rejected_damping it falls to min_damping at once. Refused: it grows 2, 4, 8, … times.
 template <typename Problem>
 LeastSquaresResult minimize_least_squares(Problem& problem, const LevenbergMarquardtOptions& options) {
   LeastSquaresResult result;
@@ -114,20 +73,29 @@ LeastSquaresResult minimize_least_squares(Problem& problem, const LevenbergMarqu
   if (!is_finite(cost)) return result;
   result.initial_cost = cost;
   result.status = SolverStatus::iteration_limit;
-  Damping damping(options);
+  const auto clamped = [&](double damping) {
+    return (std::min)((std::max)(damping, options.min_damping), options.max_damping);
+  };
+  const double rejected_damping = (std::min)(options.rejected_damping, options.max_damping);
+  double damping = clamped(options.initial_damping), growth = 2;
   while (result.iterations < options.max_iterations) {
     ++result.iterations;
-    const double promised = problem.propose(damping.value());
+    const double promised = problem.propose(damping);
     if (is_finite(promised)) {
       // A small promise says something about the minimum only where the damping is small, too.
-      const bool damped = damping.value() > (std::max)(options.initial_damping, options.rejected_damping);
+      const bool damped = damping > (std::max)(options.initial_damping, options.rejected_damping);
       const double enough = (std::max)(options.min_absolute_decrease, options.min_relative_decrease * cost);
       if (!(promised > (damped ? 0 : enough))) {
-        result.status = damping.last_step_rejected() ? SolverStatus::no_decrease : SolverStatus::converged;
+        // After a refusal it means a short step, not an optimum.
+        result.status = growth > 2 ? SolverStatus::no_decrease : SolverStatus::converged;
         break;
       }
-      const double next = problem.linearize_trial(), decrease = cost - next;
-      if (damping.accept(decrease / promised)) {
+      const double next = problem.linearize_trial(), decrease = cost - next, gain = decrease / promised;
+      if (gain > 1e-3) {
+        const double t = 2 * (std::min)(gain, 1.0) - 1;
+        damping = clamped(damping * (std::max)(1.0 / 3, 1 - t * t * t));
+        if (damping < rejected_damping) damping = options.min_damping;
+        growth = 2;
         problem.accept();
         ++result.accepted;
         cost = next;
@@ -135,16 +103,16 @@ LeastSquaresResult minimize_least_squares(Problem& problem, const LevenbergMarqu
         result.status = SolverStatus::converged;
         break;
       }
-    } else if (damping.value() > 0) {
-      damping.reject();
-    } else {
+    } else if (!(damping > 0)) {
       result.status = SolverStatus::degenerate;
       break;
     }
-    if (damping.exhausted()) {
+    if (damping >= options.max_damping) {
       result.status = SolverStatus::no_decrease;
       break;
     }
+    damping = clamped((std::max)(damping * growth, rejected_damping));
+    growth *= 2;
   }
   result.final_cost = cost;
   return result;
