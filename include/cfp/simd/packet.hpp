@@ -37,13 +37,6 @@ inline constexpr int native_lanes = static_cast<int>(Eigen::internal::packet_tra
 template <typename T>
 struct PacketMask {
   typename Eigen::internal::packet_traits<T>::type bits;
-
-  friend PacketMask operator&(const PacketMask& a, const PacketMask& b) noexcept {
-    return {Eigen::internal::pand(a.bits, b.bits)};
-  }
-  friend PacketMask operator|(const PacketMask& a, const PacketMask& b) noexcept {
-    return {Eigen::internal::por(a.bits, b.bits)};
-  }
 };
 
 /// native_lanes<T> numbers of type T. For registers and local arrays only: its alignment depends on flags, so no struct
@@ -74,7 +67,6 @@ struct BasicPacket {
   friend BasicPacket operator/(const BasicPacket& a, const BasicPacket& b) noexcept {
     return wrap(Eigen::internal::pdiv(a.bits, b.bits));
   }
-  friend BasicPacket operator-(const BasicPacket& a) noexcept { return wrap(Eigen::internal::pnegate(a.bits)); }
   BasicPacket& operator+=(const BasicPacket& b) noexcept { return *this = *this + b; }
 
   // A comparison with NaN is false.
@@ -85,7 +77,6 @@ struct BasicPacket {
     return {Eigen::internal::pcmp_le(a.bits, b.bits)};
   }
   friend Mask operator>(const BasicPacket& a, const BasicPacket& b) noexcept { return b < a; }
-  friend Mask operator>=(const BasicPacket& a, const BasicPacket& b) noexcept { return b <= a; }
 };
 
 namespace detail {
@@ -144,7 +135,7 @@ template <typename T>
 /// Conjunction of two conditions, of packets or of scalars.
 template <typename T>
 [[nodiscard]] PacketMask<T> both(const PacketMask<T>& a, const PacketMask<T>& b) noexcept {
-  return a & b;
+  return {Eigen::internal::pand(a.bits, b.bits)};
 }
 [[nodiscard]] constexpr bool both(bool a, bool b) noexcept { return a && b; }
 
@@ -162,11 +153,6 @@ template <typename T>
 // Found by argument-dependent lookup, as for dual numbers: `using std::sqrt; sqrt(x)` in a formula covers scalar and
 // packet.
 
-/// Within 2 units in the last place: Eigen refines the hardware estimate where that is faster; exact at 0.
-template <typename T>
-[[nodiscard]] BasicPacket<T> sqrt(const BasicPacket<T>& a) noexcept {
-  return BasicPacket<T>::wrap(Eigen::internal::psqrt(a.bits));
-}
 template <typename T>
 [[nodiscard]] BasicPacket<T> abs(const BasicPacket<T>& a) noexcept {
   return BasicPacket<T>::wrap(Eigen::internal::pabs(a.bits));
