@@ -3,28 +3,11 @@
 #pragma once
 
 #include <cmath>
-#include <cstdint>
-#include <cstring>
 #include <limits>
 
 #include "cfp/core/numeric.hpp"
 
 namespace cfp {
-namespace detail {
-inline namespace CFP_ISA {
-
-// The cube root of a positive number to 4 %: a third of the exponent, read from the bits.
-[[nodiscard]] inline double rough_cube_root(double x) noexcept {
-  std::uint64_t bits;
-  std::memcpy(&bits, &x, sizeof bits);
-  bits = bits / 3 + 0x2a9f7893782da1ceULL;
-  std::memcpy(&x, &bits, sizeof bits);
-  return x;
-}
-
-}  // namespace CFP_ISA
-}  // namespace detail
-
 inline namespace CFP_ISA {
 
 /// The real root of x^3 + a x^2 + b x + c farthest from the other two: never a double one, and exact to rounding unless
@@ -38,7 +21,7 @@ template <typename Scalar>
   const Scalar size = std::abs(r), square = size * size - q * q * q;
   Scalar t = 0;
   if (square > Scalar(0)) {  // one real root: Cardano
-    const Scalar sum = static_cast<Scalar>(detail::rough_cube_root(static_cast<double>(size + std::sqrt(square))));
+    const Scalar sum = std::cbrt(size + std::sqrt(square));
     t = sum + q / sum;
   } else if (q > Scalar(0)) {  // three: t = 2 sqrt(q) cos(acos(ratio) / 3), the cosine to 3e-4
     const Scalar root = std::sqrt(q), ratio = size / (q * root);
