@@ -70,9 +70,7 @@ static void instantiate_geometry() noexcept {
   use(&cfp::has_distance<Scalar>);
   use(&cfp::essential_from_pose<Scalar>);
   use(&cfp::epipolar_line<Scalar>);
-  use(&cfp::point_line_distance<Scalar>);
   use(&cfp::epipolar_distance<Scalar>);
-  use(&cfp::symmetric_epipolar_distance<Scalar>);
   use(&cfp::sampson_distance<Scalar>);
   use(&cfp::epipolar_distances<Scalar>);
   use(&cfp::nearest_fundamental<Scalar>);

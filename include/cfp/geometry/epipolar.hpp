@@ -20,6 +20,54 @@
 #include "cfp/math/se3.hpp"
 
 namespace cfp {
+
+namespace detail {
+inline namespace CFP_ISA {
+
+/// |numerator| / sqrt(norm_sq), or no_distance unless norm_sq > noise_sq >= 0 and the quotient is finite.
+template <typename Scalar>
+[[nodiscard]] Scalar ratio_distance(const Scalar& numerator, const Scalar& norm_sq, const Scalar& noise_sq) noexcept {
+  using std::abs;
+  using std::sqrt;
+  if (!(norm_sq > noise_sq)) return Scalar(no_distance<double>);
+  const Scalar distance = abs(numerator) / sqrt(norm_sq);
+  return has_distance(distance) ? distance : Scalar(no_distance<double>);
+}
+
+/// F over its largest coefficient, so that squares neither over- nor underflow; zero when F is zero or not finite.
+template <typename Scalar>
+[[nodiscard]] Matrix3<Scalar> unit_scale(const Matrix3<Scalar>& F) noexcept {
+  using std::abs;
+  Scalar largest(0);
+  for (Eigen::Index i = 0; i < 9; ++i) {
+    const Scalar size = abs(F(i));
+    if (!is_finite(size)) return Matrix3<Scalar>::Zero();
+    if (size > largest) largest = size;
+  }
+  if (!(largest > Scalar(0))) return Matrix3<Scalar>::Zero();
+  return F / largest;
+}
+
+/// Square of the size, per unit of |(u, v, 1)|, below which the normal of the line F (u, v, 1) is rounding noise.
+template <typename Scalar>
+[[nodiscard]] Scalar line_noise(const Matrix3<Scalar>& F) noexcept {
+  const Scalar tolerance(Tolerance<Scalar>::degenerate);
+  return tolerance * tolerance * F.template topRows<2>().squaredNorm();
+}
+
+/// epipolar_distance for an F of unit_scale, whose line_noise is given.
+template <typename Scalar>
+[[nodiscard]] Scalar scaled_epipolar_distance(const Matrix3<Scalar>& F, const Scalar& noise,
+                                              const Vector2<Scalar>& x_prev, const Vector2<Scalar>& x_cur) noexcept {
+  const Vector3<Scalar> line = F.col(0) * x_prev.x() + F.col(1) * x_prev.y() + F.col(2);
+  return ratio_distance(Scalar(line.x() * x_cur.x() + line.y() * x_cur.y() + line.z()),
+                        Scalar(line.x() * line.x() + line.y() * line.y()),
+                        Scalar(noise * (x_prev.squaredNorm() + Scalar(1))));
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
+
 inline namespace CFP_ISA {
 
 /// E = [t]x R of T_cur_prev = (R, t): y_cur^T E y_prev = 0 for rays y = K^-1 x. Zero when t is zero.
@@ -53,33 +101,6 @@ template <typename Scalar>
   return F.col(0) * x_prev.x() + F.col(1) * x_prev.y() + F.col(2);
 }
 
-/// |A u + B v + C| / sqrt(A^2 + B^2) in pixels; no_distance when A = B = 0 or the result is not finite.
-template <typename Scalar>
-[[nodiscard]] Scalar point_line_distance(const Vector3<Scalar>& line, const Vector2<Scalar>& point) noexcept {
-  const Scalar numerator = line.x() * point.x() + line.y() * point.y() + line.z();
-  return detail::ratio_distance(numerator, line.x() * line.x() + line.y() * line.y(), Scalar(0));
-}
-
-}  // namespace CFP_ISA
-
-namespace detail {
-inline namespace CFP_ISA {
-
-/// epipolar_distance for an F of unit_scale, whose line_noise is given.
-template <typename Scalar>
-[[nodiscard]] Scalar scaled_epipolar_distance(const Matrix3<Scalar>& F, const Scalar& noise,
-                                              const Vector2<Scalar>& x_prev, const Vector2<Scalar>& x_cur) noexcept {
-  const Vector3<Scalar> line = epipolar_line(F, x_prev);
-  return ratio_distance(Scalar(line.x() * x_cur.x() + line.y() * x_cur.y() + line.z()),
-                        Scalar(line.x() * line.x() + line.y() * line.y()),
-                        Scalar(noise * (x_prev.squaredNorm() + Scalar(1))));
-}
-
-}  // namespace CFP_ISA
-}  // namespace detail
-
-inline namespace CFP_ISA {
-
 /// The paper's d = |x_cur^T F x_prev| / sqrt(A^2 + B^2), (A, B, C) = F x_prev: distance in pixels of the current point
 /// to the line of the previous one. no_distance where sqrt(A^2 + B^2) is below Tolerance::degenerate times the size of
 /// the terms it is summed from: such a line is rounding noise.
@@ -88,17 +109,6 @@ template <typename Scalar>
                                        const Vector2<Scalar>& x_cur) noexcept {
   const Matrix3<Scalar> G = detail::unit_scale(F);
   return detail::scaled_epipolar_distance(G, detail::line_noise(G), x_prev, x_cur);
-}
-
-/// Mean of the distances in both images, in pixels: invariant when the two views change roles (F becomes F^T).
-/// no_distance when either has none.
-template <typename Scalar>
-[[nodiscard]] Scalar symmetric_epipolar_distance(const Matrix3<Scalar>& F, const Vector2<Scalar>& x_prev,
-                                                 const Vector2<Scalar>& x_cur) noexcept {
-  const Scalar in_cur = epipolar_distance(F, x_prev, x_cur);
-  const Scalar in_prev = epipolar_distance(Matrix3<Scalar>(F.transpose()), x_cur, x_prev);
-  return has_distance(in_cur) && has_distance(in_prev) ? Scalar(0.5) * in_cur + Scalar(0.5) * in_prev
-                                                       : Scalar(no_distance<double>);
 }
 
 /// |x_cur^T F x_prev| / sqrt(A^2 + B^2 + A'^2 + B'^2), (A', B', C') = F^T x_cur: to first order the distance in pixels

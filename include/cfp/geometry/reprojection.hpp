@@ -21,14 +21,9 @@
 namespace cfp {
 
 namespace detail {
-inline namespace CFP_ISA {
-/// Largest depth that is back-projected: beyond it a moved point may overflow, which would project to a wrong but
-/// finite pixel.
-template <typename Scalar>
-[[nodiscard]] constexpr Scalar max_reprojected_depth() noexcept {
-  return Scalar(1e-6) * (std::numeric_limits<Scalar>::max)();
-}
-}  // namespace CFP_ISA
+// Largest depth that is back-projected, as a share of the largest number: beyond it a moved point may overflow, which
+// would project to a wrong but finite pixel.
+inline constexpr double max_reprojected_share = 1e-6;
 }  // namespace detail
 
 inline namespace CFP_ISA {
@@ -41,8 +36,8 @@ template <typename Camera, typename Scalar>
   using std::sqrt;
   Vector3<Scalar> ray = Vector3<Scalar>::Zero();
   Vector2<Scalar> projected = Vector2<Scalar>::Zero();
-  if (!(depth_prev > Scalar(0) && depth_prev <= Scalar(detail::max_reprojected_depth<Scalar>())))
-    return Scalar(no_distance<double>);
+  const Scalar max_depth = Scalar(detail::max_reprojected_share) * (std::numeric_limits<Scalar>::max)();
+  if (!(depth_prev > Scalar(0) && depth_prev <= max_depth)) return Scalar(no_distance<double>);
   if (!camera.unproject(pixel_prev, ray)) return Scalar(no_distance<double>);
   const Vector3<Scalar> point = ray * depth_prev;
   if (!camera.project(T_cur_prev * point, projected)) return Scalar(no_distance<double>);
@@ -72,6 +67,7 @@ void reprojection_distances(const PointSpan<non_deduced<Scalar>, 2>& prev, span<
   const Matrix3<Scalar>& R = T_cur_prev.rotation;
   const Vector3<Scalar>& t = T_cur_prev.translation;
   const Scalar inv_fx = Scalar(1) / camera.fx, inv_fy = Scalar(1) / camera.fy;
+  const Scalar max_depth = Scalar(detail::max_reprojected_share) * (std::numeric_limits<Scalar>::max)();
   for (std::size_t i = 0; i < out.size(); ++i) {
     const Scalar x = (prev(i, 0) - camera.cx) * inv_fx, y = (prev(i, 1) - camera.cy) * inv_fy, depth = depth_prev[i];
     const Scalar z = depth * (R(2, 0) * x + R(2, 1) * y + R(2, 2)) + t[2];
@@ -80,8 +76,8 @@ void reprojection_distances(const PointSpan<non_deduced<Scalar>, 2>& prev, span<
     const Scalar v = camera.fy * ((depth * (R(1, 0) * x + R(1, 1) * y + R(1, 2)) + t[1]) * inv_z);
     const Scalar du = u + (camera.cx - cur(i, 0)), dv = v + (camera.cy - cur(i, 1));
     const Scalar distance = std::sqrt(du * du + dv * dv);
-    const bool valid = depth > Scalar(0) && depth <= detail::max_reprojected_depth<Scalar>() &&
-                       z > Tolerance<Scalar>::min_depth && has_distance(distance);
+    const bool valid =
+        depth > Scalar(0) && depth <= max_depth && z > Tolerance<Scalar>::min_depth && has_distance(distance);
     out[i] = valid ? distance : no_distance<Scalar>;
   }
 }
