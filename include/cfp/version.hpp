@@ -56,3 +56,11 @@
     "cfp: -ffinite-math-only (part of -ffast-math) removes the NaN checks that cfp's guarantees rest on; it is not supported."
 #endif
 #endif
+
+// Programmer errors only (two arrays of different length, a null view, unsorted input where sorted is required); never
+// bad data, which gets a status. On in debug builds; define CFP_ASSERT yourself, before the first cfp header and
+// equally in every unit of a program, to route it elsewhere.
+#ifndef CFP_ASSERT
+#include <cassert>
+#define CFP_ASSERT(condition) assert(condition)
+#endif

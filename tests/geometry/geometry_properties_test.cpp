@@ -3,13 +3,13 @@
 #include <vector>
 
 #include "cfp/geometry/box.hpp"
+#include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/depth_noise.hpp"
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/fundamental.hpp"
 #include "cfp/geometry/homography.hpp"
 #include "cfp/geometry/motion_distance.hpp"
 #include "cfp/geometry/p3p.hpp"
-#include "cfp/geometry/undistort.hpp"
 #include "cfp_testing/generators.hpp"
 #include "support/properties.hpp"
 
@@ -150,15 +150,13 @@ CFP_PROPERTIES(
        return std::abs(cfp::epipolar_distance(F, prev, cur) - cfp::epipolar_distance(other, prev, cur)) < 1e-9 &&
               std::abs(cfp::sampson_distance(F, prev, cur) - cfp::sampson_distance(other, prev, cur)) < 1e-9;
      }},
-    {"Sampson and symmetric distance do not care which view is the first", 300,
+    {"the Sampson distance does not care which view is the first", 300,
      [](Random& random) {
        const Matrix3<double> F = cfp::fundamental_from_pose(cfp_testing::pinhole_camera<double>(random),
                                                             motion(random)),
                              back = F.transpose();
        const Vector2<double> prev = cfp_testing::pixel(random), cur = cfp_testing::pixel(random);
-       return std::abs(cfp::sampson_distance(F, prev, cur) - cfp::sampson_distance(back, cur, prev)) < 1e-9 &&
-              std::abs(cfp::symmetric_epipolar_distance(F, prev, cur) -
-                       cfp::symmetric_epipolar_distance(back, cur, prev)) < 1e-9;
+       return std::abs(cfp::sampson_distance(F, prev, cur) - cfp::sampson_distance(back, cur, prev)) < 1e-9;
      }},
     {"a rotation of the camera is a homography: its pixels have distance 0, and batches equal single calls", 300,
      [](Random& random) {

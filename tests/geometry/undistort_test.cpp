@@ -1,4 +1,4 @@
-#include "cfp/geometry/undistort.hpp"
+#include "cfp/geometry/camera.hpp"
 
 #include <array>
 #include <cmath>

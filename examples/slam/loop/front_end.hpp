@@ -12,7 +12,7 @@
 
 #include "../../detection/detector_types.hpp"
 #include "../../support/sequence.hpp"
-#include "cfp/geometry/undistort.hpp"
+#include "cfp/geometry/camera.hpp"
 #include "cfp/interop/opencv.hpp"
 #include "cfp/interop/opencv_flow.hpp"
 #include "observer.hpp"

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "cfp/clustering/dbscan.hpp"
-#include "cfp/core/assert.hpp"
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
@@ -47,18 +46,6 @@ struct AdaptiveOptions {
   if (!(o.density > 0.0 && o.density <= 1.0)) return "density";
   return {};
 }
-
-namespace detail {
-inline namespace CFP_ISA {
-
-// Position of a share in [0, 1) of n > 0 ascending values.
-[[nodiscard]] constexpr std::size_t position_of_share(double share, std::size_t n) noexcept {
-  const auto at = static_cast<std::size_t>(share * static_cast<double>(n));
-  return at < n ? at : n - 1;
-}
-
-}  // namespace CFP_ISA
-}  // namespace detail
 
 inline namespace CFP_ISA {
 

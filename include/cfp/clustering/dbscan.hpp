@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "cfp/clustering/sorted_values.hpp"
-#include "cfp/core/assert.hpp"
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
@@ -55,6 +54,12 @@ template <typename Scalar>
 [[nodiscard]] constexpr Scalar radius(double eps) noexcept {
   return eps < static_cast<double>((std::numeric_limits<Scalar>::max)()) ? static_cast<Scalar>(eps)
                                                                          : (std::numeric_limits<Scalar>::max)();
+}
+
+// Position of a share in [0, 1) of n > 0 ascending values.
+[[nodiscard]] constexpr std::size_t position_of_share(double share, std::size_t n) noexcept {
+  const auto at = static_cast<std::size_t>(share * static_cast<double>(n));
+  return at < n ? at : n - 1;
 }
 
 // neighbours[i] = how many of the ascending values lie within eps of value i, itself included.

@@ -11,7 +11,6 @@
 #include "cfp/clustering/adaptive.hpp"
 #include "cfp/clustering/dbscan.hpp"
 #include "cfp/clustering/sorted_values.hpp"
-#include "cfp/core/assert.hpp"
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"

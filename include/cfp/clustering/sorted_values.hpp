@@ -8,7 +8,6 @@
 #include <limits>
 #include <vector>
 
-#include "cfp/core/assert.hpp"
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 

@@ -13,7 +13,6 @@
 #include <cstddef>
 #include <string>
 
-#include "cfp/core/assert.hpp"
 #include "cfp/core/numeric.hpp"
 #include "cfp/version.hpp"
 

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdint>
 
-#include "cfp/core/assert.hpp"
 #include "cfp/core/numeric.hpp"
 
 namespace cfp {

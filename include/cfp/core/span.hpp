@@ -10,7 +10,7 @@
 
 #include <Eigen/Core>
 
-#include "cfp/core/assert.hpp"
+#include "cfp/version.hpp"
 
 namespace cfp {
 
@@ -45,18 +45,13 @@ struct is_span : std::false_type {};
 template <typename T>
 struct is_span<span<T>> : std::true_type {};
 
-template <typename T>
-struct same_type {
-  using type = T;
-};
-
 }  // namespace detail
 
 /// T, not deduced. Scalar deduces from one argument of a call, a workspace, a model or an output struct; every other
 /// parameter is a `span<const non_deduced<Scalar>>`, to which a std::vector converts. Where nothing else carries the
 /// Scalar, the function takes `const Range&` and reads it as `range_value_t<Range>`.
 template <typename T>
-using non_deduced = typename detail::same_type<T>::type;
+using non_deduced = std::common_type_t<T>;
 
 /// The element type of a contiguous range, without const.
 template <typename Range>
@@ -136,12 +131,10 @@ class PointSpan {
         point_stride_(point_stride_bytes),
         coordinate_stride_(coordinate_stride_bytes) {}
   /// From any contiguous container of std::array<Scalar, Dim> or Eigen column vectors.
-  template <typename C,
-            typename Element = std::remove_cv_t<std::remove_pointer_t<decltype(std::declval<const C&>().data())>>,
-            std::enable_if_t<detail::is_point<Element, Scalar, Dim>::value, int> = 0>
+  template <typename C, std::enable_if_t<detail::is_point<range_value_t<C>, Scalar, Dim>::value, int> = 0>
   PointSpan(const C& points) noexcept
       : PointSpan(reinterpret_cast<const Scalar*>(points.data()), static_cast<std::size_t>(points.size()),
-                  sizeof(Element)) {}
+                  sizeof(range_value_t<C>)) {}
   /// From an Eigen matrix, map or block with one point per column, whatever its strides. What has no memory of its own,
   /// a product or a cast, does not compile.
   template <typename Derived,

@@ -13,7 +13,6 @@
 #include <utility>
 #include <vector>
 
-#include "cfp/core/assert.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/status.hpp"
 

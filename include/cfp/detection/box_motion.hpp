@@ -3,7 +3,7 @@
 /// width and height positive however long a box is predicted. The paper (IV-A) names an EKF and leaves state, noise and
 /// time open.
 ///
-/// Motion: constant rates, white noise on the accelerations (rate_filter.hpp).
+/// Motion: constant rates, white noise on the accelerations (RateFilter).
 /// Measurement: the four edges, h = (u - w/2, u + w/2, v - h/2, v + h/2) with w = exp(log width): not linear, hence an
 /// EKF. The noise of an edge is proportional to the box, s_x = edge_noise * w for the vertical edges and s_y =
 /// edge_noise * h for the horizontal ones, w and h of the prediction.
@@ -23,7 +23,6 @@
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/types.hpp"
-#include "cfp/detection/rate_filter.hpp"
 #include "cfp/geometry/box.hpp"
 
 namespace cfp {
@@ -45,6 +44,36 @@ struct BoxMotionOptions {
   if (!(o.initial_size_rate > 0 && o.initial_size_rate <= 1e6)) return "initial_size_rate";
   return {};
 }
+
+/// Kalman filter of one value that changes at a nearly constant rate: x <- x + dt x', white noise on the acceleration
+/// of spectral density q^2, so Q = q^2 [dt^3/3, dt^2/2; dt^2/2, dt], and one step of 2 dt equals two steps of dt.
+/// A value, its rate per second, and their covariance.
+template <typename Scalar>
+struct RateFilter {
+  Scalar value{}, rate{};
+  Scalar var_value{}, covariance{}, var_rate{};
+
+  /// dt >= 0 seconds ahead; q: square root of the spectral density of the acceleration.
+  CFP_INLINE constexpr void predict(Scalar dt_s, Scalar q) noexcept {
+    const Scalar noise = q * q * dt_s;
+    value += dt_s * rate;
+    var_value += dt_s * (Scalar(2) * covariance + dt_s * (var_rate + noise / Scalar(3)));
+    covariance += dt_s * (var_rate + noise / Scalar(2));
+    var_rate += noise;
+  }
+  /// Takes in a measurement of the value by its innovation. Joseph's form, written out. Ignored when not finite.
+  CFP_INLINE constexpr void correct(Scalar innovation, Scalar variance) noexcept {
+    const Scalar s = var_value + variance;
+    if (!(s > Scalar(0)) || !is_finite(innovation) || !is_finite(s)) return;
+    const Scalar k = var_value / s, k_rate = covariance / s, rest = variance / s;  // rest = 1 - k, without cancellation
+    value += k * innovation;
+    rate += k_rate * innovation;
+    var_rate = var_rate - Scalar(2) * k_rate * covariance + k_rate * k_rate * s;
+    covariance *= rest;
+    var_value *= rest;
+    if (!(var_rate > Scalar(0))) var_rate = Scalar(0);
+  }
+};
 
 /// The box filter in its split form.
 template <typename Scalar>

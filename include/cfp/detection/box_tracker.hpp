@@ -12,7 +12,6 @@
 #include <tuple>
 #include <vector>
 
-#include "cfp/core/assert.hpp"
 #include "cfp/core/types.hpp"
 #include "cfp/detection/assignment.hpp"
 #include "cfp/detection/box_association.hpp"

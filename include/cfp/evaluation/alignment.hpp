@@ -10,7 +10,6 @@
 
 #include <Eigen/Core>
 
-#include "cfp/core/assert.hpp"
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/status.hpp"
 #include "cfp/core/types.hpp"

@@ -13,9 +13,9 @@
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
 #include "cfp/frame/weigh_keypoints.hpp"
+#include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/reprojection.hpp"
-#include "cfp/geometry/undistort.hpp"
 #include "cfp/probability/distance_sigmoid.hpp"
 #include "cfp/probability/second_stage_probability.hpp"
 

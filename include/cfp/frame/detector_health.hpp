@@ -8,7 +8,6 @@
 #include <optional>
 #include <vector>
 
-#include "cfp/core/assert.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/detection/box_tracker_types.hpp"

@@ -9,7 +9,7 @@
 #include "cfp/frame/flow_model.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
-#include "cfp/geometry/undistort.hpp"
+#include "cfp/geometry/camera.hpp"
 #include "cfp/probability/object_memory.hpp"
 
 namespace cfp {

@@ -15,7 +15,6 @@
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/homography.hpp"
-#include "cfp/geometry/undistort.hpp"
 #include "cfp/robust/fundamental_ransac.hpp"
 
 namespace cfp {

@@ -13,7 +13,6 @@
 
 #include <Eigen/Core>
 
-#include "cfp/core/assert.hpp"
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"

@@ -9,16 +9,101 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 #include <Eigen/Core>
 
 #include "cfp/core/status.hpp"
 #include "cfp/core/types.hpp"
-#include "cfp/geometry/fundamental_impl.hpp"
 #include "cfp/geometry/point_pairs.hpp"
+#include "cfp/math/cubic.hpp"
 #include "cfp/math/matrix3.hpp"
 
 namespace cfp {
+
+namespace detail {
+inline namespace CFP_ISA {
+
+// Null space of the seven epipolar equations by elimination with complete pivoting (rows and columns), which stays
+// exact when any of the nine coefficients vanishes (pure translations do that). False when the rank is below seven.
+template <typename T>
+[[nodiscard]] bool seven_point_null_space(T (&A)[7][9], Matrix3<T>& F1, Matrix3<T>& F2) noexcept {
+  int column[9] = {0, 1, 2, 3, 4, 5, 6, 7, 8};
+  T first_pivot = 0;
+  for (int k = 0; k < 7; ++k) {
+    int pivot_row = k, pivot_col = k;
+    T pivot = 0;
+    for (int r = k; r < 7; ++r) {
+      for (int c = k; c < 9; ++c) {
+        const T value = std::abs(A[r][c]);
+        if (value > pivot) pivot = value, pivot_row = r, pivot_col = c;
+      }
+    }
+    if (k == 0) first_pivot = pivot;
+    if (!(pivot > T(1e-12) * first_pivot)) return false;
+    if (pivot_row != k) std::swap(A[k], A[pivot_row]);
+    if (pivot_col != k) {
+      for (auto& row : A) std::swap(row[k], row[pivot_col]);
+      std::swap(column[k], column[pivot_col]);
+    }
+    const T inverse = 1 / A[k][k];
+    for (int c = k + 1; c < 9; ++c) A[k][c] *= inverse;
+    for (int r = k + 1; r < 7; ++r) {
+      const T factor = A[r][k];
+      for (int c = k + 1; c < 9; ++c) A[r][c] -= factor * A[k][c];
+    }
+  }
+  for (int free = 0; free < 2; ++free) {
+    T x[9];
+    x[7] = free == 0 ? 1 : 0;
+    x[8] = free == 0 ? 0 : 1;
+    for (int k = 6; k >= 0; --k) {
+      x[k] = 0;
+      for (int c = k + 1; c < 9; ++c) x[k] -= A[k][c] * x[c];
+    }
+    Matrix3<T>& F = free == 0 ? F1 : F2;
+    for (int k = 0; k < 9; ++k) F(column[k] / 3, column[k] % 3) = x[k];
+    F.normalize();
+  }
+  return true;
+}
+
+// Seven-point solver on scaled pixels: the matrices of the pencil through the null space whose determinant vanishes.
+template <typename T>
+[[nodiscard]] int solve_seven_point(const std::array<Vector2<T>, 7>& p, const std::array<Vector2<T>, 7>& q,
+                                    std::array<Matrix3<T>, 3>& F) noexcept {
+  T A[7][9];
+  for (std::size_t i = 0; i < 7; ++i) {
+    for (int r = 0; r < 3; ++r) {
+      const T factor = r < 2 ? q[i][r] : T(1);
+      A[i][3 * r] = factor * p[i][0], A[i][3 * r + 1] = factor * p[i][1], A[i][3 * r + 2] = factor;
+    }
+  }
+  Matrix3<T> a, b;
+  if (!seven_point_null_space(A, a, b)) return 0;
+  // det(a + x b) has at most three roots, so among four members of the pencil one has a determinant well away from
+  // zero: that one as b makes the cubic's leading coefficient safe and leaves no root at infinity.
+  const Matrix3<T> candidates[4] = {b, a, (a + b).normalized(), (a - b).normalized()};
+  int best = 0;
+  T det_b = determinant(candidates[0]);
+  for (int k = 1; k < 4; ++k) {
+    const T det = determinant(candidates[k]);
+    if (std::abs(det) > std::abs(det_b)) best = k, det_b = det;
+  }
+  if (best == 1) a = b;
+  b = candidates[best];
+  if (!(std::abs(det_b) > 0)) return 0;
+  // Coefficients of det(a + x b): det a, tr(adj(a) b), tr(a adj(b)), det b.
+  T roots[3];
+  const int count = real_cubic_roots(cofactors(b).cwiseProduct(a).sum() / det_b,
+                                     cofactors(a).cwiseProduct(b).sum() / det_b, determinant(a) / det_b, roots);
+  for (int k = 0; k < count; ++k) F[static_cast<std::size_t>(k)] = (a + roots[k] * b).normalized();
+  return count;
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
+
 inline namespace CFP_ISA {
 
 /// The matrix of rank at most 2 nearest to F (Frobenius), scaled to unit norm; zero for an F that is zero or not

@@ -12,7 +12,6 @@
 #include <cstddef>
 #include <limits>
 
-#include "cfp/core/assert.hpp"
 #include "cfp/core/span.hpp"
 
 namespace cfp {

@@ -38,14 +38,6 @@ struct FundamentalRansacWorkspace {
   std::vector<double> distances_sq, scratch;
 };
 
-inline namespace CFP_ISA {
-
-[[nodiscard]] inline OptionPath invalid_field(const FundamentalRansacOptions& options) noexcept {
-  return invalid_field(options, 8);
-}
-
-}  // namespace CFP_ISA
-
 namespace detail {
 inline namespace CFP_ISA {
 
@@ -115,6 +107,10 @@ template <typename Scalar>
 }  // namespace detail
 
 inline namespace CFP_ISA {
+
+[[nodiscard]] inline OptionPath invalid_field(const FundamentalRansacOptions& options) noexcept {
+  return invalid_field(options, 8);
+}
 
 /// Robust F of pairs: `fundamental_ransac(PointPairs{previous, current}, options, workspace)`. Weights multiply the
 /// score, sum w min(d^2 / T^2, 1), and the refinement's loss, and steer the sampling; the inlier test sees the Sampson

@@ -8,7 +8,6 @@
 
 #include <Eigen/Core>
 
-#include "cfp/core/assert.hpp"
 #include "cfp/core/types.hpp"
 #include "cfp/math/matrix3.hpp"
 #include "cfp/math/normal_equations.hpp"

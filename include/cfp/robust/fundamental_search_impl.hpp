@@ -15,7 +15,7 @@
 #include <Eigen/Core>
 
 #include "cfp/core/random.hpp"
-#include "cfp/geometry/fundamental_impl.hpp"
+#include "cfp/geometry/fundamental.hpp"
 #include "cfp/math/matrix3.hpp"
 #include "cfp/robust/fundamental_pairs_impl.hpp"
 #include "cfp/robust/fundamental_refine_impl.hpp"

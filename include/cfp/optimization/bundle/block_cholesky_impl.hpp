@@ -13,7 +13,6 @@
 
 #include <Eigen/Core>
 
-#include "cfp/core/assert.hpp"
 #include "cfp/core/span.hpp"
 
 namespace cfp::detail {
