@@ -62,13 +62,8 @@ inline float weight_with(const CalibrationSample& sample, const CalibratedOption
   if (known.foreground && !known.box_associated) return 0;
   cfp::MapPointOptions options = run.probability.map_point;
   options.constraint_power = chosen.constraint_power;
-  const bool judged = sample.flow >= 0;
-  const float o = judged ? sample.flow : known.object_probability;
-  const float e = cfp::first_stage_evidence(o, judged || known.foreground, threshold);
-  const cfp::SecondStageRule rule = cfp::second_stage_rule(known, threshold);
-  const bool silent =
-      rule == cfp::SecondStageRule::unmatched_foreground || rule == cfp::SecondStageRule::unmatched_background;
-  const float k = silent ? 0.5F : cfp::second_stage_probability(known, threshold);
+  const float e = cfp::first_stage_evidence(sample.flow, known.object_probability, known.foreground, threshold);
+  const float k = cfp::second_stage_evidence(known, threshold);
   return cfp::posterior_probability(k, std::min(e, 0.5F), sample.map_point, options);
 }
 

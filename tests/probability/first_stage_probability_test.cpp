@@ -63,3 +63,16 @@ TEMPLATE_TEST_CASE("What the first stage says of a map point is O's odds against
     CHECK(cfp::first_stage_evidence(S(o), false, S(0.9)) == S(0.5));
   }
 }
+
+TEMPLATE_TEST_CASE("Flow at a keypoint's own place speaks in the place of its object, on it and behind it",
+                   "[probability]", float, double) {
+  using S = TestType;
+  const S threshold = S(0.9), object = S(0.2);
+  for (const bool foreground : {true, false}) {
+    CHECK(cfp::first_stage_evidence(S(0.6), object, foreground, threshold) ==
+          cfp::first_stage_evidence(S(0.6), true, threshold));
+    for (const S none : {S(-1), std::numeric_limits<S>::quiet_NaN()})
+      CHECK(cfp::first_stage_evidence(none, object, foreground, threshold) ==
+            cfp::first_stage_evidence(object, foreground, threshold));
+  }
+}

@@ -98,3 +98,24 @@ TEMPLATE_TEST_CASE("The second stage keeps its range for hostile input", "[proba
     }
   }
 }
+
+TEST_CASE("As evidence beside M, what no constraint judges says nothing, on the object and behind it",
+          "[probability]") {
+  cfp::SecondStageKeypoint<double> p;
+  p.projection = {0.8, 0.4, true};
+  p.matched = true;
+  p.map_point_probability = 0.7;
+  CHECK(cfp::second_stage_evidence(p, 0.9) == cfp::second_stage_probability(p, 0.9));
+  for (const bool foreground : {true, false}) {
+    p.foreground = foreground;
+    p.matched = false;
+    CHECK(cfp::second_stage_evidence(p, 0.9) == 0.5);
+    p.matched = true;
+    p.projection.available = false;
+    CHECK(cfp::second_stage_evidence(p, 0.9) == 0.5);
+    p.projection.available = true;
+  }
+  p.foreground = true;
+  p.box_associated = false;
+  CHECK(cfp::second_stage_evidence(p, 0.9) == 0);  // its match is false, whatever it says
+}

@@ -158,9 +158,8 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
     keypoint.matched = is_finite(scratch.points[i][0]) && is_finite(scratch.points[i][1]);
     keypoint.box_associated = state.boxes[b].associated;
     const Scalar threshold = static_cast<Scalar>(options.object_threshold);
-    const SecondStageRule rule = second_stage_rule(keypoint, threshold);
-    const bool silent = rule == SecondStageRule::unmatched_foreground || rule == SecondStageRule::unmatched_background;
-    state.static_probability[i] = posterior && silent ? Scalar(0.5) : second_stage_probability(keypoint, threshold);
+    state.static_probability[i] =
+        posterior ? second_stage_evidence(keypoint, threshold) : second_stage_probability(keypoint, threshold);
     ++state.report.constrained;
   }
 }

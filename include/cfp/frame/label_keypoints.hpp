@@ -55,7 +55,8 @@ bool separate_foreground(const TrackedBox<Scalar>& box, const CoarseOptions& opt
 /// camera's motion judges a pair with depth well enough for that; after estimate_objects.
 template <typename Scalar>
 void score_flow_at_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
-  if (state.report.flow_model != FlowModelKind::motion || frame.flow.previous_depths.empty()) return;
+  const Scalar radius_px = static_cast<Scalar>(options.coarse.flow_radius_px);
+  if (radius_px <= 0 || state.report.flow_model != FlowModelKind::motion || frame.flow.previous_depths.empty()) return;
   const ObjectProbabilityOptions scored = scaled_to_noise(options.coarse.object, state.report.flow_sigma_px, 2);
   FrameScratch<Scalar>& scratch = state.scratch;
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
@@ -71,7 +72,7 @@ void score_flow_at_keypoints(const Frame<Scalar>& frame, const FrameOptions& opt
     for (std::size_t i = 0; i < state.size(); ++i) {
       if (state.box[i] != static_cast<std::int32_t>(b)) continue;
       const auto& [x, y] = state.current.keypoints[i];
-      Scalar nearest_sq = Scalar(options.coarse.flow_radius_px * options.coarse.flow_radius_px), distance = Scalar(-1);
+      Scalar nearest_sq = radius_px * radius_px, distance = Scalar(-1);
       for (std::size_t p = 0; p < scratch.points.size(); ++p) {
         const Scalar dx = scratch.points[p][0] - x, dy = scratch.points[p][1] - y, apart_sq = dx * dx + dy * dy;
         if (!(apart_sq < nearest_sq)) continue;

@@ -21,15 +21,14 @@ template <typename Scalar>
   return state.label[i] == KeypointLabel::foreground && !state.boxes[static_cast<std::size_t>(state.box[i])].associated;
 }
 
-/// E of keypoint i, which must be in a box: first_stage_evidence of the flow at its place, which tells a part that
-/// moves from one that rests, or where there is none of its object.
+/// E of keypoint i, which must be in a box: first_stage_evidence of the flow at its place or, without, of its object.
 template <typename Scalar>
 [[nodiscard]] Scalar first_stage_evidence(std::size_t i, const FrameOptions& options,
                                           const FrameState<Scalar>& state) noexcept {
-  const bool judged = state.flow_probability[i] >= Scalar(0), foreground = state.label[i] == KeypointLabel::foreground;
-  const double o = judged ? static_cast<double>(state.flow_probability[i])
-                          : state.objects[static_cast<std::size_t>(state.box[i])].static_probability;
-  return static_cast<Scalar>(first_stage_evidence(o, judged || foreground, options.object_threshold));
+  const double o = state.objects[static_cast<std::size_t>(state.box[i])].static_probability;
+  return static_cast<Scalar>(first_stage_evidence(static_cast<double>(state.flow_probability[i]), o,
+                                                  state.label[i] == KeypointLabel::foreground,
+                                                  options.object_threshold));
 }
 
 /// M of a map point of which nothing is known when keypoint i observes it: 1 outside all boxes and by the printed

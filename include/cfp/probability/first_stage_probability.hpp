@@ -51,5 +51,14 @@ template <typename Scalar>
   return is_static / (is_static + moves);
 }
 
+/// The same where the flow at the keypoint's own place was scored (negative: it was not): that score stands for O, on
+/// the object and behind it.
+template <typename Scalar>
+[[nodiscard]] constexpr Scalar first_stage_evidence(Scalar flow_probability, Scalar object_probability, bool foreground,
+                                                    Scalar object_threshold) noexcept {
+  return flow_probability >= Scalar(0) ? first_stage_evidence(flow_probability, true, object_threshold)
+                                       : first_stage_evidence(object_probability, foreground, object_threshold);
+}
+
 }  // namespace CFP_ISA
 }  // namespace cfp

@@ -105,5 +105,14 @@ template <typename Scalar>
   }
 }
 
+/// What the constraints say of a keypoint whose map point's M is the prior: K by the rules above, and 1/2, nothing, of
+/// one that no constraint judges. In [0, 1]. Not in the paper, whose K is 0 or M then.
+template <typename Scalar>
+[[nodiscard]] constexpr Scalar second_stage_evidence(const SecondStageKeypoint<Scalar>& keypoint,
+                                                     Scalar object_threshold) noexcept {
+  const bool from_nowhere = keypoint.foreground && !keypoint.box_associated;
+  return from_nowhere || is_judged(keypoint) ? second_stage_probability(keypoint, object_threshold) : Scalar(0.5);
+}
+
 }  // namespace CFP_ISA
 }  // namespace cfp
