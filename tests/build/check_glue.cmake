@@ -35,7 +35,7 @@ function(check_glue host most)
 endfunction()
 
 check_glue(orb_slam 80 orb_slam/static_weights.hpp)
-check_glue(orb_slam_shape 100 orb_slam/static_weights.hpp orb_slam_shape/cfp_glue.hpp)
+check_glue(orb_slam_shape 80 orb_slam/static_weights.hpp orb_slam_shape/cfp_glue.hpp)
 check_glue(stella_vslam_shape 80 stella_vslam_shape/cfp_glue.hpp)
 check_glue(plain_c 80 plain_c/cfp_weights.cpp)
 check_glue(ceres 60 ceres/weighted_pose.hpp)

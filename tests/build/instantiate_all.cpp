@@ -142,10 +142,12 @@ static void instantiate_probability() noexcept {
   use(&cfp::fuse_high_dynamic<Scalar>);
   use(&cfp::fuse_low_dynamic<Scalar>);
   use(&cfp::second_stage_probability<Scalar>);
+  use(&cfp::second_stage_evidence<Scalar>);
   use(&cfp::is_high_dynamic<Scalar>);
   use(&cfp::background_factor<Scalar>);
   use(&cfp::first_stage_probability<Scalar>);
   use<Scalar (*)(Scalar, bool, Scalar) noexcept>(&cfp::first_stage_evidence<Scalar>);
+  use<Scalar (*)(Scalar, Scalar, bool, Scalar) noexcept>(&cfp::first_stage_evidence<Scalar>);
   use<Scalar (*)(Scalar, Scalar, const cfp::MapPointOptions&) noexcept>(&cfp::updated_map_point<Scalar>);
   use(&cfp::is_deletable<Scalar>);
   use(&cfp::is_mismatch<Scalar>);
@@ -207,6 +209,7 @@ static void instantiate_frame() noexcept {
   use(&cfp::detections_of<Scalar>);
   use(&cfp::label_at<Scalar>);
   use(&cfp::match_descriptors<Scalar>);
+  use(&cfp::match_by_map_point<std::vector<const int*>>);
   use(&cfp::estimate_flow_model<Scalar>);
   use(&cfp::flow_distances<Scalar>);
   use(&cfp::estimate_camera_motion<Scalar>);

@@ -27,7 +27,7 @@ struct Frame {
   std::vector<float> mvStaticProbability, mvWeight;
 };
 
-using Host = cfp_integration::OrbSlam2<Frame, MapPoint>;
+using Host = cfp_integration::OrbSlam2<Frame>;
 
 cv::Mat pose_matrix(const cfp::SE3<double>& T) {
   cv::Mat matrix = cv::Mat::eye(4, 4, CV_32F);
@@ -89,7 +89,7 @@ TEST_CASE("The adapter of ORB-SLAM2: two frames, weights of a wall and of people
   CHECK(person / people < 0.05);
   CHECK(wall / walls > 0.5);
   CHECK(double(walkers) < 0.1 * people);
-  CHECK_FALSE(weights.Trusts(0, *points[0]));
+  CHECK_FALSE(weights.Trusts(0, points[0]->mStaticProbability));
 
   for (std::size_t i = 0; i < points.size(); ++i) CHECK(points[i]->mStaticProbability == initial[i]);
   weights.Learn(F);
@@ -115,7 +115,7 @@ TEST_CASE("ORB-SLAM3's poses, and a pose that is not there", "[interop]") {
   struct Frame3 : Frame {
     Sophus GetPose() const { return {}; }
   };
-  CHECK(cfp_integration::OrbSlam3<Frame3, MapPoint>::Pose(Frame3{}).translation.z() == 3);
+  CHECK(cfp_integration::OrbSlam3<Frame3>::Pose(Frame3{}).translation.z() == 3);
   CHECK(Host::Pose(Frame{}).translation.norm() == 0);
 }
 

@@ -1,5 +1,5 @@
 // What StaticWeights must know of ORB-SLAM2 and ORB-SLAM3, and optical flow for both. Templates, so that nothing of
-// theirs is needed here: `StaticWeights<OrbSlam2<ORB_SLAM2::Frame, ORB_SLAM2::MapPoint>>`.
+// theirs is needed here: `StaticWeights<OrbSlam2<ORB_SLAM2::Frame>>`.
 #pragma once
 
 #include <vector>
@@ -17,10 +17,9 @@ namespace cfp_integration {
 
 // Objects are detected in the image as the lens gives it, so the keypoints are those before undistortion (mvKeys, not
 // mvKeysUn) and the camera is the one with its distortion.
-template <typename FrameType, typename MapPointType>
+template <typename FrameType>
 struct OrbSlam2 {
   using Frame = FrameType;
-  using MapPoint = MapPointType;
   using Camera = cfp::RadialTangentialCamera<float>;
   static cfp::PointSpan<float, 2> Keys(const Frame& F) { return cfp::view(F.mvKeys); }
   static cfp::DescriptorSpan Descriptors(const Frame& F) { return cfp::descriptor_view(F.mDescriptors); }
@@ -31,8 +30,8 @@ struct OrbSlam2 {
 };
 
 // ORB-SLAM3 1.0 has Sophus poses. Pinhole cameras only: not the pair of fisheye cameras (Nleft != -1).
-template <typename FrameType, typename MapPointType>
-struct OrbSlam3 : OrbSlam2<FrameType, MapPointType> {
+template <typename FrameType>
+struct OrbSlam3 : OrbSlam2<FrameType> {
   static cfp::SE3<double> Pose(const FrameType& F) {
     const auto T_cam_world = F.GetPose();
     return {T_cam_world.rotationMatrix().template cast<double>(), T_cam_world.translation().template cast<double>()};

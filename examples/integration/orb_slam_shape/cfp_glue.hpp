@@ -2,15 +2,12 @@
 // MapPoint::mStaticProbability, and the calls marked "cfp:" in tracking.hpp. The class itself is the one for ORB-SLAM2.
 #pragma once
 
-#include <vector>
-
 #include "../orb_slam/static_weights.hpp"
 #include "host.hpp"
 
 // [glue]
 struct Miniature {
   using Frame = ::Frame;
-  using MapPoint = ::MapPoint;
   using Camera = cfp::PinholeCamera<float>;
   static cfp::PointSpan<float, 2> Keys(const Frame& F) {
     return {&F.mvKeysUn.data()->pt.x, F.mvKeysUn.size(), sizeof(KeyPoint)};
@@ -20,11 +17,6 @@ struct Miniature {
   }
   static cfp::SE3<double> Pose(const Frame& F) {
     return {F.mTcw.topLeftCorner<3, 3>().cast<double>(), F.mTcw.topRightCorner<3, 1>().cast<double>()};
-  }
-  static std::vector<cfp::Detection<float>> Detections(const Frame& F) {
-    std::vector<cfp::Detection<float>> detections;
-    for (const BoundingBox& b : F.mvBoxes) detections.push_back({{b.x1, b.y1, b.x2, b.y2}, b.classId, b.score});
-    return detections;
   }
 };
 using StaticWeights = cfp_integration::StaticWeights<Miniature>;

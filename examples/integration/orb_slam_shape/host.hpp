@@ -13,6 +13,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "cfp/detection/box_tracker_types.hpp"
+
 using Descriptor = std::array<std::uint8_t, 32>;
 
 inline int DescriptorDistance(const std::uint8_t* a, const std::uint8_t* b) {
@@ -37,12 +39,6 @@ struct KeyPoint {  // cv::KeyPoint
   } pt;
   float size = 31, angle = -1, response = 0;
   int octave = 0, class_id = -1;
-};
-
-struct BoundingBox {  // of the object detector
-  float x1, y1, x2, y2;
-  int classId;
-  float score;
 };
 
 class MapPoint {
@@ -77,7 +73,7 @@ struct Frame {
   Eigen::Matrix4f mTcw = Eigen::Matrix4f::Identity();
   std::vector<float> mvStaticProbability, mvWeight;  // cfp: K, and the weight of the observation
   // of the detector and the optical flow, which a dynamic SLAM has besides
-  std::vector<BoundingBox> mvBoxes;
+  std::vector<cfp::Detection<float>> mvBoxes;
   std::vector<std::array<float, 2>> mvFlowPrevious, mvFlowCurrent;
 
   const std::uint8_t* Row(std::size_t i) const { return mDescriptors.data() + 32 * i; }

@@ -42,19 +42,15 @@ class Simulation {
     frame.mTimeStamp = 1000 + static_cast<double>(n) / 30;
     if (n >= 90 && n < 96) return frame;  // the lens is covered
     std::vector<Eigen::Vector3f> before(mPoints.size()), now(mPoints.size());
-    std::array<BoundingBox, 2> boxes;
-    boxes.fill({1e9F, 1e9F, -1e9F, -1e9F, 0, 0.9F});
+    std::array<cfp::Box<float>, 2> boxes;
+    boxes.fill({1e9F, 1e9F, -1e9F, -1e9F});
     for (std::size_t i = 0; i < mPoints.size(); ++i) {
       before[i] = Project(i, n - 1);
       now[i] = Project(i, n);
       if (mPoints[i].person < 0 || now[i].z() <= 0) continue;
-      BoundingBox& box = boxes[static_cast<std::size_t>(mPoints[i].person)];
-      box = {std::min(box.x1, now[i].x()),
-             std::min(box.y1, now[i].y()),
-             std::max(box.x2, now[i].x()),
-             std::max(box.y2, now[i].y()),
-             0,
-             0.9F};
+      cfp::Box<float>& box = boxes[static_cast<std::size_t>(mPoints[i].person)];
+      box = {std::min(box.x1, now[i].x()), std::min(box.y1, now[i].y()), std::max(box.x2, now[i].x()),
+             std::max(box.y2, now[i].y())};
     }
     for (std::size_t i = 0; i < mPoints.size(); ++i) {
       if (!InImage(now[i]) || Hidden(i, now, boxes)) continue;
@@ -73,9 +69,9 @@ class Simulation {
       for (int bit = 0; bit < 20; ++bit) descriptor[mRandom.index(32)] ^= std::uint8_t(1U << mRandom.index(8));
       frame.mDescriptors.insert(frame.mDescriptors.end(), descriptor.begin(), descriptor.end());
     }
-    for (const BoundingBox& box : boxes) {
+    for (const cfp::Box<float>& box : boxes) {
       if (box.x2 < 5 || box.x1 > static_cast<float>(mK.width) - 5 || Uniform(0, 1) < 0.15F) continue;  // missed
-      frame.mvBoxes.push_back({box.x1 + Noise(3), box.y1 + Noise(3), box.x2 + Noise(3), box.y2 + Noise(3), 0, 0.9F});
+      frame.mvBoxes.push_back({{box.x1 + Noise(3), box.y1 + Noise(3), box.x2 + Noise(3), box.y2 + Noise(3)}, 0, 0.9F});
     }
     return frame;
   }
@@ -108,9 +104,10 @@ class Simulation {
            p.y() < static_cast<float>(mK.height);
   }
   // Whether a person stands before the point: an ellipse in the middle of his box.
-  bool Hidden(std::size_t i, const std::vector<Eigen::Vector3f>& now, const std::array<BoundingBox, 2>& boxes) const {
+  bool Hidden(std::size_t i, const std::vector<Eigen::Vector3f>& now,
+              const std::array<cfp::Box<float>, 2>& boxes) const {
     for (int person = 0; person < 2; ++person) {
-      const BoundingBox& b = boxes[static_cast<std::size_t>(person)];
+      const cfp::Box<float>& b = boxes[static_cast<std::size_t>(person)];
       if (mPoints[i].person == person || b.x2 <= b.x1 || (mPoints[i].person >= 0 && mPoints[i].person < person))
         continue;
       const float dx = (2 * now[i].x() - b.x1 - b.x2) / (b.x2 - b.x1),

@@ -26,7 +26,7 @@ class Tracking {
     mCurrentFrame.mvpMapPoints.assign(mCurrentFrame.mvKeysUn.size(), nullptr);
     mCurrentFrame.mvbOutlier.assign(mCurrentFrame.mvKeysUn.size(), false);
     if (mpWeights)  // cfp: boxes, objects, depth
-      mpWeights->NewFrame(mCurrentFrame, Miniature::Detections(mCurrentFrame),
+      mpWeights->NewFrame(mCurrentFrame, mCurrentFrame.mvBoxes,
                           {mCurrentFrame.mvFlowPrevious, mCurrentFrame.mvFlowCurrent});
     if (mState == NOT_INITIALIZED) {
       CreateNewKeyFrame();

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <unordered_map>
 #include <vector>
 
 #include "cfp/frame/static_probability.hpp"
@@ -38,15 +37,8 @@ class static_weights {
 
   // After the first pose (motion_based_track, bow_match_based_track, robust_match_based_track).
   void first_pose(const stella_vslam::data::frame& frm, const stella_vslam::data::frame& last, unsigned int num_valid) {
-    std::unordered_map<const stella_vslam::data::landmark*, std::int32_t> index_in_last;
-    for (std::size_t i = 0; i < last.landmarks_.size(); ++i)
-      if (last.landmarks_[i]) index_in_last[last.landmarks_[i].get()] = static_cast<std::int32_t>(i);
+    cfp::match_by_map_point(frm.landmarks_, last.landmarks_, scratch_, match_);
     gather(frm);
-    match_.assign(m_.size(), cfp::no_match);
-    for (std::size_t i = 0; i < m_.size(); ++i) {
-      const auto found = index_in_last.find(frm.landmarks_[i].get());
-      if (frm.landmarks_[i] && found != index_in_last.end()) match_[i] = found->second;
-    }
     report_ = probability_.fine({pose(frm) * pose(last).inverse(), num_valid}, match_, m_).report;
   }
 
@@ -85,7 +77,7 @@ class static_weights {
 
   cfp::StaticProbability<cfp::PinholeCamera<float>> probability_;
   cfp::FrameReport report_;
-  std::vector<std::int32_t> match_;
+  std::vector<std::int32_t> scratch_, match_;
   std::vector<float> m_;
 };
 // [glue]

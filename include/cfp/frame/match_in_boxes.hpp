@@ -1,13 +1,16 @@
 /// @file match_in_boxes.hpp
-/// The matches between a frame and the one before: the host's, and by descriptors those of keypoints in boxes that it
-/// left alone. A host that matches map points only has none on a person, and an unmatched foreground keypoint is not
-/// trusted.
+/// The matches between a frame and the one before: the host's, by the map points that both observe, and by descriptors
+/// those of keypoints in boxes that it left alone. A host that matches map points only has none on a person, and an
+/// unmatched foreground keypoint is not trusted.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
+#include <vector>
 
 #include "cfp/frame/descriptor_matching.hpp"
 #include "cfp/frame/frame_options.hpp"
@@ -15,6 +18,32 @@
 
 namespace cfp {
 inline namespace CFP_ISA {
+
+/// The matches of two frames whose keypoints observe the same map points, for hosts that keep a map point per keypoint:
+/// current and last hold pointers of any kind, one per keypoint, null where there is no map point. match[i] becomes the
+/// index in last of what current[i] points to, or no_match; of several the lowest. O(n log n); `scratch` is
+/// overwritten.
+template <typename Pointers>
+void match_by_map_point(const Pointers& current, const Pointers& last, std::vector<std::int32_t>& scratch,
+                        std::vector<std::int32_t>& match) {
+  const auto before = [](const auto& a, const auto& b) { return std::less<>()(a, b); };
+  scratch.clear();
+  for (std::size_t j = 0; j < last.size(); ++j) {
+    if (last[j]) scratch.push_back(static_cast<std::int32_t>(j));
+  }
+  std::sort(scratch.begin(), scratch.end(), [&](std::int32_t a, std::int32_t b) {
+    const auto &p = last[static_cast<std::size_t>(a)], &q = last[static_cast<std::size_t>(b)];
+    return before(p, q) || (p == q && a < b);
+  });
+  match.assign(current.size(), no_match);
+  for (std::size_t i = 0; i < current.size(); ++i) {
+    if (!current[i]) continue;
+    const auto found = std::lower_bound(
+        scratch.begin(), scratch.end(), current[i],
+        [&](std::int32_t j, const auto& point) { return before(last[static_cast<std::size_t>(j)], point); });
+    if (found != scratch.end() && last[static_cast<std::size_t>(*found)] == current[i]) match[i] = *found;
+  }
+}
 
 /// Where the keypoints of the frame before are expected in this one if they are static: moved by the pose where they
 /// have depth, in place where they have none.
