@@ -9,9 +9,16 @@ import sys
 from pathlib import Path
 
 GUARD = "if(mpStaticWeights) "
+NEW_FRAME = (r"if(mpStaticWeights)\n    {\n        mpStaticWeights->NewFrame(mCurrentFrame,mDetections,mFlow.Next("
+             r"mImGray,%s,mCurrentFrame.mvKeys,mpStaticWeights->Probability().state().boxes));\n"
+             r"        mDetections.reset();\n    }\n\n    \1")
 
 # Step, file, function ("" for the whole file), a regular expression, what takes its place, how many times it is found.
 STEPS = [
+    # 0: what C++17 wants of the code of 2017; nothing changes where a fork has done it
+    (0, "include/LoopClosing.h", "", r"std::pair<(?:const KeyFrame\*|KeyFrame\* ?const), ?g2o::Sim3>",
+     "std::pair<KeyFrame* const, g2o::Sim3>", 1),
+    (0, "include/LoopClosing.h", "", r"(?:bool|int) mnFullBAIdx;", "int mnFullBAIdx;", 1),
     # 1: what a frame, a keyframe and a map point hold, and their copies
     (1, "include/Frame.h", "", r"(std::vector<bool> mvbOutlier;)",
      r"\1\n    std::vector<float> mvStaticProbability, mvWeight;  // cfp: K, and the weights of the last optimisation", 1),
@@ -28,7 +35,7 @@ STEPS = [
     (2, "include/Tracking.h", "", r"(#include\s*<mutex>)",
      r'#include<memory>\n#include<optional>\n#include"orb_slam2.hpp"  // of cfp, examples/integration/orb_slam\n\n\1', 1),
     (2, "include/Tracking.h", "", r"(\nclass Tracking\s*\n\{\s*\n\s*public:)",
-     r"\ntypedef cfp_integration::StaticWeights<cfp_integration::OrbSlam2<Frame, MapPoint> > StaticWeights;\n\1"
+     r"\ntypedef cfp_integration::StaticWeights<cfp_integration::OrbSlam2<Frame> > StaticWeights;\n\1"
      r"\n    // cfp\n    void UseStaticWeights(const cfp::FrameOptions &options)\n    {\n"
      r"        cfp::RadialTangentialCamera<float> camera;\n"
      r"        if(cfp::to_camera(mK,mDistCoef,camera)==cfp::Status::ok)\n"
@@ -53,14 +60,20 @@ STEPS = [
     (2, "src/Tracking.cc", "Tracking::Reset()", r"(mlRelativeFramePoses\.clear\(\);)",
      r"if(mpStaticWeights)\n    {\n        mpStaticWeights->Reset();\n        mFlow.Reset();\n    }\n\n    \1", 1),
     # 3: a new frame
-    (3, "src/Tracking.cc", "Tracking::GrabImageRGBD", r"(Track\(\);)",
-     r"if(mpStaticWeights)\n    {\n        mpStaticWeights->NewFrame(mCurrentFrame,mDetections,mFlow.Next("
-     r"mImGray,imDepth,mCurrentFrame.mvKeys,mpStaticWeights->Probability().state().boxes));\n"
-     r"        mDetections.reset();\n    }\n\n    \1", 1),
+    (3, "src/Tracking.cc", "Tracking::GrabImageStereo", r"(Track\(\);)", NEW_FRAME % "cv::Mat()", 1),
+    (3, "src/Tracking.cc", "Tracking::GrabImageMonocular", r"(Track\(\);)", NEW_FRAME % "cv::Mat()", 1),
+    (3, "src/Tracking.cc", "Tracking::GrabImageRGBD", r"(Track\(\);)", NEW_FRAME % "imDepth", 1),
     # 4: initialisation
     (4, "src/Tracking.cc", "Tracking::StereoInitialization()", r"if\(z>0\)", "if(z>0 && MayCreate(i))", 1),
     (4, "src/Tracking.cc", "Tracking::StereoInitialization()", r"(new MapPoint\(x3D,pKFini,mpMap\);)",
      r"\1\n                pNewMP->mStaticProbability = InitialM(mCurrentFrame,i);", 1),
+    (4, "src/Tracking.cc", "Tracking::MonocularInitialization()", r"(// Check if there are enough correspondences)",
+     r"for(size_t i=0; mpStaticWeights && i<mvIniMatches.size(); i++)\n        {\n"
+     r"            if(mvIniMatches[i]>=0 && !(MayCreate(mvIniMatches[i]) &&"
+     r" mpStaticWeights->MayCreate(mInitialFrame.mvStaticProbability[i])))\n            {\n"
+     r"                mvIniMatches[i]=-1;\n                nmatches--;\n            }\n        }\n\n        \1", 1),
+    (4, "src/Tracking.cc", "Tracking::CreateInitialMapMonocular()", r"(new MapPoint\(worldPos,pKFcur,mpMap\);)",
+     r"\1\n        pMP->mStaticProbability = InitialM(mCurrentFrame,mvIniMatches[i]);", 1),
     # 5: weights of every pose optimisation
     (5, "src/Tracking.cc", "", r"Optimizer::PoseOptimization\(&mCurrentFrame\)", "PoseOptimization()", 6),
     (5, "src/Tracking.cc", "", r"(\nbool Tracking::TrackReferenceKeyFrame\(\)\n)",
@@ -88,7 +101,7 @@ STEPS = [
     (7, "src/Tracking.cc", "Tracking::Relocalization()", r"(if\(nmatches<15\))",
      r"for(size_t j=0; mpStaticWeights && j<vvpMapPointMatches[i].size(); j++)\n            {\n"
      r"                MapPoint* &pMP = vvpMapPointMatches[i][j];\n"
-     r"                if(pMP && !mpStaticWeights->Trusts(j,*pMP))\n                {\n"
+     r"                if(pMP && !mpStaticWeights->Trusts(j,pMP->mStaticProbability))\n                {\n"
      r"                    pMP = static_cast<MapPoint*>(NULL);\n                    nmatches--;\n"
      r"                }\n            }\n            \1", 1),
     # 8: the local map
