@@ -221,7 +221,8 @@ void object_score_boost(benchmark::State& state) {
     }
     std::sort(score.begin(), score.end());
     const auto at = [&](double q) { return score[cfp::quantile_rank(q, n) - 1]; };
-    return (at(0.1) + at(0.2) + at(0.3)) / 3;
+    const auto positions = cfp::ObjectProbabilityOptions().positions;
+    return (at(positions[0]) + at(positions[1]) + at(positions[2])) / 3;
   };
   for (auto _ : state) benchmark::DoNotOptimize(next());
   double sum = 0;

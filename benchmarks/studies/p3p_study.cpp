@@ -1,7 +1,8 @@
 // How complete, exact and fast is P3P? Per kind of problem: the share whose true pose is among the solutions (to 1e-4
 // and to 1e-6, |R - R'| + |t - t'|, m), the number of solutions, the share without any, the share of solutions that do
 // not fit (a ray misses its point by more than 1e-6 rad, the point lies behind the camera, or the rotation is none by
-// more than 1e-6), and the median time of a call, all methods in turns. Beside it OpenGV's solvers where found.
+// more than 1e-6), and the median time of a call, all methods in turns. Beside it PoseLib's and OpenGV's solvers where
+// found.
 //   random              three points 0.5 to 5 m away in a field of view of 62 x 48 degrees
 //   triangle 10 .. 1 cm a small triangle 1 to 6 m away
 //   thin 1e-2, 1e-3     a triangle whose height is that share of one edge
@@ -27,6 +28,10 @@
 
 #ifdef CFP_HAVE_OPENGV
 #include <opengv/absolute_pose/modules/main.hpp>
+#endif
+#ifdef CFP_HAVE_POSELIB
+#include <PoseLib/solvers/p3p.h>
+#include <PoseLib/solvers/p3p_lambdatwist.h>
 #endif
 
 namespace {
@@ -141,6 +146,19 @@ std::vector<Method> make_methods() {
                        for (int k = 0; k < solutions.count; ++k)
                          poses.push_back(solutions.T_cam_world[static_cast<std::size_t>(k)]);
                      }});
+#ifdef CFP_HAVE_POSELIB
+  const auto poselib = [&methods](const char* name, auto solver) {
+    methods.push_back({name, [solver](const Problem& problem, Poses& poses) {
+                         std::vector<Eigen::Vector3d> rays, world(problem.world.begin(), problem.world.end());
+                         for (const Vector& ray : problem.rays) rays.push_back(ray.normalized());
+                         std::vector<poselib::CameraPose> found;
+                         solver(rays, world, &found);
+                         for (const auto& pose : found) poses.push_back({pose.R(), pose.t});
+                       }});
+  };
+  poselib("PoseLib", poselib::p3p);
+  poselib("Lambda Twist", poselib::p3p_lambdatwist);
+#endif
 #ifdef CFP_HAVE_OPENGV
   const auto opengv = [&methods](const char* name, auto solver) {
     methods.push_back({name, [solver](const Problem& problem, Poses& poses) {
