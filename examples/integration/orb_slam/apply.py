@@ -15,7 +15,10 @@ NEW_FRAME = (r"if(mpStaticWeights)\n    {\n        mpStaticWeights->NewFrame(mCu
 
 # Step, file, function ("" for the whole file), a regular expression, what takes its place, how many times it is found.
 STEPS = [
-    # 0: what C++17 wants of the code of 2017; nothing changes where a fork has done it
+    # 0: what C++17, OpenCV 4 and a newer C library want of the code of 2017, nothing where a fork has done it
+    (0, "include/ORBextractor.h", "", r"#include\s*<(?:opencv/cv\.h|opencv2/opencv\.hpp)>",
+     "#include <unistd.h>\n#include <opencv2/core/core_c.h>\n#include <opencv2/imgproc/types_c.h>\n"
+     "#include <opencv2/opencv.hpp>", 1),
     (0, "include/LoopClosing.h", "", r"std::pair<(?:const KeyFrame\*|KeyFrame\* ?const), ?g2o::Sim3>",
      "std::pair<KeyFrame* const, g2o::Sim3>", 1),
     (0, "include/LoopClosing.h", "", r"(?:bool|int) mnFullBAIdx;", "int mnFullBAIdx;", 1),
