@@ -16,7 +16,7 @@ namespace {
 
 constexpr double inf = std::numeric_limits<double>::infinity(), not_a_number = std::numeric_limits<double>::quiet_NaN();
 
-/// [low, high] with each end in or out; an infinite end that is in switches something off.
+/// [low, high] with each end in or out; infinity is in no range.
 struct Range {
   double low;
   bool low_in;
@@ -97,7 +97,7 @@ TEST_CASE("The ends of the ranges of a frame's options", "[core]") {
       CFP_FIELD(O, tracker.motion.initial_centre_rate, (Range{0, false, 1e6, true})),
       CFP_FIELD(O, tracker.motion.initial_size_rate, (Range{0, false, 1e6, true})),
       CFP_FIELD(O, tracker.min_iou, below_one),
-      CFP_FIELD(O, tracker.coast_per_hit, (Range{0, false, inf, true})),
+      CFP_FIELD(O, tracker.coast_per_hit, positive),
       CFP_FIELD(O, tracker.min_visible, share),
       CFP_FIELD(O, tracker.max_gap_s, (Range{0, false, 1e6, true})),
       CFP_FIELD(O, tracker.image_width, (Range{0, true, 1e6, true})),
@@ -127,8 +127,8 @@ TEST_CASE("The ends of the ranges of a frame's options", "[core]") {
       CFP_FIELD(O, coarse.foreground.min_gap_m, not_negative),
       CFP_FIELD(O, coarse.foreground.half_body_m, not_negative),
       CFP_FIELD(O, fine.min_pose_inliers, not_negative),
-      CFP_FIELD(O, fine.min_translation_m, (Range{0, true, inf, true})),
-      CFP_FIELD(O, fine.min_parallax, (Range{0, true, inf, true})),
+      CFP_FIELD(O, fine.min_translation_m, not_negative),
+      CFP_FIELD(O, fine.min_parallax, not_negative),
       CFP_FIELD(O, fine.projection.quantile, above_zero),
       CFP_FIELD(O, fine.projection.steepness, positive),
       CFP_FIELD(O, fine.epipolar.quantile, above_zero),

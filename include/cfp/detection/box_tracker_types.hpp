@@ -64,7 +64,7 @@ struct BoxTrackerOptions {
   if (!(o.confirm_hits >= 1)) return "confirm_hits";
   if (!(o.max_idle >= 0)) return "max_idle";
   if (!(o.max_coast >= 0)) return "max_coast";
-  if (!(o.coast_per_hit > 0)) return "coast_per_hit";
+  if (!detail::positive(o.coast_per_hit)) return "coast_per_hit";
   if (!(o.min_visible >= 0 && o.min_visible <= 1)) return "min_visible";
   if (!(o.max_gap_s > 0 && o.max_gap_s <= 1e6)) return "max_gap_s";
   if (!(o.image_width >= 0 && o.image_width <= 1e6)) return "image_width";

@@ -89,8 +89,8 @@ inline namespace CFP_ISA {
 
 [[nodiscard]] inline OptionPath invalid_field(const FineOptions& o) noexcept {
   if (!detail::non_negative(o.min_pose_inliers)) return "min_pose_inliers";
-  if (!(o.min_translation_m >= 0)) return "min_translation_m";
-  if (!(o.min_parallax >= 0)) return "min_parallax";
+  if (!detail::non_negative(o.min_translation_m)) return "min_translation_m";
+  if (!detail::non_negative(o.min_parallax)) return "min_parallax";
   if (const OptionPath field = nested("projection", invalid_field(o.projection))) return field;
   if (const OptionPath field = nested("epipolar", invalid_field(o.epipolar))) return field;
   return nested("matching", invalid_field(o.matching));
