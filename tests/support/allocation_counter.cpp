@@ -5,11 +5,15 @@
 #include <new>
 
 namespace {
-thread_local std::size_t count = 0;
-}
+thread_local std::size_t count = 0, failing = 0;  // failing: the count at which there is no memory
+
+// One more; whether it is to be had.
+[[maybe_unused]] bool counted() noexcept { return ++count != failing; }
+}  // namespace
 
 namespace cfp_test {
 std::size_t allocation_count() noexcept { return count; }
+void fail_allocation(std::size_t k) noexcept { failing = k > 0 ? count + k : 0; }
 }  // namespace cfp_test
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -37,32 +41,21 @@ void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t n, std::size_t size);
 void* __libc_realloc(void* pointer, std::size_t size);
 void* __libc_memalign(std::size_t alignment, std::size_t size);
-void* malloc(std::size_t size) {
-  ++count;
-  return __libc_malloc(size);
-}
-void* calloc(std::size_t n, std::size_t size) {
-  ++count;
-  return __libc_calloc(n, size);
-}
-void* realloc(void* pointer, std::size_t size) {
-  ++count;
-  return __libc_realloc(pointer, size);
-}
+void* malloc(std::size_t size) { return counted() ? __libc_malloc(size) : nullptr; }
+void* calloc(std::size_t n, std::size_t size) { return counted() ? __libc_calloc(n, size) : nullptr; }
+void* realloc(void* pointer, std::size_t size) { return counted() ? __libc_realloc(pointer, size) : nullptr; }
 void* aligned_alloc(std::size_t alignment, std::size_t size) {
-  ++count;
-  return __libc_memalign(alignment, size);
+  return counted() ? __libc_memalign(alignment, size) : nullptr;
 }
 int posix_memalign(void** pointer, std::size_t alignment, std::size_t size) {
-  ++count;
-  *pointer = __libc_memalign(alignment, size);
+  *pointer = counted() ? __libc_memalign(alignment, size) : nullptr;
   return *pointer != nullptr ? 0 : ENOMEM;
 }
 }
 #else
 void* operator new(std::size_t size) {
-  ++count;
-  if (void* pointer = std::malloc(size == 0 ? 1 : size)) return pointer;
+  void* const pointer = counted() ? std::malloc(size == 0 ? 1 : size) : nullptr;
+  if (pointer != nullptr) return pointer;
   throw std::bad_alloc();
 }
 void operator delete(void* pointer) noexcept { std::free(pointer); }

@@ -125,7 +125,7 @@ void begin_frame(const Frame<Scalar>& frame, FrameState<Scalar>& state) {
   CFP_ASSERT(frame.descriptors.size == 0 || frame.descriptors.size == n);
   std::swap(state.previous, state.current);
   FrameMemory<Scalar>& current = state.current;
-  current.known = true;
+  current.known = false;  // until it is whole: what allocates may throw
   current.timestamp_s = frame.timestamp_s;
   current.object_depths.clear();
   current.depths.assign(frame.depths.begin(), frame.depths.end());
@@ -154,6 +154,7 @@ void begin_frame(const Frame<Scalar>& frame, FrameState<Scalar>& state) {
   report.frames_without_detections = state.report.frames_without_detections;
   report.frames_since_detector = state.report.frames_since_detector;
   state.report = report;
+  current.known = true;
 }
 
 }  // namespace CFP_ISA
