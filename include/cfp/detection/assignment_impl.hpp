@@ -124,7 +124,7 @@ class AssignmentSearch {
     const auto n = static_cast<Eigen::Index>(columns_);
     const View cost(costs(visit.row), n), saving(w_.open_saving.data(), n);
     Eigen::Map<Eigen::ArrayXd> distance(w_.distance.data(), n);
-    distance = distance.min(cost + saving + visit.offset);
+    distance = (distance.min)(cost + saving + visit.offset);
     return distance.minCoeff();
   }
 

@@ -135,7 +135,7 @@ template <typename Real>
   const Pair qb = n * (C.vw * l.u - C.uw * l.v) - l.w * (l.u * gv - l.v * gu);
   const Pair qc = l.w * (l.w * g - Real(2) * n * (C.uw * l.u + C.vw * l.v)) + C.ww * n * n;
   const Pair square = qb * qb, product = qa * qc, discriminant = square - product;
-  const Pair margin = Real(-1e-8) * (square + product.abs()), root = discriminant.max(Real(0)).sqrt();
+  const Pair margin = Real(-1e-8) * (square + product.abs()), root = (discriminant.max)(Real(0)).sqrt();
 
   int count = 0;
   for (int i = 0; i < 2; ++i) {

@@ -40,7 +40,7 @@ template <typename T>
     const Lane dx = h(0, 0) * x + h(0, 1) * y + h(0, 2) - load(2) * z;
     const Lane dy = h(1, 0) * x + h(1, 1) * y + h(1, 2) - load(3) * z;
     const Lane d2 = (dx * dx + dy * dy) / (z * z + T(1e-30));
-    sum += static_cast<double>((load(4) * d2.min(static_cast<T>(limit))).sum());
+    sum += static_cast<double>((load(4) * (d2.min)(static_cast<T>(limit))).sum());
   }
   return sum / limit;
 }

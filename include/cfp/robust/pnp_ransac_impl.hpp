@@ -150,10 +150,10 @@ struct PnpProblem {
         const Lane wx = load(X), wy = load(Y), wz = load(Z);
         const auto moved = [&](int r) -> Lane { return R(r, 0) * wx + R(r, 1) * wy + R(r, 2) * wz + t[r]; };
         // A depth that is not positive becomes a tiny one: a point behind the camera then is far off, as it has to be.
-        const Lane inverse = moved(2).max(1e-9F).inverse();
+        const Lane inverse = (moved(2).max)(1e-9F).inverse();
         const Lane dx = moved(0) * inverse - load(ray_x), dy = moved(1) * inverse - load(ray_y);
         const Lane u = load(s11) * dx + load(s12) * dy, v = load(s22) * dy;
-        cost += load(observation_weight_row) * (u * u + v * v).min(static_cast<float>(limit));
+        cost += load(observation_weight_row) * ((u * u + v * v).min)(static_cast<float>(limit));
       }
       sum += static_cast<double>(cost.sum());
       if (!(sum < stop)) break;
