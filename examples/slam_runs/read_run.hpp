@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
@@ -53,7 +54,7 @@ inline void read_frames(const std::filesystem::path& file, RunRecord& run) {
     constexpr std::size_t fixed = 13;
     if (words.size() != fixed + module_count) cfp_examples::bad_line(file, line, "not the columns of this version");
     const auto number = [&](std::size_t i) { return cfp_examples::parse_number(file, line, words[i], "figure"); };
-    const auto count = [&](std::size_t i) { return static_cast<std::size_t>(number(i)); };
+    const auto count = [&](std::size_t i) { return cfp_examples::parse_count(file, line, words[i], "figure"); };
     RunFrame f;
     f.time_s = number(0);
     f.image = words[1];
@@ -94,7 +95,7 @@ inline RunRecord read_run(const std::filesystem::path& folder) {
     return at->second;
   };
   const auto number = [&](const char* key) {
-    return static_cast<std::size_t>(cfp_examples::parse_number(folder / "run.txt", 0, value(key), key));
+    return cfp_examples::parse_count(folder / "run.txt", 0, value(key), key);
   };
   RunRecord run;
   run.recording = value("recording");
@@ -102,7 +103,10 @@ inline RunRecord read_run(const std::filesystem::path& folder) {
   run.variant = value("variant");
   run.detector = value("detector");
   run.options = settings.count("options") > 0 ? value("options") : "none";
-  run.seed = std::stoull(value("seed"));
+  const std::string seed = value("seed");
+  const char* const end = seed.data() + seed.size();
+  if (const auto read = std::from_chars(seed.data(), end, run.seed); read.ec != std::errc() || read.ptr != end)
+    throw std::runtime_error((folder / "run.txt").string() + ": '" + seed + "' is no seed");
   run.features = static_cast<int>(number("features"));
   run.keyframes = number("keyframes");
   run.map_points = number("map_points");
@@ -122,6 +126,8 @@ inline RunRecord read_run(const std::filesystem::path& folder) {
   }
   const auto boxes = folder / "boxes.txt", keypoints = folder / "keypoints.txt";
   detail::for_each_row(boxes, 10, [&](int line, const std::vector<double>& v) {
+    if (!(std::abs(v[1]) <= 0x1p53 && v[9] >= 0 && v[9] <= 0x1p53))
+      cfp_examples::bad_line(boxes, line, "no such id or count");
     detail::frame_at(run, boxes, line, v[0])
         .boxes.push_back({static_cast<std::int64_t>(v[1]),
                           {float(v[2]), float(v[3]), float(v[4]), float(v[5])},

@@ -49,6 +49,15 @@ inline double parse_number(const std::filesystem::path& file, int line, const st
   return *value;
 }
 
+/// The same for what is counted: a whole number in [0, 1e9].
+inline std::size_t parse_count(const std::filesystem::path& file, int line, const std::string& word,
+                               const char* meaning) {
+  const double value = parse_number(file, line, word, meaning);
+  if (!(value >= 0 && value <= 1e9 && value == std::floor(value)))
+    bad_line(file, line, "'" + word + "' is no count (" + meaning + ")");
+  return static_cast<std::size_t>(value);
+}
+
 /// `timestamp tx ty tz qx qy qz qw`, camera to world. Quaternions are normalised; a line whose quaternion is zero, or
 /// with a value that is not finite, is kept as a pose that cfp::is_usable refuses, as SLAM systems print such lines for
 /// lost frames.

@@ -120,7 +120,16 @@ TEST_CASE("A file that is cut off or damaged is refused with its name", "[slam]"
   for (const char* line :
        {"0 1 2 3", "3 1 2 3 4 5 6 7 8", "-1 1 2 3 4 5 6 7 8", "nan 1 2 3 4 5 6 7 8", "0 1 2 3 4 5 6 7 x"})
     refused("keypoints.txt", line);
-  refused("boxes.txt", "9 1 1 2 3 4 0 1 0.5 0\n");
+  for (const char* line : {"9 1 1 2 3 4 0 1 0.5 0", "0 1e300 1 2 3 4 0 1 0.5 0", "0 1 1 2 3 4 0 1 0.5 -1"})
+    refused("boxes.txt", line);
+  const std::string numbers = "keyframes 4\nmap_points 5\n", settings = settings_of(folder.path / "recording").text();
+  const auto without_seed = [&](const std::string& seed) {
+    const std::size_t at = settings.find("\nseed ") + 6;
+    return settings.substr(0, at) + seed + settings.substr(settings.find('\n', at)) + numbers;
+  };
+  for (const char* seed : {"x", "", "-1", "99999999999999999999999"}) refused("run.txt", without_seed(seed));
+  for (const char* count : {"-1", "1.5", "1e300", "nan"})
+    refused("run.txt", settings + "keyframes 4\nmap_points " + count + "\n");
 }
 
 TEST_CASE("Only a whole run with the same settings is not run again", "[slam]") {

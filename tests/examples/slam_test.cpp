@@ -342,6 +342,53 @@ TEST_CASE("Damaged frames are skipped with their line; the others are tracked", 
   CHECK(r.absolute.translation_m.rmse < 0.01);
 }
 
+TEST_CASE("A recording that disappears while it is read costs its own frames, and nothing that was done", "[slam]") {
+  for (const bool threads : {false, true}) {
+    cfp_test::TemporaryFolder folder;
+    const cfp_test::TemporaryFolder out;
+    std::filesystem::copy(rendered(), folder.path, std::filesystem::copy_options::recursive);
+    FileDetector detector((folder.path / "detections.txt").string(), {});
+    RunSettings settings;
+    settings.recording = folder.path.string();
+    const auto unmounted = [&](std::size_t done) {
+      if (done == 20) std::filesystem::remove_all(folder.path);
+    };
+    const std::string said = run_into(out.path, Sequence(folder.path), detector, settings, threads, unmounted);
+    CHECK(said.find("rgb.txt") != std::string::npos);
+    CHECK(cfp_test::error_of([&] { read_run(out.path); }).find(folder.path.string()) != std::string::npos);
+    std::filesystem::copy(rendered(), folder.path, std::filesystem::copy_options::recursive);
+    const RunRecord r = read_run(out.path);
+    CHECK(r.frames.size() == frames);
+    CHECK(count(r, Outcome::tracked) + count(r, Outcome::skipped) == frames);
+    CHECK(count(r, Outcome::tracked) >= 20);
+    CHECK(count(r, Outcome::tracked) <= 22);
+  }
+}
+
+TEST_CASE("A detector that throws ends the run with its words; the folder is no run, and can be one", "[slam]") {
+  struct Broken final : cfp_examples::Detector {
+    Broken() : Detector("broken", {}) {}
+    cfp_examples::Detections detect(const cv::Mat&, double) override {
+      if (++frame == 7) throw std::runtime_error("the detector's cable is out");
+      return {};
+    }
+    int frame = 0;
+  };
+  const Sequence sequence(rendered());
+  for (const bool threads : {false, true}) {
+    const cfp_test::TemporaryFolder out;
+    RunSettings settings;
+    settings.recording = rendered().string();
+    settings.frames = 12;
+    Broken broken;
+    const auto run_it = [&] { run_into(out.path, sequence, broken, settings, threads, [](std::size_t) {}); };
+    CHECK(cfp_test::error_of(run_it) == "the detector's cable is out");
+    CHECK_FALSE(is_done(out.path, settings));
+    CHECK(cfp_test::error_of(run_it).empty());
+    CHECK(is_done(out.path, settings));
+  }
+}
+
 TEST_CASE("Two men stand up in a real clip: every frame has a pose, within centimetres of a published estimate",
           "[slam]") {
   CFP_REQUIRE_DATA(folder, "tum_fr3_walking_halfsphere_30");
