@@ -40,6 +40,12 @@ void clustering(FuzzInput& in) {
 
   cfp::ForegroundOptions foreground;
   foreground.rule = in.flag() ? cfp::ForegroundRule::dbscan : cfp::ForegroundRule::depth_window;
+  cfp::AdaptiveOptions& a = foreground.adaptive;
+  cfp_fuzz::disturb(in, foreground,
+                    {&foreground.near_share, &foreground.upper_share, &foreground.obstacle_m, &foreground.before_m,
+                     &foreground.behind_m, &foreground.first_gap_m, &foreground.last_gap_m, &foreground.min_gap_m,
+                     &foreground.half_body_m, &a.noise_factor, &a.min_eps_m, &a.max_eps_m, &a.spacing_factor,
+                     &a.min_share, &a.density, &a.noise.constant_m, &a.noise.quadratic, &a.fixed.eps});
   const std::vector<float> pixels = in.numbers<float>(in.flag() ? 2 * depths.size() : 0, 0, 640);
   cfp::ForegroundInput<float> input;
   input.depths_m = depths;
@@ -60,12 +66,19 @@ void tracker(FuzzInput& in) {
   options.image_width = in.flag() ? 640 : 0;
   options.image_height = 480;
   options.max_coast = static_cast<int>(in.count(9));
+  cfp::BoxMotionOptions& m = options.motion;
+  cfp_fuzz::disturb(in, options,
+                    {&m.edge_noise, &m.centre_acceleration, &m.size_acceleration, &m.initial_centre_rate,
+                     &m.initial_size_rate, &options.min_iou, &options.min_score, &options.birth_threshold,
+                     &options.coast_per_hit, &options.min_visible, &options.max_gap_s});
+  const double largest = in.byte() < 32 ? 1e5 : 640;
   cfp::BoxTracker<Scalar> tracker(options);
   std::int64_t newest = 0;
   while (!in.empty()) {
     std::vector<cfp::Detection<Scalar>> detections(in.count(6));
     for (auto& d : detections) {
-      const double x = in.number(-50, 640), y = in.number(-50, 480), w = in.number(-5, 200), h = in.number(-5, 300);
+      const double x = in.number(-50, largest), y = in.number(-50, 480), w = in.number(-5, largest / 3),
+                   h = in.number(-5, largest / 2);
       d.box = {FuzzInput::to<Scalar>(x), FuzzInput::to<Scalar>(y), FuzzInput::to<Scalar>(x + w),
                FuzzInput::to<Scalar>(y + h)};
       d.class_id = in.byte() & 1;

@@ -34,9 +34,15 @@ void errors(FuzzInput& in) {
   const auto truth = trajectory(in, n), estimate = in.flag() ? truth : trajectory(in, in.count(30));
   cfp::TrajectoryErrorWorkspace workspace;
   const cfp::span<const cfp::StampedPose<double>> true_poses(truth), estimated(estimate);
-  const auto ate = cfp::absolute_trajectory_error(true_poses, estimated, cfp::AbsoluteErrorOptions{}, workspace);
+  cfp::AbsoluteErrorOptions absolute;
+  absolute.alignment = static_cast<cfp::AlignmentMode>(in.byte() % 4);
+  cfp_fuzz::disturb(in, absolute, {&absolute.association.max_difference_s, &absolute.association.offset_s});
+  const auto ate = cfp::absolute_trajectory_error(true_poses, estimated, absolute, workspace);
   CFP_PROMISE(usable(ate.translation_m.rmse));
-  const auto rpe = cfp::relative_pose_error(true_poses, estimated, cfp::RelativeErrorOptions{}, workspace);
+  cfp::RelativeErrorOptions relative;
+  relative.unit = in.flag() ? cfp::DeltaUnit::frames : cfp::DeltaUnit::seconds;
+  cfp_fuzz::disturb(in, relative, {&relative.delta, &relative.offset_s, &relative.scale});
+  const auto rpe = cfp::relative_pose_error(true_poses, estimated, relative, workspace);
   CFP_PROMISE(usable(rpe.translation_m.rmse) && usable(rpe.rotation_deg.rmse));
 }
 
@@ -57,12 +63,22 @@ void formulas(FuzzInput& in) {
   const auto number = [&](double low, double high) { return FuzzInput::to<Scalar>(in.number(low, high)); };
   CFP_PROMISE(is_probability(cfp::chi_squared_survival(number(0, 20), in.number(0, 10))));
   std::vector<Scalar> samples = in.numbers<Scalar>(in.count(60), 0, 5), scratch(samples.size());
-  const auto model = cfp::fit_constraint(samples, cfp::ConstraintOptions{}, scratch);
+  cfp::ConstraintOptions constraint;
+  cfp_fuzz::disturb(in, constraint, {&constraint.quantile, &constraint.steepness});
+  const auto model = cfp::fit_constraint(samples, constraint, scratch);
   CFP_PROMISE(is_probability(cfp::static_probability(model, number(-1, 10))));
   CFP_PROMISE(is_probability(model.calculation_confidence));
-  const auto object = cfp::object_probability(samples, cfp::ObjectProbabilityOptions{}, scratch);
+  cfp::ObjectProbabilityOptions scored;
+  cfp_fuzz::disturb(in, scored,
+                    {&scored.degrees_of_freedom, &scored.sigma_px, &scored.noise_factor, &scored.positions[0],
+                     &scored.positions[1], &scored.positions[2], &scored.unknown_object_probability});
+  const auto object = cfp::object_probability(samples, scored, scratch);
   CFP_PROMISE(is_probability(object.static_probability));
-  const cfp::MapPointOptions options;
+  cfp::MapPointOptions options;
+  options.policy = static_cast<cfp::MapPointPolicy>(in.byte() % 3);
+  cfp_fuzz::disturb(in, options,
+                    {&options.rate, &options.evidence_limit, &options.deletion_threshold, &options.mismatch_threshold,
+                     &options.constraint_power, &options.foreground_prior, &options.background_prior});
   Scalar m = cfp::clamp_probability(number(0, 1));
   for (int k = 0; k < 20; ++k) {
     m = cfp::updated_map_point(number(0, 1), m, options);

@@ -41,6 +41,48 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
   options.coarse.flow.use_depth = in.flag();
   options.tracker.image_width = in.flag() ? 640 : 0;
   options.tracker.image_height = 480;
+  if (in.flag()) {
+    auto& flow = options.coarse.flow;
+    auto& object = options.coarse.object;
+    auto& fine = options.fine;
+    auto& point = options.map_point;
+    flow.min_outside_pairs = flow.motion.min_pairs = object.min_pairs = 8;
+    point.weight = in.flag() ? cfp::WeightRule::product : cfp::WeightRule::posterior;
+    cfp_fuzz::disturb(in, options,
+                      {&options.object_threshold,
+                       &options.min_creation_probability,
+                       &options.min_inlier_weight,
+                       &options.coarse.flow_radius_px,
+                       &options.coarse.memory.time_constant_s,
+                       &options.coarse.memory.evidence_limit,
+                       &flow.motion.min_inlier_share,
+                       &flow.motion.min_sigma_px,
+                       &flow.motion.max_sigma_px,
+                       &flow.motion.distance.depth_noise.constant_m,
+                       &flow.motion.distance.depth_noise.quadratic,
+                       &flow.ransac.threshold_px,
+                       &object.degrees_of_freedom,
+                       &object.sigma_px,
+                       &object.noise_factor,
+                       &object.unknown_object_probability,
+                       &fine.min_pose_inliers,
+                       &fine.min_translation_m,
+                       &fine.min_parallax,
+                       &fine.projection.quantile,
+                       &fine.projection.steepness,
+                       &fine.epipolar.quantile,
+                       &fine.epipolar.steepness,
+                       &fine.matching.radius_px,
+                       &fine.matching.max_ratio,
+                       &point.rate,
+                       &point.evidence_limit,
+                       &point.deletion_threshold,
+                       &point.mismatch_threshold,
+                       &point.constraint_power,
+                       &point.foreground_prior,
+                       &point.background_prior,
+                       &options.health.min_effective_points});
+  }
   cfp::StaticProbability probability(camera, options);
   std::vector<float> all;
   std::size_t previous = 0;

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <initializer_list>
 #include <limits>
 #include <vector>
 
@@ -84,6 +85,17 @@ class FuzzInput {
   const std::uint8_t* data_;
   std::size_t size_;
 };
+
+/// Other values for some of the options' fields, hostile ones among them, as far as validation lets them pass.
+template <typename Options>
+void disturb(FuzzInput& in, Options& options, std::initializer_list<double*> fields) {
+  for (double* field : fields) {
+    if (in.byte() >= 40) continue;
+    const double before = *field;
+    *field = in.number(0, 2);
+    if (invalid_field(options)) *field = before;
+  }
+}
 
 template <typename Scalar>
 [[nodiscard]] bool is_probability(Scalar p) {

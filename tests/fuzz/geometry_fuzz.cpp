@@ -55,7 +55,10 @@ void pose(FuzzInput& in) {
   for (int k = 0; k < 6; ++k) xi[k] = in.number(-0.3, 0.3);
   const cfp::SE3<double> start = cfp::se3_exp(xi);
   cfp::PoseWorkspace<Scalar> workspace;
-  const cfp::PoseOptions options = in.flag() ? cfp::PoseOptions() : cfp::orb_slam2_pose_options();
+  cfp::PoseOptions options = in.flag() ? cfp::PoseOptions() : cfp::orb_slam2_pose_options();
+  cfp_fuzz::disturb(in, options,
+                    {&options.chi2_mono, &options.chi2_stereo, &options.rounds[0].scale, &options.rounds[1].scale,
+                     &options.min_decrease, &options.handover_decrease});
   const cfp::PoseResult result = cfp::refine_pose(observations, camera, start, options, workspace);
   if (result.status == cfp::SolverStatus::invalid_input) return;
   CFP_PROMISE(result.used + result.zero_weight + result.invalid == static_cast<int>(seen.points.size()));
@@ -65,6 +68,7 @@ void pose(FuzzInput& in) {
 
   cfp::PnpRansacOptions ransac;
   ransac.max_iterations = 50;
+  cfp_fuzz::disturb(in, ransac, {&ransac.threshold_px, &ransac.confidence});
   cfp::PnpRansacWorkspace pnp;
   const auto found = cfp::pnp_ransac(cfp::PointSpan<Scalar, 3>(seen.points), cfp::PointSpan<Scalar, 2>(seen.pixels),
                                      cfp::span<const Scalar>(seen.weights), camera, ransac, pnp);
@@ -112,6 +116,7 @@ void two_views(FuzzInput& in) {
   if (in.flag()) weights = in.numbers<float>(n, 0, 1);
   cfp::FundamentalRansacOptions options;
   options.max_iterations = 50;
+  cfp_fuzz::disturb(in, options, {&options.threshold_px, &options.confidence});
   cfp::FundamentalRansacWorkspace workspace;
   cfp::PointPairs<float> pairs{previous, current};
   pairs.weights = weights;
@@ -155,7 +160,11 @@ void bundle(FuzzInput& in) {
   problem.observations.weights = weights;
   problem.fixed_poses = fixed;
   cfp::BundleOptions options;
-  options.levenberg_marquardt.max_iterations = 5;
+  cfp::LevenbergMarquardtOptions& lm = options.levenberg_marquardt;
+  lm.max_iterations = 5;
+  cfp_fuzz::disturb(in, options,
+                    {&options.chi2_mono, &options.chi2_stereo, &lm.initial_damping, &lm.min_damping,
+                     &lm.rejected_damping, &lm.max_damping, &lm.min_relative_decrease, &lm.min_absolute_decrease});
   cfp::BundleWorkspace workspace;
   const auto before = poses;
   const cfp::BundleResult result = cfp::adjust_bundle(problem, options, workspace);
