@@ -65,6 +65,8 @@ def mutants_of(header):
             if kind == "statement" and not complete:
                 continue
             before, after = lines[number].strip(), (lines[number][:start] + replacement + lines[number][end:]).strip()
+            if before == after:
+                continue
             seen[before, after] += 1
             name = f"{header}|{before}|{after}|{seen[before, after]}"
             yield Mutant(hashlib.sha1(name.encode()).hexdigest()[:10], header.split("/")[1], header, number, kind, before, after)

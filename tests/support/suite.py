@@ -22,11 +22,12 @@ def output_of(*command):
         return []
 
 
-def limited_to(seconds):
-    """Limits of a child: processor time, so that a busy machine kills no mutant, and no core files."""
+def limited_to(seconds, bytes_of_data):
+    """Limits of a child: processor time, so that a busy machine kills no mutant, memory, and no core files."""
 
     def limit():
         resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, int(seconds) + 1))
+        resource.setrlimit(resource.RLIMIT_DATA, (bytes_of_data, bytes_of_data))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
     return limit
@@ -68,11 +69,13 @@ class Suite:
         made_with.write_text(flags)
         return self
 
-    def run(self, command, seconds, check=False):
+    def run(self, command, seconds, check=False, **variables):
         """Return code, or None when time ran out: `seconds` of the processor, or four times that and a minute by the clock."""
-        environment = dict(os.environ, RC_PARAMS="seed=20261121", ASAN_OPTIONS="detect_leaks=0")
+        environment = dict(os.environ, RC_PARAMS="seed=20261121", ASAN_OPTIONS="detect_leaks=0", **variables)
+        shadow = self.emulator or any("-fsanitize" in flag for flag in self.flags)
+        limit = limited_to(seconds, resource.RLIM_INFINITY if shadow else 4 << 30)
         process = subprocess.Popen([*self.launcher, *command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-                                   env=environment, preexec_fn=limited_to(seconds), start_new_session=True, errors="replace")
+                                   env=environment, preexec_fn=limit, start_new_session=True, errors="replace")
         try:
             self.output, _ = process.communicate(timeout=60 + 4 * seconds)
         except subprocess.TimeoutExpired:
@@ -88,11 +91,11 @@ class Suite:
         needs = {"interop": self.opencv[0], "properties": pathlib.Path("/usr/include/rapidcheck").exists()}
         return needs.get(test.parent.name, True)
 
-    def compiled(self, test, target, overlay=None):
+    def compiled(self, test, target, overlay=None, more=()):
         """True when the test compiles, with the headers of `overlay` in front of the library's."""
         front = [f"-I{overlay}", f"-ffile-prefix-map={overlay}={ROOT}/include"] if overlay else []
         extra = self.opencv[0] if test.parent.name == "interop" else []
-        command = [*self.compiler, *front, *self.flags, *extra, "-include", str(self.build / "all.hpp"), "-c", str(test), "-o", str(target)]
+        command = [*self.compiler, *front, *self.flags, *more, *extra, "-include", str(self.build / "all.hpp"), "-c", str(test), "-o", str(target)]
         return self.run(command, 300) == 0
 
     def linked(self, room, objects, program):
