@@ -1,0 +1,104 @@
+// The defaults of all options as the studies of benchmarks/ chose them, or as the field has them: a changed one is a
+// change of behaviour and is made here as well, with its measurement.
+#include "cfp/cfp.hpp"
+#include "support/catch.hpp"
+
+TEST_CASE("The defaults of the box tracker", "[core]") {
+  const cfp::BoxTrackerOptions o;
+  CHECK((o.min_iou == 0.3 && o.min_score == -1e300 && o.birth_threshold == -1e300 && o.confirm_hits == 2));
+  CHECK((o.max_coast == 6 && o.max_idle == 0 && o.coast_per_hit == 1 && o.min_visible == 0.25 && o.max_gap_s == 2));
+  CHECK((o.image_width == 0 && o.image_height == 0));
+  const cfp::BoxMotionOptions& m = o.motion;
+  CHECK((m.edge_noise == 0.07 && m.centre_acceleration == 1 && m.size_acceleration == 0.2));
+  CHECK((m.initial_centre_rate == 2 && m.initial_size_rate == 0.2));
+}
+
+TEST_CASE("The defaults of the depth foreground", "[core]") {
+  const cfp::ForegroundOptions o;
+  CHECK((o.rule == cfp::ForegroundRule::depth_window && o.near_share == 0.15 && o.upper_share == 0.1));
+  CHECK((o.obstacle_m == 0.4 && o.before_m == 0.5 && o.behind_m == 0.4 && o.first_gap_m == 0.15));
+  CHECK((o.last_gap_m == 0.6 && o.min_gap_m == 0.04 && o.half_body_m == 0.05 && o.min_points == 6));
+  CHECK(o.invalid_is_foreground);
+  const cfp::AdaptiveOptions& a = o.adaptive;
+  CHECK((a.rule == cfp::AdaptiveRule::foreground_density && a.noise_factor == 3 && a.min_eps_m == 0.1));
+  CHECK((a.max_eps_m == 0.3 && a.spacing_factor == 3 && a.min_share == 0.15 && a.density == 0.3));
+  CHECK((a.fixed.eps == 0.15 && a.fixed.min_pts == 5));
+}
+
+TEST_CASE("The defaults of the flow and of objects", "[core]") {
+  const cfp::FrameOptions frame;
+  const cfp::CoarseOptions& o = frame.coarse;
+  CHECK((o.use_object_probability && o.use_depth_foreground && o.soft_background && o.flow_radius_px == 10));
+  const cfp::FlowModelOptions& flow = o.flow;
+  CHECK((flow.min_outside_pairs == 30 && flow.use_rotation_homography && flow.use_depth));
+  CHECK((flow.motion.min_pairs == 30 && flow.motion.min_inlier_share == 0.5));
+  CHECK((flow.motion.min_sigma_px == 0.05 && flow.motion.max_sigma_px == 1));
+  CHECK((o.object.score == cfp::ObjectScore::survival && o.object.degrees_of_freedom == 2));
+  CHECK((o.object.sigma_px == 1 && o.object.noise_factor == 5.8 && o.object.min_pairs == 10));
+  CHECK((o.object.positions == std::array<double, 3>{0.2, 0.3, 0.4}));
+  CHECK(o.object.unknown_object_probability == 0.5);
+  CHECK((o.memory.time_constant_s == 0.2 && o.memory.evidence_limit == 3));
+}
+
+TEST_CASE("The defaults of constraints, map points and frames", "[core]") {
+  const cfp::FrameOptions o;
+  CHECK((o.use_boxes && o.classes.size() == 1 && o.classes[0].class_id == 0 && o.classes[0].non_rigid));
+  CHECK((o.object_threshold == 0.9 && o.min_creation_probability == 0.3 && o.min_inlier_weight == 0.1));
+  CHECK((o.fine.enabled && o.fine.min_pose_inliers == 10 && o.fine.min_translation_m == 0.005));
+  CHECK(o.fine.min_parallax == 0);
+  for (const cfp::ConstraintOptions& c : {o.fine.projection, o.fine.epipolar})
+    CHECK((c.quantile == 0.8 && c.steepness == 5 && c.min_samples == 10));
+  CHECK((o.fine.matching.radius_px == 40 && o.fine.matching.max_distance == 50 && o.fine.matching.max_ratio == 0.9));
+  const cfp::MapPointOptions& m = o.map_point;
+  CHECK((m.policy == cfp::MapPointPolicy::log_odds && m.weight == cfp::WeightRule::posterior && m.rate == 0.2));
+  CHECK((m.evidence_limit == 0.02 && m.deletion_threshold == 0.3 && m.mismatch_threshold == 0.5));
+  CHECK((m.constraint_power == 0.5 && m.foreground_prior == 0.02 && m.background_prior == 0.9));
+  CHECK((o.health.use_fallback && o.health.min_effective_points == 10));
+}
+
+TEST_CASE("The defaults of what judges poses and detectors", "[core]") {
+  const cfp::PoseHealthOptions p;
+  CHECK((p.min_inliers == 20 && p.min_inlier_share == 0.3 && p.min_spread == 0.1));
+  CHECK((p.max_position_sigma_m == 0.03 && p.max_rotation_sigma_rad == 0.02));
+  CHECK((p.max_speed_m_s == 4 && p.max_turn_rad_s == 8 && p.slack_m == 0.05 && p.slack_rad == 0.05));
+  const cfp::FrameIntervalOptions i;
+  CHECK((i.factor == 3 && i.shortest_s == 0.2));
+  const cfp::DetectorHealthOptions d;
+  CHECK((d.silent_after == 3 && d.believed_after == 90 && d.stuck_after == 3 && d.confirmed_after == 10));
+  CHECK((d.border_share == 0.03 && d.leaving_share == 0.15 && d.max_box_share == 0.9));
+}
+
+TEST_CASE("The defaults of the estimators", "[core]") {
+  const cfp::FundamentalRansacOptions F;
+  CHECK((F.threshold_px == 1 && F.confidence == 0.99 && F.min_iterations == 30 && F.max_iterations == 1000));
+  CHECK((F.min_inliers == 12 && F.sampling == cfp::Sampling::weighted && F.seed == 0));
+  const cfp::PnpRansacOptions pnp;
+  CHECK((pnp.threshold_px == 2.5 && pnp.min_iterations == 5 && pnp.max_iterations == 10000 && pnp.min_inliers == 8));
+  const cfp::PoseOptions p;
+  CHECK((p.chi2_mono == 5.991 && p.chi2_stereo == 7.815 && p.min_observations == 3 && p.max_iterations == 20));
+  CHECK((p.round_count == 2 && p.rounds[0].loss == cfp::LossType::geman_mcclure && p.rounds[0].scale == 30));
+  CHECK((p.rounds[1].loss == cfp::LossType::geman_mcclure && p.rounds[1].scale == 1.5));
+  CHECK((p.min_decrease == 1e-2 && p.handover_decrease == 0.3 && !p.from_start && !p.inliers_only));
+  const cfp::BundleOptions b;
+  CHECK((b.loss == cfp::LossType::huber && b.chi2_mono == 5.991 && b.chi2_stereo == 7.815));
+  const cfp::LevenbergMarquardtOptions& l = b.levenberg_marquardt;
+  CHECK((l.max_iterations == 10 && l.initial_damping == 1e-4 && l.min_damping == 1e-8 && l.rejected_damping == 1e-8));
+  CHECK((l.max_damping == 1e10 && l.min_relative_decrease == 1e-6 && l.min_absolute_decrease == 1e-9));
+}
+
+TEST_CASE("The defaults of the evaluation", "[core]") {
+  const cfp::AbsoluteErrorOptions a;
+  CHECK((a.association.max_difference_s == 0.02 && a.association.offset_s == 0 && a.expected_poses == 0));
+  CHECK(a.alignment == cfp::AlignmentMode::rigid);
+  const cfp::RelativeErrorOptions r;
+  CHECK((r.delta == 1 && r.unit == cfp::DeltaUnit::seconds && r.offset_s == 0 && r.scale == 1));
+  CHECK(r.expected_poses == 0);
+}
+
+TEST_CASE("ORB-SLAM2's schedule of pose rounds is ORB-SLAM2's", "[core]") {
+  const cfp::PoseOptions p = cfp::orb_slam2_pose_options();
+  CHECK((p.round_count == 4 && p.max_iterations == 10 && p.min_decrease == 1e-8));
+  CHECK((p.from_start && p.inliers_only));
+  for (std::size_t k = 0; k < 4; ++k)
+    CHECK(p.rounds[k].loss == (k < 3 ? cfp::LossType::huber : cfp::LossType::trivial));
+}
