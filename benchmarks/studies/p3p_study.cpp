@@ -41,6 +41,7 @@ using Points = std::array<Vector, 3>;
 
 struct Problem : cfp::P3PProblem<double> {
   cfp::SE3<double> truth;
+  std::vector<Vector> points, unit_rays;  // the same, as PoseLib wants them
 };
 
 using Poses = std::vector<cfp::SE3<double>>;
@@ -115,6 +116,8 @@ Problem make_problem(cfp::Random& random, const std::function<Points(cfp::Random
   for (std::size_t i = 0; i < 3; ++i) {
     problem.rays[i] = points[i] / points[i].z();
     problem.world[i] = problem.truth.inverse() * points[i];
+    problem.points.push_back(problem.world[i]);
+    problem.unit_rays.push_back(problem.rays[i].normalized());
   }
   return problem;
 }
@@ -148,13 +151,11 @@ std::vector<Method> make_methods() {
                      }});
 #ifdef CFP_HAVE_POSELIB
   const auto poselib = [&methods](const char* name, auto solver) {
-    methods.push_back({name, [solver](const Problem& problem, Poses& poses) {
-                         std::vector<Eigen::Vector3d> rays, world(problem.world.begin(), problem.world.end());
-                         for (const Vector& ray : problem.rays) rays.push_back(ray.normalized());
-                         std::vector<poselib::CameraPose> found;
-                         solver(rays, world, &found);
-                         for (const auto& pose : found) poses.push_back({pose.R(), pose.t});
-                       }});
+    methods.push_back(
+        {name, [solver, found = std::vector<poselib::CameraPose>()](const Problem& problem, Poses& poses) mutable {
+           solver(problem.unit_rays, problem.points, &found);
+           for (const auto& pose : found) poses.push_back({pose.R(), pose.t});
+         }});
   };
   poselib("PoseLib", poselib::p3p);
   poselib("Lambda Twist", poselib::p3p_lambdatwist);
