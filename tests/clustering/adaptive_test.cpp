@@ -37,6 +37,44 @@ TEST_CASE("The default's min_pts grows with n at unchanged shape", "[clustering]
   }
 }
 
+TEST_CASE("eps and min_pts of chosen depths are those of the documented rule", "[clustering]") {
+  cfp::DbscanWorkspace<double> workspace;
+  cfp::AdaptiveOptions options;
+  options.noise_factor = 0;
+  options.min_eps_m = 0.01;
+  options.max_eps_m = 0.5;
+  const auto ramp = [](std::size_t n, double step) {
+    std::vector<double> depths(n);
+    for (std::size_t i = 0; i < n; ++i) depths[i] = 1 + step * static_cast<double>(i);
+    return depths;
+  };
+  const auto eps = [&](const std::vector<double>& depths) {
+    return cfp::adaptive_options(depths, options, workspace).eps;
+  };
+  // The mean spacing of 8 depths on either side of the one at 15 %, of what there are at the ends.
+  CHECK_THAT(eps(ramp(101, 0.02)), WithinAbs(0.06, 1e-12));
+  CHECK_THAT(eps(ramp(4, 0.02)), WithinAbs(0.06, 1e-12));
+  std::vector<double> uneven = ramp(101, 0.02);
+  for (std::size_t i = 0; i < uneven.size(); ++i) uneven[i] += i > 15 ? 0.08 : 0;
+  CHECK_THAT(eps(uneven), WithinAbs(3 * (16 * 0.02 + 0.08) / 16, 1e-12));
+  CHECK(eps(ramp(101, 0.2)) == 0.5);
+  CHECK(eps(ramp(101, 0.001)) == 0.01);
+  options.noise_factor = 5;
+  const double z = 1 + 0.02 * 15;
+  CHECK_THAT(eps(ramp(101, 0.02)), WithinAbs(std::max(0.06, 5 * cfp::DepthNoise{}.sigma_m(z)), 1e-12));
+  options.noise = {0.1, 0.0, 0.0};
+  CHECK_THAT(eps(ramp(101, 0.02)), WithinAbs(0.5, 1e-12));
+  // min_pts: of the largest count among what reaches to eps behind that depth, its end included.
+  options.noise_factor = 0;
+  options.min_share = 0;
+  options.density = 1;
+  options.min_eps_m = options.max_eps_m = 0.25;
+  CHECK(cfp::adaptive_options(std::vector<double>{1, 1.25, 1.375, 1.5, 9, 9, 9, 9, 9, 9}, options, workspace).min_pts ==
+        4);
+  options.density = 0.5;
+  CHECK(cfp::adaptive_options(std::vector<double>(9, 1.0), options, workspace).min_pts == 5);
+}
+
 TEMPLATE_TEST_CASE("Every rule keeps eps above the sensor's noise and survives hostile depths", "[clustering]", float,
                    double) {
   cfp::DbscanWorkspace<TestType> workspace;

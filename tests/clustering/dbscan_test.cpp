@@ -84,6 +84,15 @@ TEST_CASE("A border point joins its nearest core point and the lower one of two"
         std::vector<int>({0, 0, 0, 0, 1, 1, 1, 1, 1}));
 }
 
+TEST_CASE("A border point may be exactly eps away, on either side", "[clustering]") {
+  cfp::DbscanWorkspace<double> workspace;
+  std::vector<int> labels(5);
+  const std::vector<double> values{-0.25, 0, 0.125, 0.25, 0.5};
+  const auto result = cfp::dbscan(values, {0.25, 4}, workspace, labels);
+  CHECK(result.core_points == 2);  // 0 and 0.25; between them 0.125 has three neighbours
+  CHECK(labels == std::vector<int>(5, 0));
+}
+
 TEST_CASE("The point counts itself in min_pts", "[clustering]") {
   CHECK(cluster<double>({3.0}, 0.1, 1).labels == std::vector<int>({0}));
   CHECK(cluster<double>({3.0}, 0.1, 2).labels == std::vector<int>({-1}));

@@ -102,3 +102,10 @@ TEST_CASE("ORB-SLAM2's schedule of pose rounds is ORB-SLAM2's", "[core]") {
   for (std::size_t k = 0; k < 4; ++k)
     CHECK(p.rounds[k].loss == (k < 3 ? cfp::LossType::huber : cfp::LossType::trivial));
 }
+
+TEST_CASE("A result that nothing was computed for says so", "[core]") {
+  const cfp::PoseResult p;
+  CHECK((!cfp::is_solved(p.status) && p.used == 0 && p.inliers == 0 && p.zero_weight == 0 && p.invalid == 0));
+  const cfp::BundleResult b;
+  CHECK((!cfp::is_solved(b.status) && b.used == 0 && b.zero_weight == 0 && b.invalid == 0 && b.behind == 0));
+}

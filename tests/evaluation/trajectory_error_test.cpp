@@ -192,6 +192,10 @@ TEST_CASE("Coverage tells of lost frames, gaps and late starts", "[evaluation]")
   CHECK_THAT(coverage.time_fraction, WithinAbs(0.4, 1e-12));
   CHECK_THAT(coverage.largest_gap_s, WithinAbs(2, 1e-12));
   CHECK_THAT(coverage.largest_stamp_difference_s, WithinAbs(0.004, 1e-12));
+  for (auto& pose : estimate) pose.time_s -= 0.5;
+  options.association.offset_s = 0.5;
+  const auto shifted = cfp::absolute_trajectory_error(truth, estimate, options, workspace).coverage;
+  CHECK_THAT(shifted.largest_stamp_difference_s, WithinAbs(0.004, 1e-12));
 }
 
 TEMPLATE_TEST_CASE("Hostile trajectories and options give finite results and a status", "[evaluation]", float, double) {

@@ -1,5 +1,6 @@
 #include "cfp/frame/camera_motion.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -27,8 +28,8 @@ cfp::SE3<double> motion(double translation_m, double rotation_rad, cfp::Random& 
   return cfp::se3_exp(xi);
 }
 
-/// n pairs of a static room under T; every `mover`-th one (0: none) moves 8 px on its own.
-Flow flow(int n, const cfp::SE3<double>& T, double noise_px, int mover, cfp::Random& random) {
+/// n pairs of a static room under T; every `mover`-th one (0: none) moves on its own.
+Flow flow(int n, const cfp::SE3<double>& T, double noise_px, int mover, cfp::Random& random, double moves_px = 8) {
   Flow result;
   const cfp::DepthNoise depth_noise;
   for (int i = 0; i < n; ++i) {
@@ -39,7 +40,7 @@ Flow flow(int n, const cfp::SE3<double>& T, double noise_px, int mover, cfp::Ran
     REQUIRE(camera.unproject(p, ray));
     if (!camera.project(T * cfp::Vector3<double>(z * ray), q)) continue;
     q += noise_px * cfp::Vector2<double>(random.normal(), random.normal());
-    if (mover > 0 && i % mover == 0) q.x() += 8;
+    if (mover > 0 && i % mover == 0) q.x() += moves_px;
     result.previous.push_back({p.x(), p.y()});
     result.current.push_back({q.x(), q.y()});
     result.depths.push_back(z + depth_noise.sigma_m(z) * random.normal());
@@ -69,6 +70,22 @@ TEST_CASE("The camera's motion and the flow's noise are found at rest, in rotati
       }
     }
   }
+}
+
+TEST_CASE("What moves by a few sigma of the measured noise does not take the camera with it",
+          "[frame][camera_motion]") {
+  cfp::Random random(5, "slow movers");
+  cfp::CameraMotionWorkspace<double> workspace;
+  double worst = 0;
+  for (int i = 0; i < 10; ++i) {
+    const cfp::SE3<double> T = motion(0.03, 0.02, random);
+    const Flow f = flow(300, T, 0.05, 3, random, 1.0);
+    const cfp::CameraMotion<double> found =
+        cfp::estimate_camera_motion<double>(f.pairs(), f.outside, cfp::SE3<double>(), camera, {}, workspace);
+    REQUIRE(found.known);
+    worst = std::max(worst, (T.inverse() * found.T_cur_prev).translation.norm());
+  }
+  CHECK(worst < 0.001);
 }
 
 TEST_CASE("Too few pairs with depth, or pairs that do not agree, give no motion", "[frame][camera_motion]") {

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "cfp/core/random.hpp"
@@ -122,6 +123,27 @@ TEST_CASE("No match beyond the radius or the distance, nor for what is not finit
   CHECK(other.run() == 0);
   other.to.clear();
   CHECK(other.run() == 0);
+}
+
+TEST_CASE("The largest distance that matches is the option's, and a pixel without y is no candidate", "[frame]") {
+  Pairs pair(16, 1);
+  for (const int bits : {49, 50, 51, 52}) {
+    pair.to[0] = pair.from[0];
+    for (int b = 0; b < bits; ++b) pair.to[0][std::size_t(b / 8)] ^= static_cast<std::uint8_t>(1 << (b % 8));
+    pair.match[0] = -1;
+    CHECK(pair.run() == (bits <= 50 ? 1U : 0U));
+  }
+  Pairs whole(17);
+  whole.run();
+  Pairs holes(17);
+  for (std::size_t j = 0; j < 200; j += 3) holes.previous[j][1] = std::numeric_limits<double>::quiet_NaN();
+  holes.run();
+  std::size_t same = 0;
+  for (std::size_t i = 0; i < 200; ++i) {
+    if (whole.match[i] >= 0 && whole.match[i] % 3 != 0) same += holes.match[i] == whole.match[i] ? 1U : 0U;
+    if (holes.match[i] >= 0) CHECK(holes.match[i] % 3 != 0);
+  }
+  CHECK(same >= 130);
 }
 
 TEST_CASE("Repeated matching allocates nothing and gives the same bits", "[frame]") {

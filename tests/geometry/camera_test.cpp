@@ -127,6 +127,19 @@ TEMPLATE_TEST_CASE("unproject inverts project", "[geometry]", PinholeCamera<floa
   }
 }
 
+TEMPLATE_TEST_CASE("a pixel beyond the scalar's range is none; the camera without parameters is the normalised one",
+                   "[geometry]", float, double) {
+  const auto far = (std::numeric_limits<TestType>::max)();
+  const PinholeCamera<TestType> camera{500, 500, 320, 240};
+  Vector2<TestType> pixel(-7, -7);
+  CHECK_FALSE(camera.project(Vector3<TestType>(far, 0, 1), pixel));
+  CHECK_FALSE(camera.project(Vector3<TestType>(0, -far, 1), pixel));
+  CHECK_FALSE(camera.project(Vector3<TestType>(far, far, 1), pixel));
+  CHECK(pixel == Vector2<TestType>(-7, -7));
+  CHECK(PinholeCamera<TestType>().project(Vector3<TestType>(1, -3, 4), pixel));
+  CHECK(pixel == Vector2<TestType>(TestType(0.25), TestType(-0.75)));
+}
+
 TEMPLATE_TEST_CASE("cameras answer hostile input with false and leave the outputs alone", "[geometry]",
                    PinholeCamera<float>, PinholeCamera<double>, RadialTangentialCamera<float>,
                    RadialTangentialCamera<double>) {

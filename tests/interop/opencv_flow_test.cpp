@@ -7,7 +7,6 @@
 
 #include "support/catch.hpp"
 
-
 namespace {
 
 // A smooth random texture.
@@ -64,6 +63,13 @@ TEST_CASE("Pairs follow the image, over several frames and with either check", "
   }
 }
 
+TEST_CASE("The defaults of the flow", "[flow]") {
+  const cfp::OpticalFlowOptions o;
+  CHECK((o.corners == 500 && o.corner_distance == 6 && o.corner_quality == 0.01 && o.keypoints_per_box == 100));
+  CHECK((o.keypoints_outside == 0 && o.window == 15 && o.levels == 4 && o.iterations == 20 && o.precision == 0.02));
+  CHECK((!o.backward && o.max_backward_px == 0.5F));
+}
+
 TEST_CASE("No region gets more points than it may have", "[flow]") {
   const cv::Mat image = texture();
   const std::vector<cv::KeyPoint> keypoints = keypoints_of(image);
@@ -90,6 +96,51 @@ TEST_CASE("No region gets more points than it may have", "[flow]") {
     corners.track(image, {}, {});
     corners.track(image, keypoints, {});
     CHECK(corners.previous().size() == static_cast<std::size_t>(points));
+  }
+}
+
+TEST_CASE("The strongest keypoint of every cell of a box is followed, and nothing of frames before", "[flow]") {
+  const cv::Mat image = texture();
+  const cfp::Box<float> box{100, 30, 200, 270};
+  cfp::OpticalFlowOptions options;
+  options.corners = 0;
+  options.keypoints_per_box = 15;  // cells of 40 px: 2 across, 6 down
+  std::vector<cv::KeyPoint> keypoints, best(12);
+  cv::RNG random(5);
+  for (int k = 0; k < 400; ++k) {
+    const float x = random.uniform(101.0F, 199.0F), y = random.uniform(31.0F, 269.0F);
+    keypoints.emplace_back(x, y, 31.0F, -1.0F, random.uniform(0.0F, 1.0F));
+    cv::KeyPoint& of_cell = best[static_cast<std::size_t>(2 * int((y - 30) / 40) + int((x - 100) / 50))];
+    if (of_cell.response < keypoints.back().response) of_cell = keypoints.back();
+  }
+  cfp::OpticalFlowTracker tracker(options);
+  tracker.track(image, {}, {});
+  for (int repeat = 0; repeat < 3; ++repeat) {
+    tracker.track(image, keypoints, cfp::span<const cfp::Box<float>>(&box, 1));
+    std::vector<cv::Point2f> expected;
+    for (const cv::KeyPoint& k : best) expected.push_back(k.pt);
+    CHECK(tracker.previous() == expected);
+  }
+}
+
+TEST_CASE("Corners keep their distance; without a pyramid they are found at full resolution", "[flow]") {
+  const cv::Mat image = texture();
+  for (const int levels : {1, 4}) {
+    cfp::OpticalFlowOptions options;
+    options.levels = levels;
+    cfp::OpticalFlowTracker tracker(options);
+    tracker.track(image, {}, {});
+    tracker.track(image, {}, {});
+    const auto& corners = tracker.previous();
+    REQUIRE(corners.size() > 100);
+    double smallest = 1e9;
+    bool odd = false;
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      odd = odd || static_cast<int>(corners[i].x) % 2 == 1;
+      for (std::size_t j = 0; j < i; ++j) smallest = std::min(smallest, cv::norm(corners[i] - corners[j]));
+    }
+    CHECK((smallest >= 5.99 && smallest < 9));
+    CHECK(odd == (levels == 1));
   }
 }
 
