@@ -72,10 +72,14 @@ def mutants_of(header):
             yield Mutant(hashlib.sha1(name.encode()).hexdigest()[:10], header.split("/")[1], header, number, kind, before, after)
 
 
-def chosen(seed, only):
-    """Every mutant, in an order of which each beginning is spread over rooms (by the root of their size) and kinds."""
+def chosen(seed, only, headers_per_room=None):
+    """Every mutant, or those of some headers, in an order of which each beginning is spread over rooms (by the root of their size) and kinds."""
     headers = sorted(p.relative_to(ROOT / "include").as_posix() for p in (ROOT / "include/cfp").glob("*/**/*.hpp"))
     rooms = defaultdict(lambda: defaultdict(list))
+    if headers_per_room:
+        for room in {header.split("/")[1] for header in headers}:
+            mine = sorted((h for h in headers if h.split("/")[1] == room), key=lambda h: hashlib.sha1(f"{seed} {h}".encode()).digest())
+            headers = [h for h in headers if h not in mine[headers_per_room:]]
     for header in headers:
         for mutant in mutants_of(header):
             if not only or mutant.room in only or header.endswith(tuple(only)):

@@ -28,8 +28,9 @@ def options():
     parser.add_argument("--seed", default="1", help="chooses the mutants (1)")
     parser.add_argument("--count", type=int, default=200, help="mutants (200)")
     parser.add_argument("--only", action="append", default=[], metavar="ROOM", help="a room or a header's name; may be repeated")
+    parser.add_argument("--headers", type=int, metavar="N", help="so many of each room, chosen by the seed (all)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="mutants at a time")
-    parser.add_argument("--tests", type=int, default=12, help="tests that a mutant must survive, the nearest first (12)")
+    parser.add_argument("--tests", type=int, default=5, help="tests built for a mutant, the nearest first (5); those built for others run, too")
     parser.add_argument("--again", action="store_true", help="tries earlier survivors once more")
     parser.add_argument("--quick", action="store_true", help="leaves out the mutants that need builds of their own")
     parser.add_argument("--sanitize", action="store_true", help="survivors meet their two nearest tests again under the sanitizers")
@@ -38,8 +39,13 @@ def options():
     return parser.parse_args()
 
 
+def mark(header, before, after):
+    """What equivalents.txt calls a mutant."""
+    return header, after if after not in ("", ";") else f"without {before}"
+
+
 def equivalents():
-    """(header, mutated line) of the mutants that nobody can tell from the original, with the reason."""
+    """The marks of the mutants that nobody can tell from the original; the reasons stand beside them."""
     lines = (ROOT / "tests/mutations/equivalents.txt").read_text().splitlines()
     return {tuple(part.strip() for part in line.split(" ## ")[:2]) for line in lines if line and line[0] != "#"}
 
@@ -111,7 +117,8 @@ class Together:
     def tried(self, mutant, limit):
         """(outcome, test, seconds), or None for a mutant that needs a build of its own."""
         start, seen = time.monotonic(), False
-        for test in tests_of(mutant.header)[:limit]:
+        near, far = tests_of(mutant.header)[:limit], tests_of(mutant.header)[limit:]
+        for test in near + [t for t in far if self.programs.get(t)]:
             built = self.program(test)
             if mutant.id in self.switched.dropped:
                 return None
@@ -153,7 +160,7 @@ def alone(mutant, folder, plain, sanitized, limit):
 def report(rows, missing):
     known = equivalents()
     for row in rows:
-        if row["outcome"] in ("survived", "same code") and (row["header"], row["after"] or ";") in known:
+        if row["outcome"] in ("survived", "same code") and mark(row["header"], row["before"], row["after"]) in known:
             row["outcome"] = "equivalent"
     rooms = defaultdict(Counter)
     for row in rows:
@@ -181,7 +188,7 @@ def main():
     if asked.again:
         rows = {k: row for k, row in rows.items() if row["outcome"] in ("killed", "not compiled")}
     launcher = shlex.split(asked.launcher)
-    mutants, known, guard = chosen(asked.seed, asked.only)[: asked.count], equivalents(), threading.Lock()
+    mutants, known, guard = chosen(asked.seed, asked.only, asked.headers)[: asked.count], equivalents(), threading.Lock()
 
     def note(mutant, outcome, test="", seconds=0.0):
         with guard:
@@ -213,7 +220,7 @@ def main():
 
     if not asked.report:
         for mutant in mutants:
-            if mutant.id not in rows and (mutant.header, mutant.after or ";") in known:
+            if mutant.id not in rows and mark(mutant.header, mutant.before, mutant.after) in known:
                 note(mutant, "equivalent")
         together = Together(build / "together", mutants, launcher).prepared()
         over([m for m in mutants if m.id not in rows], lambda m, _: together.tried(m, asked.tests))
@@ -222,7 +229,7 @@ def main():
         plain = Suite(build / "plain", FLAGS, launcher).prepared()
         sanitized = Suite(build / "sanitized", strict, launcher) if asked.sanitize else None
         over([m for m in mutants if m.id not in rows],
-             lambda m, number: alone(m, build / f"worker{number}", plain, sanitized, min(asked.tests, 5)))
+             lambda m, number: alone(m, build / f"worker{number}", plain, sanitized, asked.tests))
     report([rows[m.id] for m in mutants if m.id in rows], sum(m.id not in rows for m in mutants))
 
 

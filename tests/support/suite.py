@@ -151,8 +151,9 @@ def tests_of(header):
         steps = includes_of(test).get(path)
         if steps is None or "_ceres_" in test.name or (test.parent.name == "interop" and room != "interop"):
             continue
-        mirror, at_home = test.stem.startswith(f"{stem}_"), test.parent.name == room
-        ranked.append((not mirror, not at_home, steps, test.parent.name != "properties", test.stat().st_size, test))
+        mirror, at_home = test.stem.startswith(f"{stem}_"), test.parent.name == room or test.stem == "defaults_test"
+        of_room = test.stem in ("defaults_test", f"{room}_properties_test")
+        ranked.append((not mirror, not at_home, not of_room, steps, test.parent.name != "properties", test.stat().st_size, test))
     return [entry[-1] for entry in sorted(ranked)]
 
 
