@@ -3,9 +3,8 @@
 /// thread: who does not include it does not need the thread library.
 #pragma once
 
-#include <atomic>
 #include <condition_variable>
-#include <cstdint>
+#include <functional>
 #include <mutex>
 #include <thread>
 
@@ -17,14 +16,17 @@ inline namespace CFP_ISA {
 /// An executor with one helper thread, started by the constructor and joined by the destructor: keep it as long as you
 /// keep the workspace. `executor(count, task)` calls task(0), …, task(count - 1), each on whichever of the two threads
 /// comes to it first, and returns when all are done. On a busy machine, where the helper comes late, the caller does
-/// all of them: it waits only for a task that the helper has begun. The helper looks for work for a few microseconds
-/// (the phases of one solve follow each other closely) and then sleeps. One caller at a time; tasks must not throw.
+/// all of them: it waits only for a task that the helper has begun. One caller at a time; tasks must not throw.
 /// Allocation: none per call.
 class TwoThreads {
  public:
   TwoThreads() : helper_([this] { run(); }) {}
   ~TwoThreads() {
-    post(nullptr, nullptr, 0);
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      stop_ = true;
+    }
+    requested_.notify_one();
     helper_.join();
   }
   TwoThreads(const TwoThreads&) = delete;
@@ -32,63 +34,36 @@ class TwoThreads {
 
   template <typename Task>
   void operator()(int count, const Task& task) {
-    if (count <= 1) {
-      if (count == 1) task(0);
-      return;
-    }
-    post([](const void* context, int i) { (*static_cast<const Task*>(context))(i); }, &task, count);
-    work();
     std::unique_lock<std::mutex> lock(mutex_);
+    task_ = std::cref(task);
+    next_ = 0, count_ = unfinished_ = count;
+    requested_.notify_one();
+    work(lock);
     finished_.wait(lock, [this] { return unfinished_ == 0; });
-    call_ = nullptr;
   }
 
  private:
-  using Call = void (*)(const void*, int);
-
-  void post(Call call, const void* context, int count) {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      call_ = call, context_ = context;
-      next_ = 0, count_ = unfinished_ = count;
-      stop_ = call == nullptr;
-      posted_.fetch_add(1, std::memory_order_release);
-    }
-    requested_.notify_one();
-  }
   /// Does tasks until none is left to begin.
-  void work() {
-    std::unique_lock<std::mutex> lock(mutex_);
+  void work(std::unique_lock<std::mutex>& lock) {
     while (next_ < count_) {
       const int i = next_++;
-      const Call call = call_;
-      const void* const context = context_;
       lock.unlock();
-      call(context, i);
+      task_(i);
       lock.lock();
       if (--unfinished_ == 0) finished_.notify_one();
     }
   }
   void run() {
-    for (std::uint32_t seen = 0;;) {
-      for (int look = 0; look < looks && posted_.load(std::memory_order_acquire) == seen; ++look) {
-      }
-      {
-        std::unique_lock<std::mutex> lock(mutex_);
-        requested_.wait(lock, [&] { return posted_.load(std::memory_order_relaxed) != seen; });
-        seen = posted_.load(std::memory_order_relaxed);
-        if (stop_) return;
-      }
-      work();
+    std::unique_lock<std::mutex> lock(mutex_);
+    while (!stop_) {
+      work(lock);
+      requested_.wait(lock, [this] { return stop_ || next_ < count_; });
     }
   }
 
-  static constexpr int looks = 1 << 13;
-  std::mutex mutex_;  // guards all but posted_
+  std::mutex mutex_;  // guards what follows
   std::condition_variable requested_, finished_;
-  std::atomic<std::uint32_t> posted_{0};
-  Call call_ = nullptr;
-  const void* context_ = nullptr;
+  std::function<void(int)> task_;  // a reference, which fits in without allocation
   int next_ = 0, count_ = 0, unfinished_ = 0;
   bool stop_ = false;
   std::thread helper_;  // last: it uses the others
