@@ -27,6 +27,16 @@ template <typename Scalar>
   return m;
 }
 
+/// I + a hat(w) + b hat(w)^2, the form of everything below.
+template <typename Scalar>
+[[nodiscard]] Matrix3<Scalar> so3_series(const Vector3<Scalar>& w, const Scalar& a, const Scalar& b) noexcept {
+  const Matrix3<Scalar> W = hat(w);
+  Matrix3<Scalar> M = a * W;
+  M.noalias() += b * (W * W);
+  M.diagonal().array() += Scalar(1);
+  return M;
+}
+
 /// exp: rotation vector (axis times angle, rad) to rotation matrix: I + a hat(w) + b hat(w)^2 with
 /// a = sin(t)/t, b = (1 - cos t)/t^2, t = |w|; Taylor expansion below Tolerance::small_angle. Never divides by zero.
 template <typename Scalar = double>
@@ -35,7 +45,6 @@ template <typename Scalar = double>
   using std::sin;
   using std::sqrt;
   const Scalar t2 = w.squaredNorm();
-  const Matrix3<Scalar> W = hat(w);
   Scalar a, b;
   if (t2 > Scalar(Tolerance<Scalar>::small_angle) * Scalar(Tolerance<Scalar>::small_angle)) {
     const Scalar t = sqrt(t2);
@@ -46,10 +55,7 @@ template <typename Scalar = double>
     a = Scalar(1) - t2 / Scalar(6);
     b = Scalar(0.5) - t2 / Scalar(24);
   }
-  Matrix3<Scalar> R = a * W;
-  R.noalias() += b * (W * W);
-  R.diagonal().array() += Scalar(1);
-  return R;
+  return so3_series(w, a, b);
 }
 
 template <typename Derived, typename = typename Derived::PlainObject>
@@ -63,11 +69,7 @@ template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> so3_from_quaternion(const Vector4<Scalar>& q) noexcept {
   const Vector3<Scalar> v = q.template head<3>();
   const Scalar twice = Scalar(2) / q.squaredNorm();
-  const Matrix3<Scalar> V = hat(v);
-  Matrix3<Scalar> R = (twice * q[3]) * V;
-  R.noalias() += twice * (V * V);
-  R.diagonal().array() += Scalar(1);
-  return R;
+  return so3_series(v, Scalar(twice * q[3]), twice);
 }
 
 /// A quaternion (x, y, z, w) with w >= 0 of the rotation R, of unit length up to the error of R.
@@ -119,7 +121,6 @@ template <typename Scalar>
   using std::sin;
   using std::sqrt;
   const Scalar t2 = w.squaredNorm();
-  const Matrix3<Scalar> W = hat(w);
   Scalar b, c;
   // The difference t - sin t cancels well above small_angle. Below 0.1 rad the four-term series is exact for both
   // scalars.
@@ -132,10 +133,7 @@ template <typename Scalar>
     b = Scalar(0.5) - t2 / Scalar(24) * (Scalar(1) - t2 / Scalar(30) * (Scalar(1) - t2 / Scalar(56)));
     c = Scalar(1) / Scalar(6) - t2 / Scalar(120) * (Scalar(1) - t2 / Scalar(42) * (Scalar(1) - t2 / Scalar(72)));
   }
-  Matrix3<Scalar> J = b * W;
-  J.noalias() += c * (W * W);
-  J.diagonal().array() += Scalar(1);
-  return J;
+  return so3_series(w, b, c);
 }
 
 /// The inverse of so3_left_jacobian for |w| < 2 pi: I - hat(w)/2 + d hat(w)^2, d = (1 - (t/2) cot(t/2)) / t^2.
@@ -145,7 +143,6 @@ template <typename Scalar>
   using std::sin;
   using std::sqrt;
   const Scalar t2 = w.squaredNorm();
-  const Matrix3<Scalar> W = hat(w);
   Scalar d;
   if (t2 > Scalar(1e-2)) {
     const Scalar half = Scalar(0.5) * sqrt(t2);
@@ -153,10 +150,7 @@ template <typename Scalar>
   } else {
     d = Scalar(1) / Scalar(12) + t2 / Scalar(720) * (Scalar(1) + t2 / Scalar(42) * (Scalar(1) + t2 / Scalar(40)));
   }
-  Matrix3<Scalar> J = Scalar(-0.5) * W;
-  J.noalias() += d * (W * W);
-  J.diagonal().array() += Scalar(1);
-  return J;
+  return so3_series(w, Scalar(-0.5), d);
 }
 
 /// The rotation of R's normalised quaternion: to first order the nearest one to an R that is nearly a rotation. Removes
