@@ -79,15 +79,10 @@ template <typename Scalar>
 /// F = K_cur^-T [t]x R K_prev^-1. The scale is that of t in metres; zero when t is zero, which every distance then
 /// reports.
 template <typename Scalar>
-[[nodiscard]] Matrix3<Scalar> fundamental_from_pose(const Matrix3<Scalar>& K_prev, const Matrix3<Scalar>& K_cur,
-                                                    const SE3<Scalar>& T_cur_prev) noexcept {
-  return inverse(K_cur).transpose() * essential_from_pose(T_cur_prev) * inverse(K_prev);
-}
-template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> fundamental_from_pose(const PinholeCamera<Scalar>& camera_prev,
                                                     const PinholeCamera<Scalar>& camera_cur,
                                                     const SE3<Scalar>& T_cur_prev) noexcept {
-  return fundamental_from_pose(camera_prev.matrix(), camera_cur.matrix(), T_cur_prev);
+  return inverse(camera_cur.matrix()).transpose() * essential_from_pose(T_cur_prev) * inverse(camera_prev.matrix());
 }
 template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> fundamental_from_pose(const PinholeCamera<Scalar>& camera,

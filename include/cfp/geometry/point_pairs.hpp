@@ -31,15 +31,6 @@ using coordinate_of = std::decay_t<decltype(std::declval<const Points&>()[0][0])
 
 inline constexpr double max_pixel = 1e5;  // beyond it a coordinate is taken for a broken one; no image is that large
 
-}  // namespace detail
-
-template <typename Previous, typename Current>
-PointPairs(const Previous&, const Current&) -> PointPairs<detail::coordinate_of<Previous>>;
-template <typename Previous, typename Current, typename Weights>
-PointPairs(const Previous&, const Current&, const Weights&) -> PointPairs<detail::coordinate_of<Previous>>;
-
-namespace detail {
-
 // x -> factor (x - centre) of one image.
 struct PixelScaling {
   double factor = 0, x = 0, y = 0;
@@ -127,4 +118,10 @@ template <typename Scalar>
 
 }  // namespace CFP_ISA
 }  // namespace detail
+
+template <typename Previous, typename Current>
+PointPairs(const Previous&, const Current&) -> PointPairs<detail::coordinate_of<Previous>>;
+template <typename Previous, typename Current, typename Weights>
+PointPairs(const Previous&, const Current&, const Weights&) -> PointPairs<detail::coordinate_of<Previous>>;
+
 }  // namespace cfp
