@@ -65,8 +65,8 @@ inline namespace CFP_ISA {
 /// double.
 ///
 /// Terminates on any input after at most rows * min(rows, cols + 1) * cols additions, whatever the costs hold.
-/// Ties: equal input gives equal output; among equally cheap partners the free one, then the one of the lower index is
-/// tried first. Allocates only while the workspace grows.
+/// Ties: equal input gives equal output; among equally cheap partners the one of the lower index is tried first.
+/// Allocates only while the workspace grows.
 ///
 /// Source: shortest augmenting paths with prices, R. Jonker and A. Volgenant, "A shortest augmenting path algorithm for
 /// dense and sparse linear assignment problems", Computing 38, 1987. Departure: every row owns a dummy column of cost

@@ -96,7 +96,8 @@ class AssignmentSearch {
       const double least = relax(w_.visits[visits - 1]);
       length = (std::min)(least, dummy);
       if (dummy <= least) break;
-      const std::size_t j = nearest(least);
+      const auto j =
+          static_cast<std::size_t>(std::find(w_.distance.begin(), w_.distance.end(), least) - w_.distance.begin());
       if (w_.row_of_column[j] == unassigned) {
         sink = static_cast<int>(j);
         break;
@@ -126,17 +127,6 @@ class AssignmentSearch {
     Eigen::Map<Eigen::ArrayXd> distance(w_.distance.data(), n);
     distance = (distance.min)(cost + saving + visit.offset);
     return distance.minCoeff();
-  }
-
-  // The open column at that distance: the first free one, else the first.
-  [[nodiscard]] std::size_t nearest(double distance) const noexcept {
-    std::size_t first = columns_;
-    for (std::size_t j = 0; j < columns_; ++j) {
-      if (w_.distance[j] != distance) continue;
-      if (w_.row_of_column[j] == unassigned) return j;
-      if (first == columns_) first = j;
-    }
-    return first;
   }
 
   // Swaps the pairs along the shortest path that ends in column `sink`, or in the dummy of visit `end` when there is no
