@@ -24,7 +24,6 @@
 #include "cfp/evaluation/calibration.hpp"
 #include "cfp/evaluation/error_statistics.hpp"
 #include "cfp/evaluation/trajectory.hpp"
-#include "cfp/evaluation/trajectory_coverage.hpp"
 #include "cfp/evaluation/trajectory_error.hpp"
 #include "cfp/frame/camera_motion.hpp"
 #include "cfp/frame/constrain_keypoints.hpp"

@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
+#include <vector>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
+#include "cfp/math/so3.hpp"
 
 namespace cfp {
 
@@ -50,4 +53,33 @@ inline namespace CFP_ISA {
 
 }  // namespace CFP_ISA
 
+namespace detail {
+inline namespace CFP_ISA {
+
+inline ErrorStatistics statistics_of(const std::vector<double>& errors, std::vector<double>& scratch) {
+  scratch.assign(errors.begin(), errors.end());
+  return error_statistics(scratch);
+}
+
+/// Median time between neighbours (numpy.median); 0 below two poses.
+template <typename Poses>
+double median_interval(const Poses& poses, const std::vector<std::size_t>& order, std::vector<double>& scratch) {
+  scratch.clear();
+  for (std::size_t i = 1; i < order.size(); ++i) {
+    scratch.push_back(
+        (std::min)(poses[order[i]].time_s - poses[order[i - 1]].time_s, (std::numeric_limits<double>::max)()));
+  }
+  return error_statistics(scratch).median;
+}
+
+inline double angle_deg(const Matrix3<double>& R) noexcept { return so3_log(R).norm() * 180 / pi<double>; }
+
+/// The length; the largest double where it overflows.
+inline double finite_norm(const Vector3<double>& v) noexcept {
+  const double length = v.stableNorm();
+  return is_finite(length) ? length : (std::numeric_limits<double>::max)();
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
 }  // namespace cfp

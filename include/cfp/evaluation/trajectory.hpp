@@ -1,16 +1,18 @@
 /// @file trajectory.hpp
-/// Stamped poses and their association by time: the common ground of the trajectory errors. Trajectories may come
-/// unsorted, with duplicates and with broken poses; nothing has to be cleaned before. A trajectory is any array of
-/// StampedPose with size() and []: a std::vector, a span.
+/// Stamped poses, their association by time and its coverage: the common ground of the trajectory errors. Trajectories
+/// may come unsorted, with duplicates and with broken poses; nothing has to be cleaned before. A trajectory is any
+/// array of StampedPose with size() and []: a std::vector, a span.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <tuple>
 #include <vector>
 
 #include "cfp/core/options.hpp"
+#include "cfp/core/span.hpp"
 #include "cfp/math/matrix3.hpp"
 #include "cfp/math/se3.hpp"
 
@@ -43,6 +45,17 @@ struct AssociationWorkspace {
   std::vector<std::size_t> first_order, second_order;
   std::vector<Candidate> candidates;
   std::vector<char> first_taken, second_taken;
+};
+
+/// How much of a recording an estimated trajectory covers: what a reader needs beside every error.
+struct TrajectoryCoverage {
+  std::size_t matched = 0;   ///< estimated poses that entered the error
+  std::size_t expected = 0;  ///< frames the estimate should have
+  std::size_t unusable = 0;  ///< estimated poses dropped: not finite, no rotation, or a stamp that comes again
+  double pose_fraction = 0;  ///< matched / expected, in [0, 1]
+  double time_fraction = 0;  ///< time from the first to the last matched pose / from the first to the last true one
+  double largest_gap_s = 0;  ///< between neighbouring matched poses
+  double largest_stamp_difference_s = 0;  ///< between a matched pose and its truth
 };
 
 inline namespace CFP_ISA {
@@ -116,5 +129,71 @@ void associate(const First& first, const Second& second, const AssociationOption
             [&](const TimeMatch& a, const TimeMatch& b) { return first[a.first].time_s < first[b.first].time_s; });
 }
 
+/// Coverage of the matches (first = truth, second = estimate), which are in order of time; the orders are those of
+/// time_order. expected_poses 0 stands for all usable estimated poses. Without a match all fractions and times are 0;
+/// times saturate at the largest double. O(matches), allocates nothing.
+template <typename Truth, typename Estimate>
+[[nodiscard]] TrajectoryCoverage trajectory_coverage(const Truth& truth, const Estimate& estimate,
+                                                     span<const std::size_t> truth_order,
+                                                     span<const std::size_t> estimate_order,
+                                                     span<const TimeMatch> matches, std::size_t expected_poses,
+                                                     double offset_s) noexcept {
+  TrajectoryCoverage coverage;
+  coverage.matched = matches.size();
+  coverage.expected = expected_poses > 0 ? expected_poses : estimate_order.size();
+  coverage.unusable = estimate.size() - estimate_order.size();
+  if (matches.empty()) return coverage;
+  const auto longer = [](double a, double b) {
+    return (std::max)(a, (std::min)(b, (std::numeric_limits<double>::max)()));
+  };
+  coverage.pose_fraction =
+      clamp_probability(static_cast<double>(coverage.matched) / static_cast<double>(coverage.expected));
+  const double whole_s = truth[truth_order[truth_order.size() - 1]].time_s - truth[truth_order[0]].time_s;
+  const double covered_s = estimate[matches[matches.size() - 1].second].time_s - estimate[matches[0].second].time_s;
+  coverage.time_fraction = whole_s > 0 ? clamp_probability(covered_s / whole_s) : 1;
+  for (std::size_t k = 0; k < matches.size(); ++k) {
+    const double time_s = estimate[matches[k].second].time_s;
+    if (k > 0) coverage.largest_gap_s = longer(coverage.largest_gap_s, time_s - estimate[matches[k - 1].second].time_s);
+    coverage.largest_stamp_difference_s =
+        longer(coverage.largest_stamp_difference_s, std::abs(truth[matches[k].first].time_s - (time_s + offset_s)));
+  }
+  return coverage;
+}
+
 }  // namespace CFP_ISA
+
+namespace detail {
+inline namespace CFP_ISA {
+
+/// find_closest_index of evaluate_rpe.py over the ascending values value(0), …, value(n − 1), n > 0: a bisection that
+/// remembers the nearest value it met. Of two equally near it returns the one it met first, which no simpler search
+/// would.
+template <typename Value>
+std::size_t closest_index(std::size_t n, double target, const Value& value) noexcept {
+  std::size_t begin = 0, end = n, best = 0;
+  double difference = std::abs(value(0) - target);
+  while (begin < end) {
+    const std::size_t middle = (begin + end) / 2;
+    if (std::abs(value(middle) - target) < difference) {
+      difference = std::abs(value(middle) - target);
+      best = middle;
+    }
+    if (value(middle) == target) return middle;
+    if (value(middle) > target) {
+      end = middle;
+    } else {
+      begin = middle + 1;
+    }
+  }
+  return best;
+}
+
+template <typename Scalar>
+SE3<double> double_pose(const StampedPose<Scalar>& pose) noexcept {
+  const SE3<double> T = pose.T_world_cam.template cast<double>();
+  return {normalized_rotation<double>(T.rotation), T.translation};
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
 }  // namespace cfp

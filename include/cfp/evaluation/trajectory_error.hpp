@@ -17,8 +17,6 @@
 #include "cfp/evaluation/alignment.hpp"
 #include "cfp/evaluation/error_statistics.hpp"
 #include "cfp/evaluation/trajectory.hpp"
-#include "cfp/evaluation/trajectory_coverage.hpp"
-#include "cfp/evaluation/trajectory_error_impl.hpp"
 
 namespace cfp {
 
