@@ -44,6 +44,7 @@ template <typename Scalar>
 struct DbscanWorkspace {
   SortWorkspace<Scalar> sort;
   std::vector<std::uint32_t> neighbours;
+  std::vector<int> labels;  // of sorted values
 };
 
 namespace detail {
@@ -74,20 +75,29 @@ void count_neighbours(span<const Scalar> values, Scalar eps, std::vector<std::ui
   }
 }
 
-// Calls emit(i, label) once for every ascending value i.
-template <typename Scalar, typename Emit>
-DbscanResult label_sorted(span<const Scalar> values, const DbscanOptions& options,
-                          std::vector<std::uint32_t>& neighbours, const Emit& emit) {
+}  // namespace CFP_ISA
+}  // namespace detail
+
+inline namespace CFP_ISA {
+
+/// DBSCAN of values that are finite and ascending already (asserted in debug builds): `labels[i]` belongs to
+/// `values[i]`. As `dbscan` otherwise. O(n).
+template <typename Scalar>
+DbscanResult dbscan_sorted(span<const non_deduced<Scalar>> values, const DbscanOptions& options,
+                           DbscanWorkspace<Scalar>& workspace, span<int> labels) {
+  CFP_ASSERT(labels.size() == values.size());
+  CFP_ASSERT(std::is_sorted(values.begin(), values.end()));
+  std::vector<std::uint32_t>& neighbours = workspace.neighbours;
   DbscanResult result;
   const std::size_t n = values.size(), none = n;
   if (invalid_field(options)) {
-    for (std::size_t i = 0; i < n; ++i) emit(i, dbscan_noise);
+    std::fill(labels.begin(), labels.end(), dbscan_noise);
     result.status = Status::invalid_input;
     result.noise = n;
     return result;
   }
-  const Scalar eps = radius<Scalar>(options.eps);
-  count_neighbours(values, eps, neighbours);
+  const Scalar eps = detail::radius<Scalar>(options.eps);
+  detail::count_neighbours<Scalar>(values, eps, neighbours);
   std::size_t left = none;  // the last core point seen
   int label = -1;           // and its cluster
   for (std::size_t begin = 0; begin < n;) {
@@ -101,10 +111,10 @@ DbscanResult label_sorted(span<const Scalar> values, const DbscanOptions& option
       const bool near_right = right < n && values[right] - values[i] <= eps;
       const bool take_left = near_left && (!near_right || values[i] - values[left] <= values[right] - values[i]);
       result.noise += near_left || near_right ? 0U : 1U;
-      emit(i, take_left ? label : near_right ? right_label : dbscan_noise);
+      labels[i] = take_left ? label : near_right ? right_label : dbscan_noise;
     }
     if (right == n) break;
-    emit(right, right_label);
+    labels[right] = right_label;
     ++result.core_points;
     label = right_label;
     left = right;
@@ -112,22 +122,6 @@ DbscanResult label_sorted(span<const Scalar> values, const DbscanOptions& option
   }
   result.clusters = static_cast<std::size_t>(label + 1);
   return result;
-}
-
-}  // namespace CFP_ISA
-}  // namespace detail
-
-inline namespace CFP_ISA {
-
-/// DBSCAN of values that are finite and ascending already (asserted in debug builds): `labels[i]` belongs to
-/// `values[i]`. As `dbscan` otherwise. O(n).
-template <typename Scalar>
-DbscanResult dbscan_sorted(span<const non_deduced<Scalar>> values, const DbscanOptions& options,
-                           DbscanWorkspace<Scalar>& workspace, span<int> labels) {
-  CFP_ASSERT(labels.size() == values.size());
-  CFP_ASSERT(std::is_sorted(values.begin(), values.end()));
-  return detail::label_sorted(values, options, workspace.neighbours,
-                              [=](std::size_t i, int label) { labels[i] = label; });
 }
 
 /// Labels every value: clusters are numbered by ascending position, `dbscan_noise` marks the rest.
@@ -144,9 +138,10 @@ DbscanResult dbscan(span<const non_deduced<Scalar>> values, const DbscanOptions&
   CFP_ASSERT(labels.size() == values.size());
   const SortedValues<Scalar> sorted = sort_values(
       values, [](Scalar value) { return is_finite(value); }, workspace.sort);
+  workspace.labels.resize(sorted.values.size());
+  DbscanResult result = dbscan_sorted(sorted.values, options, workspace, workspace.labels);
   std::fill(labels.begin(), labels.end(), dbscan_noise);
-  DbscanResult result = detail::label_sorted(sorted.values, options, workspace.neighbours,
-                                             [=](std::size_t i, int label) { labels[sorted.index[i]] = label; });
+  for (std::size_t i = 0; i < sorted.values.size(); ++i) labels[sorted.index[i]] = workspace.labels[i];
   result.invalid = values.size() - sorted.values.size();
   return result;
 }

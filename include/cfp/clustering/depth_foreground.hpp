@@ -90,10 +90,7 @@ struct ForegroundResult {
 
 /// Grows to the largest box seen, then allocates nothing.
 template <typename Scalar>
-struct ForegroundWorkspace {
-  DbscanWorkspace<Scalar> dbscan;
-  std::vector<int> labels;
-};
+using ForegroundWorkspace = DbscanWorkspace<Scalar>;
 
 namespace detail {
 inline namespace CFP_ISA {
@@ -157,11 +154,11 @@ template <typename Scalar>
 // Up to the end of the cluster of the lowest mean depth, which is the first; nothing without one.
 template <typename Scalar>
 [[nodiscard]] DepthRange first_cluster(span<const Scalar> depths, const DbscanOptions& parameters,
-                                       ForegroundWorkspace<Scalar>& workspace) {
-  workspace.labels.resize(depths.size());
-  dbscan_sorted(depths, parameters, workspace.dbscan, workspace.labels);
-  const auto last = std::find(workspace.labels.rbegin(), workspace.labels.rend(), 0);
-  return {0, static_cast<std::size_t>(workspace.labels.rend() - last)};
+                                       DbscanWorkspace<Scalar>& workspace) {
+  std::vector<int>& labels = workspace.labels;
+  labels.resize(depths.size());
+  dbscan_sorted(depths, parameters, workspace, labels);
+  return {0, static_cast<std::size_t>(labels.rend() - std::find(labels.rbegin(), labels.rend(), 0))};
 }
 
 }  // namespace CFP_ISA
@@ -186,7 +183,7 @@ ForegroundResult depth_foreground(const ForegroundInput<non_deduced<Scalar>>& in
   CFP_ASSERT(mask.size() == in.depths_m.size());
   CFP_ASSERT(in.pixels.empty() || in.pixels.size() == in.depths_m.size());
   const SortedValues<Scalar> sorted = sort_values(
-      in.depths_m, [](Scalar depth) { return is_valid_depth(depth); }, workspace.dbscan.sort);
+      in.depths_m, [](Scalar depth) { return is_valid_depth(depth); }, workspace.sort);
   const span<const Scalar> depths = sorted.values;
   const std::size_t n = depths.size();
   ForegroundResult result;
@@ -198,7 +195,7 @@ ForegroundResult depth_foreground(const ForegroundInput<non_deduced<Scalar>>& in
     if (options.rule == ForegroundRule::depth_window) {
       range = detail::person_range<Scalar>(in, sorted, options);
     } else {
-      result.dbscan = adaptive_options(depths, options.adaptive, workspace.dbscan);
+      result.dbscan = adaptive_options(depths, options.adaptive, workspace);
       range = detail::first_cluster(depths, result.dbscan, workspace);
     }
     result.status = range.last > range.first ? ForegroundStatus::ok : ForegroundStatus::no_cluster;
