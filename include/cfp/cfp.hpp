@@ -69,7 +69,6 @@
 #include "cfp/optimization/pose/pose_problem.hpp"
 #include "cfp/optimization/pose/pose_refinement.hpp"
 #include "cfp/optimization/robust_loss.hpp"
-#include "cfp/optimization/solver_status.hpp"
 #include "cfp/probability/distance_sigmoid.hpp"
 #include "cfp/probability/first_stage_probability.hpp"
 #include "cfp/probability/map_point.hpp"
@@ -79,4 +78,3 @@
 #include "cfp/robust/fundamental_ransac.hpp"
 #include "cfp/robust/pnp_ransac.hpp"
 #include "cfp/robust/ransac.hpp"
-#include "cfp/robust/sampling.hpp"

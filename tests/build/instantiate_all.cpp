@@ -45,6 +45,7 @@ static void instantiate_math() noexcept {
   use(&cfp::quaternion<Scalar>);
   use(&cfp::so3_log<Scalar>);
   use(&cfp::so3_left_jacobian<Scalar>);
+  use(&cfp::so3_series<Scalar>);
   use(&cfp::normalized_rotation<Scalar>);
   use(&cfp::SE3<Scalar>::template cast<float>);
   use(&cfp::SE3<Scalar>::template cast<double>);

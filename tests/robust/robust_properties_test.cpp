@@ -5,7 +5,7 @@
 
 #include "cfp/robust/fundamental_ransac.hpp"
 #include "cfp/robust/pnp_ransac.hpp"
-#include "cfp/robust/sampling.hpp"
+#include "cfp/robust/ransac.hpp"
 #include "cfp_testing/generators.hpp"
 #include "support/absolute_pose_scene.hpp"
 #include "support/properties.hpp"

@@ -1,4 +1,4 @@
-#include "cfp/robust/sampling.hpp"
+#include "cfp/robust/ransac.hpp"
 
 #include <array>
 #include <limits>

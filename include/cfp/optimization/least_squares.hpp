@@ -13,6 +13,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <limits>
 #include <utility>
 
@@ -21,7 +22,6 @@
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/math/normal_equations.hpp"
-#include "cfp/optimization/solver_status.hpp"
 
 namespace cfp {
 
@@ -35,6 +35,31 @@ struct LevenbergMarquardtOptions {
   double min_relative_decrease = 1e-6;  ///< stop when a step promises or brings less than this share of the cost, >= 0
   double min_absolute_decrease = 1e-9;  ///< stop when a step promises less than this, >= 0
 };
+
+/// How a solve ended: pose refinement, bundle adjustment and whatever else runs the loop. There is a solution for the
+/// first three; for the others the caller's values are untouched.
+enum class SolverStatus : std::uint8_t {
+  converged,           ///< a step promised, or the last one brought, less than the options ask for
+  no_decrease,         ///< no step, however short, lowers the cost: the minimum within rounding
+  iteration_limit,     ///< the allowed number of steps was tried
+  not_enough_data,     ///< fewer usable observations than needed, or nothing free that an observation touches
+  no_weight,           ///< observations, but all weights are 0
+  not_enough_inliers,  ///< too few observations agree with the solution
+  degenerate,          ///< the observations do not determine the solution: collinear points, all behind the camera
+  not_finite,          ///< the cost at the start overflows
+  invalid_input        ///< a start, camera or combination of arrays that has no meaning
+};
+
+/// Whether there is a solution.
+[[nodiscard]] constexpr bool is_solved(SolverStatus status) noexcept { return status <= SolverStatus::iteration_limit; }
+
+/// The enumerator's name, for reports.
+[[nodiscard]] constexpr const char* to_string(SolverStatus status) noexcept {
+  constexpr const char* names[] = {"converged",       "no decrease", "iteration limit",
+                                   "not enough data", "no weight",   "not enough inliers",
+                                   "degenerate",      "not finite",  "invalid input"};
+  return status <= SolverStatus::invalid_input ? names[static_cast<int>(status)] : "unknown";
+}
 
 struct LeastSquaresResult {
   SolverStatus status = SolverStatus::not_enough_data;

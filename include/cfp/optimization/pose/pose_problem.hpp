@@ -12,8 +12,8 @@
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/math/se3.hpp"
+#include "cfp/optimization/least_squares.hpp"
 #include "cfp/optimization/robust_loss.hpp"
-#include "cfp/optimization/solver_status.hpp"
 
 namespace cfp {
 
