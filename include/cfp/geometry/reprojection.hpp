@@ -20,12 +20,6 @@
 
 namespace cfp {
 
-namespace detail {
-// Largest depth that is back-projected, as a share of the largest number: beyond it a moved point may overflow, which
-// would project to a wrong but finite pixel.
-inline constexpr double max_reprojected_share = 1e-6;
-}  // namespace detail
-
 inline namespace CFP_ISA {
 
 /// d_T = || pixel_cur - project(T_cur_prev * depth_prev * ray(pixel_prev)) ||, depth along z in metres.
@@ -36,7 +30,8 @@ template <typename Camera, typename Scalar>
   using std::sqrt;
   Vector3<Scalar> ray = Vector3<Scalar>::Zero();
   Vector2<Scalar> projected = Vector2<Scalar>::Zero();
-  const Scalar max_depth = Scalar(detail::max_reprojected_share) * (std::numeric_limits<Scalar>::max)();
+  // Beyond it a moved point may overflow, which would project to a wrong but finite pixel.
+  const Scalar max_depth = Scalar(1e-6) * (std::numeric_limits<Scalar>::max)();
   if (!(depth_prev > Scalar(0) && depth_prev <= max_depth)) return Scalar(no_distance<double>);
   if (!camera.unproject(pixel_prev, ray)) return Scalar(no_distance<double>);
   const Vector3<Scalar> point = ray * depth_prev;
@@ -56,30 +51,6 @@ void reprojection_distances(const PointSpan<typename Camera::ScalarType, 2>& pre
   CFP_ASSERT(prev.size() == out.size() && depth_prev.size() == out.size() && cur.size() == out.size());
   for (std::size_t i = 0; i < out.size(); ++i)
     out[i] = reprojection_distance(prev[i], depth_prev[i], cur[i], T_cur_prev, camera);
-}
-
-/// The same for the pinhole camera, by a third of the operations. Equal to the scalar function up to rounding.
-template <typename Scalar>
-void reprojection_distances(const PointSpan<non_deduced<Scalar>, 2>& prev, span<const non_deduced<Scalar>> depth_prev,
-                            const PointSpan<non_deduced<Scalar>, 2>& cur, const SE3<non_deduced<Scalar>>& T_cur_prev,
-                            const PinholeCamera<Scalar>& camera, span<non_deduced<Scalar>> out) noexcept {
-  CFP_ASSERT(prev.size() == out.size() && depth_prev.size() == out.size() && cur.size() == out.size());
-  const Matrix3<Scalar>& R = T_cur_prev.rotation;
-  const Vector3<Scalar>& t = T_cur_prev.translation;
-  const Scalar inv_fx = Scalar(1) / camera.fx, inv_fy = Scalar(1) / camera.fy;
-  const Scalar max_depth = Scalar(detail::max_reprojected_share) * (std::numeric_limits<Scalar>::max)();
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    const Scalar x = (prev(i, 0) - camera.cx) * inv_fx, y = (prev(i, 1) - camera.cy) * inv_fy, depth = depth_prev[i];
-    const Scalar z = depth * (R(2, 0) * x + R(2, 1) * y + R(2, 2)) + t[2];
-    const Scalar inv_z = Scalar(1) / z;
-    const Scalar u = camera.fx * ((depth * (R(0, 0) * x + R(0, 1) * y + R(0, 2)) + t[0]) * inv_z);
-    const Scalar v = camera.fy * ((depth * (R(1, 0) * x + R(1, 1) * y + R(1, 2)) + t[1]) * inv_z);
-    const Scalar du = u + (camera.cx - cur(i, 0)), dv = v + (camera.cy - cur(i, 1));
-    const Scalar distance = std::sqrt(du * du + dv * dv);
-    const bool valid =
-        depth > Scalar(0) && depth <= max_depth && z > Tolerance<Scalar>::min_depth && has_distance(distance);
-    out[i] = valid ? distance : no_distance<Scalar>;
-  }
 }
 
 }  // namespace CFP_ISA
