@@ -1,5 +1,6 @@
 // ORB keypoints spread over the image. OpenCV's detector keeps the strongest corners of the whole image, which crowd on
-// a few textured things (often the people's clothes); here every cell of the image gives its best corners in turn.
+// a few textured things (often the people's clothes); here every cell of the image gives its best corners in turn,
+// and where few are found the threshold falls.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +22,8 @@ struct FeatureOptions {
   int candidates = 3000;      // corners to choose from
   int levels = 8;             // of the image pyramid
   float scale_factor = 1.2F;  // between them
-  int fast_threshold = 12;    // grey levels
+  int fast_threshold = 12;    // grey levels, and
+  int lowest_threshold = 3;   // where that finds too little
   int cell = 40;              // pixels, at the level's own scale
 };
 
@@ -34,7 +36,12 @@ class FeatureExtractor {
         levels_(static_cast<std::size_t>(options.levels)) {}
 
   void operator()(const cv::Mat& gray, std::vector<cv::KeyPoint>& keypoints, std::vector<OrbDescriptor>& descriptors) {
-    orb_->detect(gray, candidates_);
+    int threshold = options_.fast_threshold;
+    do {
+      orb_->setFastThreshold(threshold);
+      orb_->detect(gray, candidates_);
+      threshold /= 2;
+    } while (candidates_.size() < static_cast<std::size_t>(options_.count) && threshold >= options_.lowest_threshold);
     select(gray.cols, gray.rows, keypoints);
     cv::Mat rows;
     orb_->compute(gray, keypoints, rows);

@@ -217,8 +217,8 @@ TEST_CASE("The fine stage after a relocalisation rests on the inliers of the pos
 
 namespace {
 
-/// An empty room under a stress.
-StressResult under(const char* name, std::vector<FrameRecord>& records) {
+/// 120 frames of an empty room.
+const std::filesystem::path& empty_room() {
   static const cfp_test::TemporaryFolder folder;
   static const bool written = [] {
     synthetic::SequenceOptions options;
@@ -230,7 +230,12 @@ StressResult under(const char* name, std::vector<FrameRecord>& records) {
     return true;
   }();
   REQUIRE(written);
-  const Sequence sequence(folder.path);
+  return folder.path;
+}
+
+/// That room under a stress.
+StressResult under(const char* name, std::vector<FrameRecord>& records) {
+  const Sequence sequence(empty_room());
   for (const Stress& stress : stresses(120, 30, sequence.calibration())) {
     if (stress.name != name) continue;
     NoDetector none;
@@ -268,6 +273,35 @@ TEST_CASE("What crosses the view and no detector knows does not take the camera 
   const StressResult result = under("board over 40 %", records);
   CHECK(result.wrong == 0);
   CHECK(result.right >= 105);
+}
+
+TEST_CASE("A camera that goes there and back needs no larger map the longer it does", "[slam]") {
+  const Sequence sequence(empty_room());
+  RunResult results[2];
+  for (const std::size_t passes : {2U, 6U}) {
+    FrameSource source(sequence);
+    source.size = passes * 120;
+    source.load = [&](std::size_t k) {
+      cfp_examples::SequenceFrame frame = sequence.load(k / 120 % 2 == 0 ? k % 120 : 119 - k % 120);
+      frame.time_s = static_cast<double>(k) / 30;
+      return frame;
+    };
+    NoDetector none;
+    Observer nobody;
+    Options options;
+    options.threads = false;
+    results[passes == 6] = run_slam(source, none, options, nobody);
+  }
+  const RunResult &brief = results[0], &lengthy = results[1];
+  CAPTURE(brief.keyframes, lengthy.keyframes, brief.map_points, lengthy.map_points);
+  REQUIRE(lengthy.trajectory.size() == 720);
+  CHECK(double(lengthy.keyframes) < 1.5 * double(brief.keyframes));
+  CHECK(double(lengthy.map_points) < 1.3 * double(brief.map_points));
+  for (std::size_t k = 0; k < 720; ++k) {  // where it is does not change with the pass
+    const std::size_t same = k % 240;
+    CHECK((lengthy.trajectory[k].T_world_cam.translation - lengthy.trajectory[same].T_world_cam.translation).norm() <
+          0.02);
+  }
 }
 
 TEST_CASE("After a second of being lost a new map begins, and is joined to the old one when both are in view",

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <bitset>
 #include <cstddef>
-#include <functional>
 #include <utility>
 #include <vector>
 
@@ -38,8 +37,10 @@ struct MapPoint {
 
 struct Keyframe {
   Frame frame;
-  int world = 0;                // after a loss a new one begins; what is in two of them has no common frame
-  std::vector<int> neighbours;  // keyframes that share points when this one was made, most first
+  int world = 0;                 // after a loss a new one begins; what is in two of them has no common frame
+  std::vector<int> neighbours;   // keyframes that share points when this one was made, most first
+  int parent = -1;               // of one that has gone: where it was is told by another keyframe,
+  cfp::SE3<double> T_of_parent;  // from whose camera to its own this goes
 };
 
 class Map {
@@ -77,9 +78,36 @@ class Map {
   [[nodiscard]] const MapPoint& point(int index) const { return points[static_cast<std::size_t>(index)]; }
   [[nodiscard]] Keyframe& keyframe(int index) { return keyframes[static_cast<std::size_t>(index)]; }
   [[nodiscard]] const Keyframe& keyframe(int index) const { return keyframes[static_cast<std::size_t>(index)]; }
-  [[nodiscard]] std::size_t alive_points() const {
+  [[nodiscard]] std::size_t alive_points() const { return points.size() - free_.size() - dead_.size(); }
+  [[nodiscard]] std::size_t alive_keyframes() const {
     return static_cast<std::size_t>(
-        std::count_if(points.begin(), points.end(), [](const MapPoint& p) { return p.alive; }));
+        std::count_if(keyframes.begin(), keyframes.end(), [](const Keyframe& k) { return k.parent < 0; }));
+  }
+  // Of a keyframe that may have gone.
+  [[nodiscard]] cfp::SE3<double> pose(int index) const {
+    cfp::SE3<double> T_cam_ancestor;
+    while (keyframe(index).parent >= 0) {
+      T_cam_ancestor = T_cam_ancestor * keyframe(index).T_of_parent;
+      index = keyframe(index).parent;
+    }
+    return T_cam_ancestor * keyframe(index).frame.T_cam_world;
+  }
+
+  // Returns its index, which may have been another point's before the last recycle().
+  int add(MapPoint&& added) {
+    if (free_.empty()) {
+      points.push_back(std::move(added));
+      return static_cast<int>(points.size()) - 1;
+    }
+    const int index = free_.back();
+    free_.pop_back();
+    point(index) = std::move(added);
+    return index;
+  }
+  // Nobody outside knows the points any more that have gone.
+  void recycle() {
+    free_.insert(free_.end(), dead_.begin(), dead_.end());
+    dead_.clear();
   }
 
   void erase_point(int index) {
@@ -88,6 +116,7 @@ class Map {
       keyframe(o.keyframe).frame.map_point[static_cast<std::size_t>(o.keypoint)] = no_point;
     p.observations = {};
     p.alive = false;
+    dead_.push_back(index);
   }
 
   // A point without observations is nobody's: it goes, too.
@@ -101,24 +130,44 @@ class Map {
     if (p.observations.empty()) erase_point(index);
   }
 
+  // What it saw must be seen by others; where it was is told by the one of them that shares most with it.
+  void erase_keyframe(int index) {
+    Keyframe& gone = keyframe(index);
+    for (const int other : covisible(gone.frame.map_point, 1)) {
+      if (other == index || keyframe(other).world != gone.world) continue;
+      gone.parent = other;
+      gone.T_of_parent = gone.frame.T_cam_world * keyframe(other).frame.T_cam_world.inverse();
+      break;
+    }
+    if (gone.parent < 0) return;
+    for (const int p : std::vector<int>(gone.frame.map_point)) {
+      if (is_alive(p)) erase_observation(p, index);
+    }
+    gone.frame = {};
+    gone.neighbours = {};
+    for (Keyframe& k : keyframes)
+      k.neighbours.erase(std::remove(k.neighbours.begin(), k.neighbours.end(), index), k.neighbours.end());
+  }
+
   // Keyframes that share at least `min_shared` of the given points, most first (ties: the newer first).
   [[nodiscard]] std::vector<int> covisible(const std::vector<int>& map_points, int min_shared) const {
-    std::vector<std::pair<int, int>> shared(keyframes.size());
-    for (std::size_t k = 0; k < shared.size(); ++k) shared[k] = {0, static_cast<int>(k)};
+    std::vector<int> count(keyframes.size());
     for (const int index : map_points) {
       if (!is_alive(index)) continue;
-      for (const Observation& o : point(index).observations) ++shared[static_cast<std::size_t>(o.keyframe)].first;
+      for (const Observation& o : point(index).observations) ++count[static_cast<std::size_t>(o.keyframe)];
     }
-    std::sort(shared.begin(), shared.end(), std::greater<>());
     std::vector<int> result;
-    for (const auto& [count, keyframe_index] : shared) {
-      if (count < std::max(min_shared, 1)) break;
-      result.push_back(keyframe_index);
+    for (std::size_t k = count.size(); k-- > 0;) {
+      if (count[k] >= std::max(min_shared, 1)) result.push_back(static_cast<int>(k));
     }
+    std::stable_sort(result.begin(), result.end(), [&](int a, int b) {
+      return count[static_cast<std::size_t>(a)] > count[static_cast<std::size_t>(b)];
+    });
     return result;
   }
 
  private:
+  std::vector<int> dead_, free_;  // points that have gone: since the last recycle(), and before
   int newest_world_ = 0;
   std::size_t first_of_world_ = 0;
 };

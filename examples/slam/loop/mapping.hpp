@@ -69,9 +69,9 @@ class Mapping {
 
   // Adds the frame as a keyframe; keypoints with depth that see no point yet and may be static make new ones, M = K.
   // Returns its index.
-  int insert(Map& map, const Frame& frame, int world, const View& view) const {
+  int insert(Map& map, const Frame& frame, int world, const View& view) {
     const int index = static_cast<int>(map.keyframes.size());
-    map.keyframes.push_back({frame, world, {}});
+    map.keyframes.push_back({frame, world, {}, -1, {}});
     Frame& kept = map.keyframes.back().frame;
     const cfp::SE3<double> T_world_cam = kept.T_cam_world.inverse();
     for (std::size_t i = 0; i < kept.size(); ++i) {
@@ -88,25 +88,43 @@ class Mapping {
     return index;
   }
 
-  // Of the points made by the last few keyframes, those that did not prove themselves go.
+  // Of the points made by the last few keyframes, those that did not prove themselves go; then of the keyframes around
+  // the newest those that others make superfluous.
   void cull(Map& map) {
     const int newest = static_cast<int>(map.keyframes.size()) - 1;
-    std::size_t kept = 0;
-    for (std::size_t p = first_young_; p < map.points.size(); ++p) {
-      const MapPoint& point = map.points[p];
-      if (!point.alive) continue;
+    const auto is_settled = [&](int p) {
+      if (!map.is_alive(p)) return true;
+      const MapPoint& point = map.point(p);
       const int age = newest - point.created_by;
       const bool unproven = age >= 3 && point.observations.size() < options_.min_observations;
-      if (unproven || double(point.found) < options_.min_found_share * double(point.in_view)) {
-        map.erase_point(static_cast<int>(p));
-      } else if (age < 3 && kept++ == 0) {
-        first_still_young_ = p;
-      }
+      if (!unproven && double(point.found) >= options_.min_found_share * double(point.in_view)) return age >= 3;
+      map.erase_point(p);
+      return true;
+    };
+    young_.erase(std::remove_if(young_.begin(), young_.end(), is_settled), young_.end());
+    for (const int k : std::vector<int>(map.keyframe(newest).neighbours)) {
+      if (k > 0 && newest - k >= 3 && is_superfluous(map, k)) map.erase_keyframe(k);
     }
-    first_young_ = kept > 0 ? first_still_young_ : map.points.size();
   }
 
  private:
+  // Whether at least three others saw nearly all of its points, not from farther away.
+  [[nodiscard]] bool is_superfluous(const Map& map, int keyframe) const {
+    const Frame& frame = map.keyframe(keyframe).frame;
+    std::size_t points = 0, known = 0;
+    for (std::size_t i = 0; i < frame.size(); ++i) {
+      if (!map.is_alive(frame.map_point[i])) continue;
+      const auto& seen = map.point(frame.map_point[i]).observations;
+      ++points;
+      known += std::count_if(seen.begin(), seen.end(), [&](const Observation& o) {
+                 const Frame& other = map.keyframe(o.keyframe).frame;
+                 return o.keyframe != keyframe &&
+                        other.keypoints[static_cast<std::size_t>(o.keypoint)].octave <= frame.keypoints[i].octave + 1;
+               }) >= 3;
+    }
+    return double(known) >= options_.superfluous_share * double(points);
+  }
+
   void observe(MapPoint& point, const Frame& frame, std::size_t i, int keyframe,
                const cfp::Vector3<double>& camera_centre) const {
     point.normal =
@@ -115,7 +133,7 @@ class Mapping {
     point.descriptor = frame.descriptors[i];
   }
 
-  void create(Map& map, Frame& frame, std::size_t i, int keyframe, const View& view) const {
+  void create(Map& map, Frame& frame, std::size_t i, int keyframe, const View& view) {
     const cfp::SE3<double> T_world_cam = frame.T_cam_world.inverse();
     const cfp::Vector3<double> in_camera = frame.back_project(i, view.camera);
     MapPoint point;
@@ -125,14 +143,13 @@ class Mapping {
     point.static_probability = frame.static_probability[i];
     point.created_by = keyframe;
     observe(point, frame, i, keyframe, T_world_cam.translation);
-    frame.map_point[i] = static_cast<int>(map.points.size());
     frame.map_point_probability[i] = point.static_probability;
-    map.points.push_back(std::move(point));
+    young_.push_back(frame.map_point[i] = map.add(std::move(point)));
   }
 
   MappingOptions options_;
   cfp::FrameOptions probability_;
-  std::size_t first_young_ = 0, first_still_young_ = 0;
+  std::vector<int> young_;  // points of the last keyframes
 };
 
 }  // namespace cfp_slam

@@ -9,6 +9,7 @@
 #include <limits>
 #include <vector>
 
+#include "cfp/geometry/depth_noise.hpp"
 #include "map.hpp"
 
 namespace cfp_slam {
@@ -129,6 +130,34 @@ inline void match_descriptors(const Frame& frame, const Map& map, const std::vec
   };
   matches.erase(std::remove_if(matches.begin(), matches.end(), one_sided), matches.end());
   for (Match& m : matches) m.index = candidates[static_cast<std::size_t>(m.index)];
+}
+
+// Of matches without any idea where they are, those that agree with one of them, the one that most agree with: the
+// camera's motion leaves the distance of two points as it is, and depths measure it. Matches without a depth stay.
+inline void keep_rigid(const Frame& frame, const Map& map, const cfp::PinholeCamera<float>& camera,
+                       std::vector<Match>& matches) {
+  constexpr double map_sigma_m = 0.01;
+  const cfp::DepthNoise noise;
+  const auto agree = [&](const Match& a, const Match& b) {
+    const double za = double(frame.depths_m[a.keypoint]), zb = double(frame.depths_m[b.keypoint]);
+    if (!(za > 0 && zb > 0)) return !(zb > 0);
+    const double seen = (frame.back_project(a.keypoint, camera) - frame.back_project(b.keypoint, camera)).norm();
+    const double known = (map.point(a.index).position - map.point(b.index).position).norm();
+    return std::abs(seen - known) <= 3 * (noise.sigma_m(za) + noise.sigma_m(zb) + map_sigma_m);
+  };
+  std::size_t most = 0, centre = 0;
+  for (std::size_t c = 0; c < matches.size(); ++c) {
+    if (!(frame.depths_m[matches[c].keypoint] > 0)) continue;
+    const auto agreeing = static_cast<std::size_t>(
+        std::count_if(matches.begin(), matches.end(), [&](const Match& m) { return agree(matches[c], m); }));
+    if (agreeing <= most) continue;
+    most = agreeing;
+    centre = c;
+  }
+  if (most == 0) return;  // no depths
+  const Match kept = matches[centre];
+  matches.erase(std::remove_if(matches.begin(), matches.end(), [&](const Match& m) { return !agree(kept, m); }),
+                matches.end());
 }
 
 }  // namespace cfp_slam

@@ -21,6 +21,7 @@ struct MappingOptions {
   std::size_t min_close = 100, new_close = 70;  // fewer close ones tracked, and more to be had: take one
   double min_found_share = 0.25;                // points seen in a smaller share of the frames that should see them go
   std::size_t min_observations = 2;  // as do points in fewer keyframes than this, three keyframes after their own
+  double superfluous_share = 0.9;    // keyframes of whose points three others see this share go
 };
 
 struct LocalBundleOptions {
@@ -50,6 +51,7 @@ struct Options {
   double new_map_after_s = 1;          // of being lost
   cfp::FrameIntervalOptions interval;  // the motion model is not asked over a gap
   double unproven_share = 0.1;         // in the pose: weight of what fewer than two keyframes saw, relative to all else
+  double min_known_share = 0.1;        // of the proven points that should be in view: fewer found, and it is not there
   int probation = 5;                   // frames after a relocalisation in which the map learns nothing
   std::size_t enough_matches = 40;     // with the last frame; with fewer the search is widened
   std::size_t min_initial_points = 100;

@@ -65,17 +65,24 @@ class PoseSolver {
       if (const cfp::PoseResult exact = solve(result.T_cam_world, narrow); cfp::is_solved(exact.status)) result = exact;
     }
     frame.T_cam_world = result.T_cam_world;
+    std::size_t proven = 0;
     for (std::size_t o = 0; o < keypoint_.size(); ++o) {
       if (inlier_[o] != 0) {
         out.inliers += cfp::counts_as_inlier(weight[keypoint_[o]], options_.probability) ? 1U : 0U;
+        proven += proven_[o] != 0 ? 1U : 0U;
       } else if (prune) {
         frame.map_point[keypoint_[o]] = no_point;
       }
     }
+    if (out.health.ok() && double(expected) >= enough_expected &&
+        double(proven) < options_.min_known_share * double(expected))
+      out.health.status = cfp::PoseHealth::few_agree;
     return out;
   }
 
  private:
+  static constexpr double enough_expected = 50;  // proven points in view: what the map knows of this view decides
+
   void collect(const Frame& frame, const LastFrameMatches& last, const Map& map, cfp::span<const float> weight,
                const View& view) {
     points_.clear();
@@ -93,9 +100,9 @@ class PoseSolver {
       points_.push_back({X.x(), X.y(), X.z()});
       pixels_.push_back({static_cast<double>(frame.pixels[i][0]), static_cast<double>(frame.pixels[i][1])});
       depths_.push_back(static_cast<double>(frame.depths_m[i]));
+      proven_.push_back(mapped && map.is_proven(frame.map_point[i]) ? char(1) : char(0));
       sigmas_.push_back(static_cast<double>(view.sigma(frame.keypoints[i])));
       weights_.push_back(static_cast<double>(weight[i]));
-      proven_.push_back(mapped && map.is_proven(frame.map_point[i]) ? char(1) : char(0));
       keypoint_.push_back(i);
     }
   }
@@ -104,11 +111,11 @@ class PoseSolver {
   // that is to be expected in view, all else weighs a small share of it, and only helps where that leaves the pose
   // open. Where the camera looks at something new, all counts. Returns whether the proven ones decided.
   bool let_proven_decide(std::size_t expected) {
-    constexpr double few = 20, enough = 50;
+    constexpr double few = 20;
     double proven = 0, others = 0;
     for (std::size_t o = 0; o < weights_.size(); ++o) (proven_[o] != 0 ? proven : others) += weights_[o];
     const double share = std::min(1.0, options_.unproven_share * proven / std::max(others, 1e-9));
-    const double known = std::clamp((static_cast<double>(expected) - few) / (enough - few), 0.0, 1.0);
+    const double known = std::clamp((static_cast<double>(expected) - few) / (enough_expected - few), 0.0, 1.0);
     for (std::size_t o = 0; o < weights_.size(); ++o) weights_[o] *= proven_[o] != 0 ? 1 : 1 + (share - 1) * known;
     return share < 1 && known > 0;
   }

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <vector>
 
 #include "cfp/frame/static_probability.hpp"
@@ -32,13 +33,10 @@ class Relocalization {
     int tries = 0;
     for (std::size_t looked = 0; looked < map.keyframes.size() && tries < most; ++looked) {
       const std::size_t back = next_++ % map.keyframes.size();
-      if (map.keyframes[map.keyframes.size() - 1 - back].world == not_of) continue;
+      const Keyframe& keyframe = map.keyframes[map.keyframes.size() - 1 - back];
+      if (keyframe.world == not_of || keyframe.parent >= 0) continue;
       ++tries;
-      candidates_.clear();
-      for (const int p : map.keyframes[map.keyframes.size() - 1 - back].frame.map_point) {
-        if (map.is_alive(p)) candidates_.push_back(p);
-      }
-      if (try_points(frame, map, candidates_, probability, camera)) {
+      if (try_points(frame, map, keyframe.frame.map_point, probability, camera)) {
         next_ = 0;
         return true;
       }
@@ -51,7 +49,12 @@ class Relocalization {
 
   bool try_points(Frame& frame, const Map& map, const std::vector<int>& points,
                   const cfp::StaticProbability<Camera>& probability, const cfp::PinholeCamera<float>& camera) {
-    match_descriptors(frame, map, points, near_descriptor, 0.8F, matches_);
+    candidates_.clear();
+    // What one keyframe alone saw may have moved since.
+    std::copy_if(points.begin(), points.end(), std::back_inserter(candidates_),
+                 [&](int p) { return map.is_alive(p) && map.is_proven(p); });
+    match_descriptors(frame, map, candidates_, near_descriptor, 0.8F, matches_);
+    keep_rigid(frame, map, camera, matches_);
     if (matches_.size() < min_inliers) return false;
     world_.clear();
     pixels_.clear();

@@ -21,7 +21,6 @@ Options fitted(Options options, const FrameSource& source, const cfp_examples::D
     ((health.image_width = source.calibration.width, health.image_height = source.calibration.height), ...);
   };
   size(options.first_health, options.health, options.relocalised_health, options.detector_health, probability.tracker);
-  if (options.variant == cfp::Variant::plain) options.unproven_share = 1e9;  // no handling of what moves at all
   return options;
 }
 

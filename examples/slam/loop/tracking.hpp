@@ -88,11 +88,10 @@ class Tracking {
     take_bundle(true);
     RunResult result;
     for (const RelativePose& p : poses_) {
-      const Keyframe& reference = map_.keyframe(p.reference);
-      result.trajectory.push_back({p.time_s, (p.T_cam_reference * reference.frame.T_cam_world).inverse()});
-      result.world.push_back(reference.world);
+      result.trajectory.push_back({p.time_s, (p.T_cam_reference * map_.pose(p.reference)).inverse()});
+      result.world.push_back(map_.keyframe(p.reference).world);
     }
-    result.keyframes = map_.keyframes.size();
+    result.keyframes = map_.alive_keyframes();
     result.map_points = map_.alive_points();
     return result;
   }
@@ -330,9 +329,10 @@ class Tracking {
     take_bundle(true);
     const int keyframe = mapping_.insert(map_, frame, world_, view_);
     local_map_.set_reference(keyframe);
+    mapping_.cull(map_);
     frame.map_point = map_.keyframe(keyframe).frame.map_point;
     frame.map_point_probability = map_.keyframe(keyframe).frame.map_point_probability;
-    mapping_.cull(map_);
+    map_.recycle();
     record.keyframe = true;
     frames_since_keyframe_ = 0;
     if (map_.keyframes.size() > 1) bundle_.start(map_, keyframe, view_, options_.bundle, options_.threads, observer_);

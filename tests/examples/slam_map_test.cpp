@@ -1,0 +1,102 @@
+#include "../../examples/slam/loop/map.hpp"
+
+#include "../../examples/slam/loop/mapping.hpp"
+#include "../../examples/slam/loop/matching.hpp"
+#include "cfp/core/random.hpp"
+#include "support/catch.hpp"
+
+using namespace cfp_slam;
+
+namespace {
+
+/// A keyframe that sees the given points, keypoint by keypoint.
+int add_keyframe(Map& map, const std::vector<int>& points, const cfp::SE3<double>& T_cam_world = {}) {
+  const int index = static_cast<int>(map.keyframes.size());
+  Frame frame;
+  frame.keypoints.assign(points.size(), cv::KeyPoint(0, 0, 31, 0, 0, 0));
+  frame.map_point = points;
+  frame.T_cam_world = T_cam_world;
+  map.keyframes.push_back({frame, 0, {}, -1, {}});
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (map.is_alive(points[i])) map.point(points[i]).observations.push_back({index, static_cast<int>(i)});
+  }
+  return index;
+}
+
+cfp::SE3<double> at(double x) { return {cfp::Matrix3<double>::Identity(), {x, 0, 0}}; }
+
+}  // namespace
+
+TEST_CASE("A keyframe that has gone is where it was, relative to one that moves", "[slam]") {
+  Map map;
+  const int a = map.add({}), b = map.add({});
+  add_keyframe(map, {a}, at(0));
+  add_keyframe(map, {a, b}, at(1));
+  add_keyframe(map, {a, b}, at(3));
+  map.erase_keyframe(2);
+  map.erase_keyframe(1);  // its parent is the first now, and it is the parent of the third
+  CHECK(map.alive_keyframes() == 1);
+  CHECK(map.point(a).observations.size() == 1);
+  CHECK_FALSE(map.is_alive(b));
+  map.keyframe(0).frame.T_cam_world = at(10);
+  CHECK_THAT(map.pose(1).translation.x(), WithinAbs(11, 1e-12));
+  CHECK_THAT(map.pose(2).translation.x(), WithinAbs(13, 1e-12));
+  map.erase_keyframe(0);  // nobody is left who could tell where it was
+  CHECK(map.alive_keyframes() == 1);
+}
+
+TEST_CASE("The place of a point that has gone is another's only when nobody knows it any more", "[slam]") {
+  Map map;
+  const int a = map.add({});
+  map.erase_point(a);
+  CHECK(map.add({}) != a);
+  map.recycle();
+  CHECK(map.add({}) == a);
+  CHECK(map.is_alive(a));
+  CHECK(map.points.size() == 2);
+}
+
+TEST_CASE("Keyframes whose points three others see go, and with them nothing that is needed", "[slam]") {
+  Map map;
+  std::vector<int> points;
+  for (int p = 0; p < 50; ++p) points.push_back(map.add({}));
+  for (int k = 0; k < 8; ++k) {
+    add_keyframe(map, points);
+    for (int n = 0; n < k; ++n) map.keyframes.back().neighbours.push_back(n);
+  }
+  Options options;
+  Mapping(options).cull(map);
+  CHECK(map.alive_keyframes() == 4);
+  CHECK(map.keyframe(0).parent < 0);  // the world's origin
+  CHECK(map.keyframe(7).parent < 0);
+  CHECK(map.alive_points() == 50);
+  for (const int p : points) CHECK(map.point(p).observations.size() == 4);
+}
+
+TEST_CASE("Depths tell the matches that one motion explains from the nine in ten that none does", "[slam]") {
+  const cfp::PinholeCamera<float> camera{525, 525, 320, 240};
+  cfp::Random random(1, "rigid");
+  const cfp::SE3<double> T_cam_world{cfp::so3_exp<double>({0.2, -0.4, 0.1}), {0.5, -0.2, 0.3}};
+  Map map;
+  Frame frame;
+  std::vector<Match> matches;
+  constexpr std::size_t all = 200, right = 20;
+  for (std::size_t i = 0; i < all; ++i) {
+    frame.keypoints.emplace_back();
+    frame.pixels.push_back({float(random.uniform(0, 640)), float(random.uniform(0, 480))});
+    frame.depths_m.push_back(float(random.uniform(1, 4)));
+    MapPoint point;
+    point.position = T_cam_world.inverse() * frame.back_project(i, camera);
+    if (i >= right) point.position += cfp::Vector3<double>(random.uniform(-2, 2), random.uniform(-2, 2), 1);
+    matches.push_back({i, map.add(std::move(point)), 0, 0});
+  }
+  std::vector<Match> kept = matches;
+  keep_rigid(frame, map, camera, kept);
+  CHECK(std::count_if(kept.begin(), kept.end(), [](const Match& m) { return m.keypoint < right; }) == right);
+  CHECK(kept.size() < 3 * right);
+
+  frame.depths_m.assign(all, -1);
+  kept = matches;
+  keep_rigid(frame, map, camera, kept);
+  CHECK(kept.size() == all);
+}
