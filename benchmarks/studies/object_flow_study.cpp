@@ -38,7 +38,8 @@ struct Person {
 };
 
 struct Image {
-  cv::Mat gray;
+  cv::Mat gray, depth;
+  double metres_per_unit = 0;
   std::vector<cv::KeyPoint> keypoints;
   std::vector<Person> people;
 };
@@ -118,7 +119,8 @@ std::vector<Candidate> candidates() {
   all.push_back(tracker("  50 keypoints in a box", with([](auto& o) { o.keypoints_per_box = 50; })));
   all.push_back(tracker("  300 keypoints in a box", with([](auto& o) { o.keypoints_per_box = 300; })));
   all.push_back(tracker("  corners 12 px apart", with([](auto& o) { o.corner_distance = 12; })));
-  all.push_back(tracker("  window 11", with([](auto& o) { o.window = 11; })));
+  all.push_back(tracker("  window 9", with([](auto& o) { o.window = 9; })));
+  all.push_back(tracker("  window 15", with([](auto& o) { o.window = 15; })));
   all.push_back(tracker("  window 21", with([](auto& o) { o.window = 21; })));
   all.push_back(tracker("  3 levels", with([](auto& o) { o.levels = 3; })));
   all.push_back(tracker("  10 iterations", with([](auto& o) { o.iterations = 10; })));
@@ -151,7 +153,10 @@ void judge(std::vector<Candidate>& all, const std::vector<Image>& images, const 
       c.track(images[k - 1].gray, images[k - 1], images[k], pairs);
       const double tracked = processor_ms();
       cfp::Frame<float> frame;
-      frame.flow = {cfp::view(pairs.first), cfp::view(pairs.second)};
+      std::vector<float> depths_m(pairs.first.size());
+      const Image& before = images[k - 1];
+      cfp::sample_depth(before.depth, cfp::view(pairs.first), before.metres_per_unit, depths_m);
+      frame.flow = {cfp::view(pairs.first), cfp::view(pairs.second), depths_m};
       cfp::begin_frame(frame, state);
       for (const Person& person : images[k].people) {
         cfp::TrackedBox<float> box;
@@ -233,9 +238,12 @@ int main(int argc, char** argv) {
   const cv::Ptr<cv::ORB> orb = cv::ORB::create(1000, 1.2F, 8, 15, 0, 2, cv::ORB::HARRIS_SCORE, 31, 10);
   std::vector<Candidate> all = candidates();
   std::vector<Image> images;
-  const auto add = [&](const cv::Mat& bgr, const cv::Mat& labels, const std::vector<cfp::Box<float>>& boxes) {
+  const auto add = [&](const cv::Mat& bgr, const cv::Mat& depth, double units_per_metre, const cv::Mat& labels,
+                       const std::vector<cfp::Box<float>>& boxes) {
     Image image;
     finish(image, bgr, *orb);
+    image.depth = depth.clone();
+    image.metres_per_unit = 1 / units_per_metre;
     for (const auto& box : boxes) image.people.push_back({box, moving_share(labels, box)});
     images.push_back(std::move(image));
   };
@@ -258,7 +266,7 @@ int main(int argc, char** argv) {
                                                                     cfp_examples::DetectorOptions{});
         for (const auto& d : detections->detect(frame.bgr, frame.time_s)) boxes.push_back(d.box);
       }
-      add(frame.bgr, labels, boxes);
+      add(frame.bgr, frame.depth, sequence.calibration().depth_units_per_metre, labels, boxes);
     }
     const auto& c = sequence.calibration();
     judge(all, images, {float(c.fx), float(c.fy), float(c.cx), float(c.cy)});
@@ -281,7 +289,7 @@ int main(int argc, char** argv) {
         if (person.pixels >= 2000 && person.visible >= 0.3)
           boxes.push_back({float(person.box.x1), float(person.box.y1), float(person.box.x2), float(person.box.y2)});
       }
-      add(frame.color, frame.label, boxes);
+      add(frame.color, frame.depth, options.sensor.depth_units_per_metre, frame.label, boxes);
     }
     const auto& c = sequence.options().camera;
     judge(all, images, {float(c.fx), float(c.fy), float(c.cx), float(c.cy)});
