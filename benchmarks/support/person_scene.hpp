@@ -34,16 +34,17 @@ enum class Scenario {
   at_table,
   outstretched_arm,
   sitting,
-  nobody
+  nobody,
+  cut_by_edge
 };
-inline constexpr std::array<Scenario, 11> scenarios{
+inline constexpr std::array<Scenario, 12> scenarios{
     Scenario::alone,      Scenario::wall_far,    Scenario::wall_close, Scenario::wall_touched,     Scenario::slanted,
     Scenario::two_people, Scenario::behind_desk, Scenario::at_table,   Scenario::outstretched_arm, Scenario::sitting,
-    Scenario::nobody};
+    Scenario::nobody,    Scenario::cut_by_edge};
 inline const char* name_of(Scenario scenario) {
-  constexpr std::array<const char*, 11> names{"alone",        "wall far",      "wall close",    "touching a wall",
+  constexpr std::array<const char*, 12> names{"alone",        "wall far",      "wall close",    "touching a wall",
                                               "slanted wall", "person behind", "behind a desk", "table in front",
-                                              "arm forward",  "sitting",       "no person"};
+                                              "arm forward",  "sitting",       "no person",     "cut by the edge"};
   return names[static_cast<std::size_t>(scenario)];
 }
 
@@ -256,7 +257,9 @@ inline PersonScene draw_scene(cfp::Random& random, Scenario scenario) {
     return parts;
   };
   const bool faces = furnished || scenario == Scenario::outstretched_arm;
-  const double x = u(-0.3, 0.3) * distance, turn = faces ? u(-0.5, 0.5) : u(-1.57, 1.57);
+  double x = u(-0.3, 0.3) * distance;
+  if (scenario == Scenario::cut_by_edge) x += (x > 0 ? 0.3 : -0.3) * distance;  // about half of them outside of the image
+  const double turn = faces ? u(-0.5, 0.5) : u(-1.57, 1.57);
   const Scenario posture = scenario == Scenario::at_table ? Scenario::sitting : scenario;
   detail::World world;
   world.person = place(detail::body(random, posture), x, distance, turn);

@@ -15,8 +15,8 @@
   CFP_LAYOUT(cfp::SortWorkspace<float>, index)                           \
   CFP_LAYOUT(cfp::DbscanOptions, min_pts)                                \
   CFP_LAYOUT(cfp::DbscanResult, invalid)                                 \
-  CFP_LAYOUT(cfp::DbscanWorkspace<float>, labels)                        \
-  CFP_LAYOUT(cfp::DbscanWorkspace<double>, labels)                       \
+  CFP_LAYOUT(cfp::DbscanWorkspace<float>, odds)                          \
+  CFP_LAYOUT(cfp::DbscanWorkspace<double>, odds)                         \
   CFP_LAYOUT(cfp::ForegroundInput<float>, previous_depth_m)              \
   CFP_LAYOUT(cfp::ForegroundInput<double>, previous_depth_m)             \
   CFP_LAYOUT(cfp::ObjectDepth<float>, depth_m)                           \

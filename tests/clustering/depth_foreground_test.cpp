@@ -103,7 +103,9 @@ TEMPLATE_TEST_CASE("A desk before a person is background when the pixels are kno
   add_layer(depths, 20, 4.0, 0.01);
   for (std::size_t i = 0; i < depths.size(); ++i) {
     const double y = i < 30 ? 160 + 0.1 * static_cast<double>(i) : 60 + static_cast<double>(i % 40);
-    pixels.push_back({TestType(120), TestType(y)});
+    // The desk is as wide as the box, the person in its middle, the wall beside.
+    const double x = i < 30 ? 101 + 1.3 * static_cast<double>(i) : i < 60 ? 120 : i % 2 == 0 ? 104 : 136;
+    pixels.push_back({TestType(x), TestType(y)});
   }
   const std::vector<TestType> typed(depths.begin(), depths.end());
   cfp::ForegroundWorkspace<TestType> workspace;
@@ -134,6 +136,21 @@ TEST_CASE("The depth of the frame before decides between layers, while somebody 
   CHECK_THAT(with(1.5).far_m, WithinAbs(1.79, 1e-9));
   for (const double unknown : {0.0, -1.0, 9.0, std::numeric_limits<double>::quiet_NaN()})
     CHECK_THAT(with(unknown).far_m, WithinAbs(1.79, 1e-9));
+}
+
+TEST_CASE("A wall beside a person's shoulders is not taken for the person", "[clustering]") {
+  std::vector<double> depths;
+  std::vector<std::array<double, 2>> pixels;
+  add_layer(depths, 60, 2.0, 0.005);  // sits in the middle of the box, mostly in its lower half
+  for (int i = 0; i < 60; ++i) pixels.push_back({110.0 + i % 20, i < 3 ? 90.0 : 130.0 + i});
+  add_layer(depths, 40, 3.0, 0.002);  // fills the corners of the upper half
+  for (int i = 0; i < 40; ++i) pixels.push_back({i % 2 == 0 ? 101.0 : 139.0, 55.0 + i});
+  cfp::ForegroundWorkspace<double> workspace;
+  std::vector<char> mask(depths.size());
+  const auto result = cfp::depth_foreground({depths, pixels, {100, 50, 140, 200}, 0}, {}, workspace, mask);
+  CHECK(result.status == ForegroundStatus::ok);
+  CHECK(kept(mask, 0, 60) == 60);
+  CHECK(kept(mask, 60, 40) == 0);
 }
 
 TEST_CASE("A body is parted from a slanted plane that begins at its back", "[clustering]") {

@@ -125,6 +125,7 @@ TEST_CASE("The ends of the ranges of a frame's options", "[core]") {
       CFP_FIELD(O, coarse.foreground.before_m, not_negative),
       CFP_FIELD(O, coarse.foreground.behind_m, not_negative),
       CFP_FIELD(O, coarse.foreground.min_gap_m, not_negative),
+      CFP_FIELD(O, coarse.foreground.short_m, not_negative),
       CFP_FIELD(O, coarse.foreground.half_body_m, not_negative),
       CFP_FIELD(O, fine.min_pose_inliers, not_negative),
       CFP_FIELD(O, fine.min_translation_m, not_negative),

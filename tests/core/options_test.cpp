@@ -107,6 +107,7 @@ TEST_CASE("Every option of a frame is refused by its full, unique name", "[core]
       {"coarse.foreground.first_gap_m", [&](auto& o) { o.coarse.foreground.first_gap_m = nan; }},
       {"coarse.foreground.last_gap_m", [&](auto& o) { o.coarse.foreground.last_gap_m = nan; }},
       {"coarse.foreground.min_gap_m", [&](auto& o) { o.coarse.foreground.min_gap_m = nan; }},
+      {"coarse.foreground.short_m", [&](auto& o) { o.coarse.foreground.short_m = nan; }},
       {"coarse.foreground.half_body_m", [&](auto& o) { o.coarse.foreground.half_body_m = nan; }},
       {"coarse.foreground.min_points", [](auto& o) { o.coarse.foreground.min_points = 0; }},
       {"fine.min_pose_inliers", [&](auto& o) { o.fine.min_pose_inliers = nan; }},

@@ -44,7 +44,8 @@ template <typename Scalar>
 struct DbscanWorkspace {
   SortWorkspace<Scalar> sort;
   std::vector<std::uint32_t> neighbours;
-  std::vector<int> labels;  // of sorted values
+  std::vector<int> labels;   // of sorted values
+  std::vector<double> odds;  // of depth_foreground alone
 };
 
 namespace detail {

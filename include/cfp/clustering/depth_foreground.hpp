@@ -1,6 +1,7 @@
 /// @file depth_foreground.hpp
-/// Which keypoints of a person's box lie on the person and which on what is behind or before (paper IV-C): by a window
-/// of depths around the person, or, as printed, by clustering the depths. Depths in metres, one call per box.
+/// Which keypoints of a person's box lie on the person and which on what is behind or before (paper IV-C): by the
+/// window of depths whose points lie where people do, or, as printed, by clustering the depths. Depths in metres, one
+/// call per box.
 #pragma once
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 
 #include "cfp/clustering/adaptive.hpp"
 #include "cfp/clustering/dbscan.hpp"
+#include "cfp/clustering/place_odds.hpp"
 #include "cfp/clustering/sorted_values.hpp"
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
@@ -36,15 +38,15 @@ enum class ForegroundRule : std::uint8_t {
 struct ForegroundOptions {
   ForegroundRule rule = ForegroundRule::depth_window;
   AdaptiveOptions adaptive;    ///< dbscan: eps and min_pts
-  double near_share = 0.15;    ///< the person's front is read at this share of the ascending depths, as nearer ones may
-                               ///< be a hand or flying pixels at a silhouette; [0, 1)
+  double near_share = 0.15;    ///< the front is read at this share of the depths, as a hand may be nearer; [0, 1)
   double upper_share = 0.1;    ///< the same among the points in the upper half of the box; [0, 1)
-  double obstacle_m = 0.4;     ///< the upper half begins so much farther: something stands before the person; >= 0
+  double obstacle_m = 0.3;     ///< the upper half begins so much farther: something may stand before the person; >= 0
   double before_m = 0.5;       ///< how far the window reaches before the front of a person behind something; >= 0
   double behind_m = 0.4;       ///< how far the window reaches behind the front where no gap ends it; >= 0
   double first_gap_m = 0.15;   ///< nearest end of the window at a gap, behind the front; >= 0
   double last_gap_m = 0.6;     ///< farthest end of the window at a gap; >= first_gap_m
   double min_gap_m = 0.04;     ///< narrower gaps end nothing; >= 0
+  double short_m = 0.3;        ///< another end of the window, so far behind the front; >= 0
   double half_body_m = 0.05;   ///< the front stands so much before `previous_depth_m`; >= 0
   std::size_t min_points = 6;  ///< fewer valid depths: too_few_points; >= 1
   bool invalid_is_foreground = true;  ///< label of points without a valid depth: true is the safe side
@@ -60,13 +62,14 @@ struct ForegroundOptions {
   if (!detail::non_negative(o.first_gap_m)) return "first_gap_m";
   if (!(o.last_gap_m >= o.first_gap_m) || !is_finite(o.last_gap_m)) return "last_gap_m";
   if (!detail::non_negative(o.min_gap_m)) return "min_gap_m";
+  if (!detail::non_negative(o.short_m)) return "short_m";
   if (!detail::non_negative(o.half_body_m)) return "half_body_m";
   if (o.min_points < 1) return "min_points";
   return {};
 }
 
-/// Every way of ending but `ok` says that the depths cannot tell, and labels every point with a valid depth foreground:
-/// the safe side, as the paper gives foreground points of a moving person the probability 0.
+/// All but `ok` say that the depths cannot tell, and label every point with a valid depth foreground: the safe side, as
+/// the paper gives foreground points of a moving person the probability 0.
 enum class ForegroundStatus : std::uint8_t {
   ok,
   too_few_points,  ///< fewer valid depths than min_points
@@ -100,22 +103,7 @@ struct DepthRange {
   std::size_t first, last;
 };
 
-// The depth at `upper_share` of the points in the upper half of the box; 0 for fewer than eight.
-template <typename Scalar>
-[[nodiscard]] double front_of_upper_half(const ForegroundInput<Scalar>& in, const SortedValues<Scalar>& sorted,
-                                         double upper_share) noexcept {
-  if (in.pixels.empty() || !is_proper(in.box)) return 0;
-  const Scalar middle = (in.box.y1 + in.box.y2) / Scalar(2);
-  const auto upper = [&](std::uint32_t i) { return in.pixels(i, 1) < middle; };
-  const auto count = static_cast<std::size_t>(std::count_if(sorted.index.begin(), sorted.index.end(), upper));
-  if (count < 8) return 0;
-  std::size_t left = position_of_share(upper_share, count), i = 0;
-  for (; !upper(sorted.index[i]) || left > 0; ++i) left -= upper(sorted.index[i]) ? 1U : 0U;
-  return static_cast<double>(sorted.values[i]);
-}
-
-// The window around a person whose front stands at `front`. A gap of many points is what few of them lie in: flying
-// pixels bridge the empty ones.
+// The window of a front. A gap of many points is what few of them lie in: flying pixels bridge the empty ones.
 template <typename Scalar>
 [[nodiscard]] DepthRange depth_window(span<const Scalar> depths, double front, double before_m,
                                       const ForegroundOptions& o) noexcept {
@@ -138,17 +126,28 @@ template <typename Scalar>
 
 template <typename Scalar>
 [[nodiscard]] DepthRange person_range(const ForegroundInput<Scalar>& in, const SortedValues<Scalar>& sorted,
-                                      const ForegroundOptions& o) noexcept {
-  const std::size_t n = sorted.values.size(), near = position_of_share(o.near_share, n);
-  if (is_valid_depth(in.previous_depth_m)) {
-    const double front = static_cast<double>(in.previous_depth_m) - o.half_body_m;
-    const DepthRange range = depth_window(sorted.values, front, o.before_m, o);
-    if (range.last > range.first + near) return range;  // else nobody is there any more
-  }
-  const double front = static_cast<double>(sorted.values[near]);
-  const double upper = front_of_upper_half(in, sorted, o.upper_share);
-  if (upper > front + o.obstacle_m) return depth_window(sorted.values, upper, o.before_m, o);
-  return depth_window(sorted.values, front, front, o);
+                                      const ForegroundOptions& o, std::vector<double>& odds) {
+  const span<const Scalar> depths = sorted.values;
+  const std::size_t n = depths.size(), near = position_of_share(o.near_share, n);
+  sum_place_odds(in.pixels, in.box, sorted.index, odds);
+  DepthRange best{0, n};
+  double most = -1e300;
+  // `bonus`: log odds per point by which this window may fall behind the others; a shorter one must be ahead by 0.1.
+  const auto offer = [&](double front, double before_m, std::size_t least, double bonus) {
+    DepthRange range = depth_window(depths, front, before_m, o);
+    for (int shorter = 0; shorter < 2 && range.last > range.first + least; ++shorter) {
+      const double found = (odds[range.last] - odds[range.first]) / static_cast<double>(n) + bonus - shorter * 0.1;
+      if (found > most) most = found, best = range;
+      while (range.last > range.first && static_cast<double>(depths[range.last - 1]) > front + o.short_m) --range.last;
+    }
+  };
+  const double front = static_cast<double>(depths[near]);
+  if (is_valid_depth(in.previous_depth_m))
+    offer(static_cast<double>(in.previous_depth_m) - o.half_body_m, o.before_m, near, 0.1);
+  offer(front, front, 0, 0.05);
+  const double upper = front_of_upper_half(in.pixels, in.box, sorted, o.upper_share);
+  if (upper > front + o.obstacle_m) offer(upper, o.before_m, 0, 0);
+  return best;
 }
 
 // Up to the end of the cluster of the lowest mean depth, which is the first; nothing without one.
@@ -167,16 +166,15 @@ template <typename Scalar>
 inline namespace CFP_ISA {
 
 /// mask[i] = 1 for foreground, 0 for background, by two cuts in depth.
-/// The person's front is taken, in this order: from `previous_depth_m`, when the window there holds more than
-/// `near_share` of the points; from the upper half of the box, when it begins `obstacle_m` farther than the whole (a
-/// desk, a table: what stands before a person hides the legs); from the depth that the nearest `near_share` reach. The
-/// window ends at the widest gap between `first_gap_m` and `last_gap_m` behind the front, or, where no gap is wider
-/// than `min_gap_m`, `behind_m` behind it. It begins `before_m` before the front in the first two cases; in the third,
-/// everything nearer belongs to the person (an arm). One layer only is `ok`: everything is foreground. Points without a
-/// valid depth take no part and get the label `invalid_is_foreground` says, whatever the status. O(n log n), in
-/// practice O(n); deterministic; permuting the points permutes the mask; allocates only when the workspace grows.
-/// Departure from the paper, which clusters: a window is better on every kind of scene of foreground_study with a
-/// person.
+/// The person's front may stand at `previous_depth_m`, if the window there holds more than `near_share` of the points;
+/// where the upper half of the box begins, if that is `obstacle_m` farther (a desk hides the legs); or at the depth
+/// that the nearest `near_share` reach, and then all that is nearer is the person's (an arm), else what is up to
+/// `before_m` nearer. The window ends at the widest gap between `first_gap_m` and `last_gap_m` behind the front;
+/// without a gap wider than `min_gap_m`, `behind_m` behind it; or `short_m` behind it. Of these windows the one is
+/// taken whose points lie most where people do (place_odds.hpp); without pixels the previous, else the nearest.
+/// Points without a valid depth take no part and get the label `invalid_is_foreground` says. O(n log n), in practice
+/// O(n); deterministic; permuting the points permutes the mask; allocates only when the workspace grows. Departure from
+/// the paper, which clusters: a window is better on every kind of scene of foreground_study.
 template <typename Scalar>
 ForegroundResult depth_foreground(const ForegroundInput<non_deduced<Scalar>>& in, const ForegroundOptions& options,
                                   ForegroundWorkspace<Scalar>& workspace, span<char> mask) {
@@ -193,7 +191,7 @@ ForegroundResult depth_foreground(const ForegroundInput<non_deduced<Scalar>>& in
   detail::DepthRange range{0, n};
   if (n > 0 && n >= options.min_points) {
     if (options.rule == ForegroundRule::depth_window) {
-      range = detail::person_range<Scalar>(in, sorted, options);
+      range = detail::person_range<Scalar>(in, sorted, options, workspace.odds);
     } else {
       result.dbscan = adaptive_options(depths, options.adaptive, workspace);
       range = detail::first_cluster(depths, result.dbscan, workspace);
