@@ -28,7 +28,7 @@ struct OpticalFlowOptions {
   double corner_quality = 0.01;  ///< least strength of a corner, as a share of the strongest one's
   int keypoints_per_box = 100;   ///< at most, besides, in each box, one per cell of a grid
   int keypoints_outside = 0;     ///< at most, outside all boxes, likewise
-  int window = 15;               ///< side of the patch that is tracked, px
+  int window = 11;               ///< side of the patch that is tracked, px
   int levels = 4;                ///< of the pyramid, >= 1
   int iterations = 20;           ///< per level
   double precision = 0.02;       ///< an update below this ends the iterations, px
