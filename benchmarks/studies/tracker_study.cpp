@@ -10,12 +10,13 @@
 // person who was detected. The defaults were chosen on the stream "tune" and its walkers (table 2); table 1 reports
 // other seeds, other numbers of people, other speeds and other miss rates.
 //
-// The aim is to cover nowhere more than a point less than the best of the three, with at most 10 % more false boxes than
-// the least of them. All simulated cells reach it; TUD-Stadtmitte at half and quarter rate does not (71 missed boxes and
-// 179 frames at most, so that a point is less than a box). No rule moves both ends. What was tried beside the options of
-// table 2, on the stream "tune" with 10 sequences (defaults: 4 cells behind, 7 with too many false boxes, the worst +23
-// %): rates that fade in 1 to 2 s cover 0.5 % more (1 cell behind), with up to +29 to +37 % false boxes; no coasting for
-// tracks seen in less than 70 (80) % of their frames: +18 (+12) %, and 6 (12) cells behind; no compensated box on a
+// The aim is to cover nowhere more than a point less than the best of the three, with at most 10 % more false boxes
+// than the least of them. All simulated cells reach it; TUD-Stadtmitte at half and quarter rate does not (71 missed
+// boxes and 179 frames at most, so that a point is less than a box). No rule moves both ends. What was tried beside the
+// options of table 2, on the stream "tune" with 10 sequences (defaults: 4 cells behind, 7 with too many false boxes,
+// the worst +23
+// %): rates that fade in 1 to 2 s cover 0.5 % more (1 cell behind), with up to +29 to +37 % false boxes; no coasting
+// for tracks seen in less than 70 (80) % of their frames: +18 (+12) %, and 6 (12) cells behind; no compensated box on a
 // detected one (IoU > 0.5): +14 %, 14 cells behind; a second round of association, by enlarged boxes or the last ones
 // seen: up to +31 %, 4 to 14 cells behind. The false boxes at low rates follow ghosts that a worse association never
 // confirms.

@@ -40,7 +40,7 @@ enum class Scenario {
 inline constexpr std::array<Scenario, 12> scenarios{
     Scenario::alone,      Scenario::wall_far,    Scenario::wall_close, Scenario::wall_touched,     Scenario::slanted,
     Scenario::two_people, Scenario::behind_desk, Scenario::at_table,   Scenario::outstretched_arm, Scenario::sitting,
-    Scenario::nobody,    Scenario::cut_by_edge};
+    Scenario::nobody,     Scenario::cut_by_edge};
 inline const char* name_of(Scenario scenario) {
   constexpr std::array<const char*, 12> names{"alone",        "wall far",      "wall close",    "touching a wall",
                                               "slanted wall", "person behind", "behind a desk", "table in front",
@@ -258,7 +258,8 @@ inline PersonScene draw_scene(cfp::Random& random, Scenario scenario) {
   };
   const bool faces = furnished || scenario == Scenario::outstretched_arm;
   double x = u(-0.3, 0.3) * distance;
-  if (scenario == Scenario::cut_by_edge) x += (x > 0 ? 0.3 : -0.3) * distance;  // about half of them outside of the image
+  if (scenario == Scenario::cut_by_edge)
+    x += (x > 0 ? 0.3 : -0.3) * distance;  // about half of them outside of the image
   const double turn = faces ? u(-0.5, 0.5) : u(-1.57, 1.57);
   const Scenario posture = scenario == Scenario::at_table ? Scenario::sitting : scenario;
   detail::World world;
