@@ -66,7 +66,7 @@ TEST_CASE("Pairs follow the image, over several frames and with either check", "
 TEST_CASE("The defaults of the flow", "[flow]") {
   const cfp::OpticalFlowOptions o;
   CHECK((o.corners == 500 && o.corner_distance == 6 && o.corner_quality == 0.01 && o.keypoints_per_box == 100));
-  CHECK((o.keypoints_outside == 0 && o.window == 15 && o.levels == 4 && o.iterations == 20 && o.precision == 0.02));
+  CHECK((o.keypoints_outside == 0 && o.window == 11 && o.levels == 4 && o.iterations == 20 && o.precision == 0.02));
   CHECK((!o.backward && o.max_backward_px == 0.5F));
 }
 
