@@ -67,13 +67,14 @@ template <typename T>
   return {pairs.row(2)[i], pairs.row(3)[i], T(1)};
 }
 
-// Enters every pair's point of one image, the first row of which is given; cells of 1 / inverse_size.
+// Enters every pair's point of one image, the first row of which is given; cells of 1 / inverse_size. A centred point
+// over no size at all is not a number: the order of the arguments sends it to the lower end.
 inline void count_cells(const PairArrays& pairs, std::size_t row, double inverse_size, CellCounts& cells) {
   std::size_t size = 64;
   while (size < 2 * pairs.size) size *= 2;
   cells.keys.assign(size, 0), cells.counts.assign(size, 0), cells.slots.resize(pairs.size);
   const auto index = [&](double x) {
-    return static_cast<std::uint64_t>((std::min)((std::max)(x * inverse_size, -1e9), 1e9) + 2e9);
+    return static_cast<std::uint64_t>((std::min)((std::max)(-1e9, x * inverse_size), 1e9) + 2e9);
   };
   for (std::size_t i = 0; i < pairs.size; ++i) {
     const std::uint64_t key = index(pairs.row(row)[i]) << 32 | index(pairs.row(row + 1)[i]);  // never 0
