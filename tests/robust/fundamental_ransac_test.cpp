@@ -326,6 +326,20 @@ TEST_CASE("Options outside their range are named", "[robust]") {
   CHECK(invalid_field(options).string() == "min_inliers");
 }
 
+TEST_CASE("The smallest threshold that validation accepts is only a threshold", "[robust]") {
+  // Its square is 0: copies of one pair over cells without a size are not a number (found by tests/fuzz), and a cut that
+  // is widened from 0 stays there.
+  const std::vector<std::array<double, 2>> copies(40, {100, 100});
+  cfp::Random random(40, "threshold");
+  const auto scene = make_two_view_scene<double>(random, noisy(100, 0.2));
+  FundamentalRansacWorkspace workspace;
+  FundamentalRansacOptions options;
+  options.threshold_px = std::numeric_limits<double>::denorm_min();
+  REQUIRE(!invalid_field(options));
+  CHECK_FALSE(fundamental_ransac(PointPairs{copies, copies}, options, workspace).found());
+  CHECK_FALSE(fundamental_ransac(PointPairs{scene.prev, scene.cur}, options, workspace).found());
+}
+
 TEST_CASE("A second call allocates nothing", "[robust]") {
   cfp::Random random(38, "allocation");
   const auto scene = make_two_view_scene<double>(random, noisy(500, 0.4));

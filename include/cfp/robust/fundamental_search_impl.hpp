@@ -161,7 +161,8 @@ struct FundamentalSearch {
   // homography suffices must not be judged by a threshold above the parallax of a video.
   void measure_noise() noexcept {
     const T floor = T(1e-4) * pairs.factor * pairs.factor;
-    for (T cut = limit; cut <= 16 * limit; cut *= 4) {
+    T cut = limit;
+    for (int width = 0; width < 3; ++width, cut *= 4) {
       noise_variance = cut / T(3.84);
       for (int step = 0; step < 10; ++step) {
         const T farthest = (std::min)(cut, T(6.25) * noise_variance);
