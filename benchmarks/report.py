@@ -53,10 +53,10 @@ FRAME = [
 # The average times of the paper's Table V (CFP-SLAM, an i7 with an RTX 3060) in milliseconds; what of ours does that work, how often.
 PAPER = [
     ("EKF: missed-detection compensation and association of boxes", 0.07, 1, "box_tracker", "cfp_frame<double>/5", "5 boxes"),
-    ("OSP: static probability of objects", 17.93, 1, "frame", "frame<float, Stages::first, false>",
+    ("OSP: static probability of objects", 17.93, 1, "frame", "frame<float, Stages::coarse, false>",
      "500 pairs, 3 boxes, F's RANSAC, foreground included; corners and optical flow, most of the paper's time, excluded"),
     ("DBSCAN: clustering of the keypoints in boxes", 1.76, 3, "clustering", "foreground/dbscan/200", "3 boxes of 200 keypoints, adaptive eps included"),
-    ("KSP: static probability of keypoints", 3.66, 1, "frame", "frame<float, Stages::second, true>", "1000 keypoints, map points and weights included"),
+    ("KSP: static probability of keypoints", 3.66, 1, "frame", "frame<float, Stages::fine, true>", "1000 keypoints, map points and weights included"),
     ("two pose optimisations", "part of Tracking, 42.7", 2, "pose_refinement", "pixel only, N = 1000, 10 % outliers: cfp double, default", "1000 points, 10 % outliers"),
 ]
 
@@ -194,12 +194,12 @@ def include_table(entries):
     return table(["header alone", "s", "ratio to Eigen/Core", "goal"], [[f"`{e['header']}`", f"{e['seconds']:.2f}", judged(e["ratio"], e["goal"], e["ratio"] <= e["goal"]), e["goal"]] for e in dearest])
 
 
-def page(rows, versions, machine, environment, include, seconds):
+def page(rows, versions, machine, environment, include, seconds, commit):
     caches = ", ".join(f"L{c['level']} {c['type'].lower()} {c['size'] // 1024} KiB" for c in machine.get("caches", []))
     versions = {k: v for k, v in environment["base"].items() if k not in ("compiler", "flags", "instruction set")} | versions
     parts = [
         "# Results\n",
-        f"Written by `benchmarks/run` on {datetime.date.today()}, {seconds / 60:.0f} minutes; do not edit. All rows with their spread, quality and percentiles: `build/bench-results` after a run.\n",
+        f"Written by `benchmarks/run` on {datetime.date.today()}{commit and f' at commit {commit}'}, {seconds / 60:.0f} minutes; do not edit. All rows with their spread, quality and percentiles: `build/bench-results` after a run.\n",
         table(["", ""], [("processor", f"{processor()}, {machine.get('num_cpus', '')} cores; {caches}"), ("compiler", environment["base"]["compiler"]),
                          *[(b, f"`{environment[b]['flags'].strip()}`: {environment[b]['instruction set']}") for b in BUILDS], ("versions", ", ".join(f"{k} {v}" for k, v in versions.items()))]),
         "Times are processor time of one thread, medians over all runs. Both builds take turns, module by module, several times; within a process the benchmarks are interleaved, "
@@ -246,8 +246,10 @@ def main():
     for module, name in sorted({w for w in wanted if w[0] in measured and w not in rows}):
         print(f"not measured: {module}: {name}")
     environment = {b: json.loads((arguments.raw / f"environment-{b}.json").read_text()) for b in BUILDS}
+    commit_file = arguments.raw / "commit"
+    commit = commit_file.read_text().strip() if commit_file.exists() else ""
     arguments.output.mkdir(parents=True, exist_ok=True)
-    (arguments.output / "RESULTS.md").write_text(page(rows, versions, machine, environment, include, arguments.seconds))
+    (arguments.output / "RESULTS.md").write_text(page(rows, versions, machine, environment, include, arguments.seconds, commit))
     (arguments.output / "tables.md").write_text(all_rows(rows))
     data = [{"module": module, "name": name, "ns": row.ns, "numbers": row.quality} for (module, name), row in sorted(rows.items())]
     (arguments.output / "results.json").write_text(json.dumps({"environment": environment, "rows": data, "include": include}, indent=1) + "\n")

@@ -327,8 +327,8 @@ TEST_CASE("Options outside their range are named", "[robust]") {
 }
 
 TEST_CASE("The smallest threshold that validation accepts is only a threshold", "[robust]") {
-  // Its square is 0: copies of one pair over cells without a size are not a number (found by tests/fuzz), and a cut that
-  // is widened from 0 stays there.
+  // Its square is 0: copies of one pair over cells without a size are not a number (found by tests/fuzz), and a cut
+  // that is widened from 0 stays there.
   const std::vector<std::array<double, 2>> copies(40, {100, 100});
   cfp::Random random(40, "threshold");
   const auto scene = make_two_view_scene<double>(random, noisy(100, 0.2));
