@@ -12,8 +12,7 @@
 #include "cfp/core/span.hpp"
 #include "cfp/geometry/box.hpp"
 
-namespace cfp {
-namespace detail {
+namespace cfp::detail {
 inline namespace CFP_ISA {
 
 // sums[i]: log odds that people cover the places of the i nearest points, so that of two ranges of depths the one with
@@ -47,5 +46,4 @@ template <typename Scalar>
 }
 
 }  // namespace CFP_ISA
-}  // namespace detail
-}  // namespace cfp
+}  // namespace cfp::detail
