@@ -116,6 +116,8 @@ template struct cfp::SortWorkspace<float>;
 template struct cfp::SortWorkspace<double>;
 template struct cfp::DbscanWorkspace<float>;
 template struct cfp::DbscanWorkspace<double>;
+template struct cfp::ForegroundWorkspace<float>;
+template struct cfp::ForegroundWorkspace<double>;
 template <typename Scalar>
 static void instantiate_clustering() noexcept {
   use(&cfp::adaptive_options<Scalar>);

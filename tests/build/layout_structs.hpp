@@ -15,14 +15,16 @@
   CFP_LAYOUT(cfp::SortWorkspace<float>, index)                           \
   CFP_LAYOUT(cfp::DbscanOptions, min_pts)                                \
   CFP_LAYOUT(cfp::DbscanResult, invalid)                                 \
-  CFP_LAYOUT(cfp::DbscanWorkspace<float>, odds)                          \
-  CFP_LAYOUT(cfp::DbscanWorkspace<double>, odds)                         \
+  CFP_LAYOUT(cfp::DbscanWorkspace<float>, labels)                        \
+  CFP_LAYOUT(cfp::DbscanWorkspace<double>, labels)                       \
   CFP_LAYOUT(cfp::ForegroundInput<float>, previous_depth_m)              \
   CFP_LAYOUT(cfp::ForegroundInput<double>, previous_depth_m)             \
   CFP_LAYOUT(cfp::ObjectDepth<float>, depth_m)                           \
   CFP_LAYOUT(cfp::ObjectDepth<double>, depth_m)                          \
   CFP_LAYOUT(cfp::ForegroundOptions, invalid_is_foreground)              \
   CFP_LAYOUT(cfp::ForegroundResult, dbscan)                              \
+  CFP_LAYOUT(cfp::ForegroundWorkspace<float>, odds)                      \
+  CFP_LAYOUT(cfp::ForegroundWorkspace<double>, odds)                     \
   CFP_LAYOUT_OPAQUE(cfp::Tolerance<float>)                               \
   CFP_LAYOUT_OPAQUE(cfp::Random)                                         \
   CFP_LAYOUT_OPAQUE(cfp::OptionPath)                                     \

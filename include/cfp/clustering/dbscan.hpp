@@ -44,8 +44,7 @@ template <typename Scalar>
 struct DbscanWorkspace {
   SortWorkspace<Scalar> sort;
   std::vector<std::uint32_t> neighbours;
-  std::vector<int> labels;   // of sorted values
-  std::vector<double> odds;  // of depth_foreground alone
+  std::vector<int> labels;  // of sorted values
 };
 
 namespace detail {

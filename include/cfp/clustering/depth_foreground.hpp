@@ -93,7 +93,9 @@ struct ForegroundResult {
 
 /// Grows to the largest box seen, then allocates nothing.
 template <typename Scalar>
-using ForegroundWorkspace = DbscanWorkspace<Scalar>;
+struct ForegroundWorkspace : DbscanWorkspace<Scalar> {
+  std::vector<double> odds;
+};
 
 namespace detail {
 inline namespace CFP_ISA {
