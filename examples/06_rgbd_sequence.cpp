@@ -25,6 +25,7 @@
 #include "cfp/interop/opencv.hpp"
 #include "support/detections_file.hpp"
 #include "support/tum.hpp"
+#include "support/variant.hpp"
 
 namespace {
 
@@ -133,13 +134,6 @@ void draw(cv::Mat& picture, const View& view, cfp::span<const float> static_prob
                   box.compensated() ? " compensated" : "", state.objects[b].static_probability);
     cv::putText(picture, text, corner + cv::Point(4, 16), cv::FONT_HERSHEY_SIMPLEX, 0.5, colour, 1, cv::LINE_AA);
   }
-}
-
-cfp::Variant variant_of(const std::string& name) {
-  for (int v = 0; v <= static_cast<int>(cfp::Variant::plain); ++v) {
-    if (name == cfp::to_string(static_cast<cfp::Variant>(v))) return static_cast<cfp::Variant>(v);
-  }
-  throw std::runtime_error("no variant '" + name + "'");
 }
 
 /// The image of a list that is nearest in time, or nullptr when none is within 20 ms.
@@ -267,7 +261,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   try {
-    run(argv[1], argv[2], variant_of(argc > 3 ? argv[3] : "cfp"));
+    run(argv[1], argv[2], cfp_examples::variant_of(argc > 3 ? argv[3] : "cfp"));
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

@@ -16,6 +16,7 @@
 #include "../slam_runs/run_folder.hpp"
 #include "../slam_runs/stress_result.hpp"
 #include "../support/progress.hpp"
+#include "../support/variant.hpp"
 
 namespace {
 
@@ -49,7 +50,7 @@ void add_common_options(CLI::App& run, Arguments& a) {
 
 void add_run_options(CLI::App& run, Arguments& a) {
   run.add_option("--out", a.out, "folder for everything that is written");
-  run.add_option("--variant", a.variants, cfp_slam::all_variants + ", or all; several with commas")->delimiter(',');
+  run.add_option("--variant", a.variants, cfp_examples::all_variants + ", or all; several with commas")->delimiter(',');
   run.add_option("--seeds", a.seeds, "runs of each variant, with so many seeds from --seed on");
   run.add_flag("--decisions", a.settings.decisions,
                "writes why each keypoint of each frame has its weight (100 kB each)");
@@ -117,8 +118,8 @@ int main(int argc, char** argv) {
   stress.add_option("--only", a.stresses, "only those with one of these in their names")->delimiter(',');
   CLI11_PARSE(app, argc, argv);
   try {
-    if (a.variants == std::vector<std::string>{"all"}) a.variants = CLI::detail::split(cfp_slam::all_variants, ',');
-    for (const std::string& variant : a.variants) cfp_slam::variant_of(variant);
+    if (a.variants == std::vector<std::string>{"all"}) a.variants = CLI::detail::split(cfp_examples::all_variants, ',');
+    for (const std::string& variant : a.variants) cfp_examples::variant_of(variant);
     if (!a.options.empty()) a.settings.options = cfp_slam::read_options(a.options);
     cv::setNumThreads(a.threads);
     for (const fs::path& recording : cfp_slam::recordings(a.folders))

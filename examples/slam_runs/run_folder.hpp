@@ -16,6 +16,7 @@
 
 #include "../slam/loop/run.hpp"
 #include "../support/tum.hpp"
+#include "../support/variant.hpp"
 #include "../support/write_text.hpp"
 #include "options_file.hpp"
 #include "run_writer.hpp"
@@ -42,15 +43,6 @@ struct RunSettings {
     return out.str();
   }
 };
-
-inline const std::string all_variants = "plain,only-boxes,no-ksp,no-posterior,no-dbscan,no-mdc,cfp-minus,cfp";
-
-inline cfp::Variant variant_of(const std::string& name) {
-  for (int v = 0; v <= static_cast<int>(cfp::Variant::plain); ++v) {
-    if (name == cfp::to_string(static_cast<cfp::Variant>(v))) return static_cast<cfp::Variant>(v);
-  }
-  throw std::runtime_error("no variant '" + name + "': " + all_variants);
-}
 
 inline std::string file_text(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
@@ -97,7 +89,7 @@ inline bool is_done(const std::filesystem::path& folder, const RunSettings& sett
 inline Options options_of(const RunSettings& settings, bool threads) {
   Options options;
   for (const auto& [name, value] : settings.options) set_option(options, name, value);
-  options.variant = variant_of(settings.variant);
+  options.variant = cfp_examples::variant_of(settings.variant);
   options.seed = settings.seed;
   options.threads = threads;
   options.max_frames = settings.frames;

@@ -26,7 +26,7 @@ inline namespace CFP_ISA {
 template <typename Pointers>
 void match_by_map_point(const Pointers& current, const Pointers& last, std::vector<std::int32_t>& scratch,
                         std::vector<std::int32_t>& match) {
-  const auto before = [](const auto& a, const auto& b) { return std::less<>()(a, b); };
+  constexpr std::less<> before{};
   scratch.clear();
   for (std::size_t j = 0; j < last.size(); ++j) {
     if (last[j]) scratch.push_back(static_cast<std::int32_t>(j));

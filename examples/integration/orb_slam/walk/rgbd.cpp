@@ -17,6 +17,7 @@
 #include "System.h"
 #include "detection/simple_detectors.hpp"
 #include "support/sequence.hpp"
+#include "support/variant.hpp"
 
 namespace {
 
@@ -34,25 +35,17 @@ std::string settings_of(const cfp_examples::TumCamera& c, const std::string& fil
   return file;
 }
 
-cfp::Variant variant_named(const char* name) {
-  for (int v = 0; v <= static_cast<int>(cfp::Variant::plain); ++v) {
-    if (std::strcmp(to_string(static_cast<cfp::Variant>(v)), name) == 0) return static_cast<cfp::Variant>(v);
-  }
-  throw std::runtime_error(std::string(name) + " is no variant");
-}
-
-void run(const char* vocabulary, const char* folder, const std::string& trajectory, const char* variant, bool mono) {
+void run(const char* vocabulary, const char* folder, const std::string& trajectory, cfp::Variant variant, bool mono) {
   using Clock = std::chrono::steady_clock;
   const cfp_examples::Sequence recording(folder);
   cfp_examples::FileDetector detector(std::string(folder) + "/detections.txt", {});
   const auto& camera = recording.calibration();
   ORB_SLAM2::System slam(vocabulary, settings_of(camera, trajectory + ".yaml"),
                          mono ? ORB_SLAM2::System::MONOCULAR : ORB_SLAM2::System::RGBD, false);
-  const bool plain = variant_named(variant) == cfp::Variant::plain;
+  const bool plain = variant == cfp::Variant::plain;
   if (!plain)
     slam.UseStaticWeights(cfp::variant_options(
-        variant_named(variant),
-        cfp_integration::StaticWeightsOptions(detector.class_of("person"), camera.width, camera.height)));
+        variant, cfp_integration::StaticWeightsOptions(detector.class_of("person"), camera.width, camera.height)));
 
   std::vector<double> milliseconds;
   const auto start = Clock::now();
@@ -88,7 +81,7 @@ int main(int argc, char* argv[]) {
     return 2;
   }
   try {
-    run(argv[1], argv[2], argv[3], argv[4], mono);
+    run(argv[1], argv[2], argv[3], cfp_examples::variant_of(argv[4]), mono);
     return 0;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
