@@ -1,5 +1,6 @@
 #include "cfp/geometry/p3p.hpp"
 
+#include <cmath>
 #include <limits>
 
 #include <Eigen/Geometry>
@@ -193,6 +194,30 @@ TEST_CASE("Rays that no such triangle fits have no pose and say so", "[geometry]
     CHECK((any.status == Status::ok) == (any.count > 0));
     CHECK(worst_misfit(any, problem) < 1e-7);
   }
+}
+
+TEST_CASE("A thin triangle on rays that it does not fit has poses that are rotations, or none", "[geometry]") {
+  cfp::Random random(48, "p3p");
+  int solved = 0;
+  for (int k = 0; k < 20000; ++k) {
+    P3PProblem<double> problem;
+    problem.world = random_points(random);
+    const Vector3<double> along = problem.world[1] - problem.world[0];
+    const double height = std::pow(10, random.uniform(-8, -1));
+    problem.world[2] = problem.world[0] + random.uniform(-1, 1) * along + height * cfp_test::random_direction(random);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double off = std::pow(10, random.uniform(-8, 0));
+      problem.rays[i] = problem.world[i] / problem.world[i].z() + off * cfp_test::random_direction(random);
+    }
+    const auto solutions = p3p(problem);
+    for (int s = 0; s < solutions.count; ++s) {
+      const auto& R = solutions.T_cam_world[std::size_t(s)].rotation;
+      REQUIRE((R * R.transpose() - cfp::Matrix3<double>::Identity()).norm() < 1e-5);
+      ++solved;
+    }
+    REQUIRE(worst_misfit(solutions, problem) < 1e-5);
+  }
+  CHECK(solved > 5000);
 }
 
 TEST_CASE("The scene's unit, the world frame, the order of points and the rays' lengths do not matter", "[geometry]") {
