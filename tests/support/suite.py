@@ -151,8 +151,9 @@ def tests_of(header):
         steps = includes_of(test).get(path)
         if steps is None or "_ceres_" in test.name or (test.parent.name == "interop" and room != "interop"):
             continue
-        mirror, at_home = test.stem.startswith(f"{stem}_"), test.parent.name == room or test.stem == "defaults_test"
-        of_room = test.stem in ("defaults_test", f"{room}_properties_test")
+        of_all = ("defaults_test", "option_bounds_test")  # of every room, though they stand in core
+        mirror, at_home = test.stem.startswith(f"{stem}_"), test.parent.name == room or test.stem in of_all
+        of_room = test.stem in (*of_all, f"{room}_properties_test")
         ranked.append((not mirror, not at_home, not of_room, steps, test.parent.name != "properties", test.stat().st_size, test))
     return [entry[-1] for entry in sorted(ranked)]
 
