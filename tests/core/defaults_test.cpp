@@ -109,4 +109,10 @@ TEST_CASE("A result that nothing was computed for says so", "[core]") {
   CHECK((!cfp::is_solved(p.status) && p.used == 0 && p.inliers == 0 && p.zero_weight == 0 && p.invalid == 0));
   const cfp::BundleResult b;
   CHECK((!cfp::is_solved(b.status) && b.used == 0 && b.zero_weight == 0 && b.invalid == 0 && b.behind == 0));
+  const cfp::ForegroundResult f;
+  CHECK((f.status == cfp::ForegroundStatus::too_few_points && f.depth_m == 0 && f.near_m == 0 && f.far_m == 0));
+  CHECK((f.foreground == 0 && f.background == 0 && f.invalid == 0));
+  const cfp::TrajectoryCoverage t;
+  CHECK((t.matched == 0 && t.expected == 0 && t.unusable == 0 && t.pose_fraction == 0 && t.time_fraction == 0));
+  CHECK((t.largest_gap_s == 0 && t.largest_stamp_difference_s == 0));
 }

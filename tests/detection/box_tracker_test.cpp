@@ -178,6 +178,19 @@ TEST_CASE("Scores: below min_score ignored, below birth_threshold only extends",
   CHECK((result.ignored == 1 && result.compensated == 1));
 }
 
+TEST_CASE("A box is used up to 1e6 px on each side and skipped beyond", "[detection]") {
+  const double beyond = std::nextafter(1e6, 2e6);
+  double Box::*const edges[] = {&Box::x1, &Box::y1, &Box::x2, &Box::y2};
+  for (int k = 0; k < 4; ++k) {
+    Box box{10, 10, 60, 160};
+    const double sign = k < 2 ? -1 : 1;
+    box.*edges[k] = sign * 1e6;
+    CHECK(cfp::BoxTracker<double>().track(Detections{{box, 0, 1}}, 0.0).skipped == 0);
+    box.*edges[k] = sign * beyond;
+    CHECK(cfp::BoxTracker<double>().track(Detections{{box, 0, 1}}, 0.0).skipped == 1);
+  }
+}
+
 TEST_CASE("A frame without a detector run predicts and forgets nobody", "[detection]") {
   cfp::BoxTracker<double> tracker;
   int id = 0;

@@ -51,6 +51,11 @@ TEMPLATE_TEST_CASE("AUC equals the count over all pairs, ties and weights includ
     const auto result = cfp::roc_auc(s.probability, s.is_static, s.weight, workspace);
     REQUIRE(result.status == cfp::Status::ok);
     CHECK_THAT(result.auc, WithinAbs(auc_by_pairs(s), 1e-12));
+    double sums[2] = {0, 0};
+    for (std::size_t i = 0; i < s.is_static.size(); ++i)
+      sums[s.is_static[i] != 0 ? 1 : 0] += s.weight.empty() ? 1 : static_cast<double>(s.weight[i]);
+    CHECK_THAT(result.moving_weight, WithinAbs(sums[0], 1e-12));
+    CHECK_THAT(result.static_weight, WithinAbs(sums[1], 1e-12));
   }
 }
 

@@ -146,6 +146,19 @@ TEST_CASE("The largest distance that matches is the option's, and a pixel withou
   CHECK(same >= 130);
 }
 
+TEST_CASE("A match lies within the radius, its rim included", "[frame]") {
+  Pairs pair(18, 1);
+  pair.to = pair.from;
+  pair.previous[0] = {100, 200};
+  for (const double distance : {40.0, 40.01}) {
+    for (const auto& [x, y] : {std::array<double, 2>{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
+      pair.current[0] = {100 + x * distance, 200 + y * distance};
+      pair.match[0] = -1;
+      CHECK(pair.run() == (distance == 40 ? 1U : 0U));
+    }
+  }
+}
+
 TEST_CASE("Repeated matching allocates nothing and gives the same bits", "[frame]") {
   Pairs pairs(15);
   pairs.run();

@@ -15,7 +15,7 @@ using cfp_test::make_dynamic_scene;
 
 namespace {
 
-bool contains(const std::string& text, const char* part) { return text.find(part) != std::string::npos; }
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 }  // namespace
 
@@ -81,7 +81,7 @@ TEST_CASE("Each rule is told by its name", "[frame]") {
   };
   const auto text = [&](std::size_t i, double m) { return to_text(cfp::explain(i, m, options, run.state)); };
   const std::size_t person = label(cfp::KeypointLabel::foreground, 0, true);
-  CHECK(contains(text(person, 1), "on the object of track"));
+  CHECK(contains(text(person, 1), "keypoint " + std::to_string(person) + ": on the object of track"));
   CHECK(contains(text(person, 1), "moving object"));
   CHECK(contains(text(person, 1), "a mismatch"));
   CHECK(contains(text(label(cfp::KeypointLabel::foreground, 0, false), 1), "not matched, on the object"));

@@ -41,3 +41,24 @@ TEST_CASE("Variants without the object stage hold for every unknown_object_proba
     }
   }
 }
+
+TEST_CASE("A variant switches its own parts off and nothing else", "[frame]") {
+  using V = cfp::Variant;
+  cfp::FrameOptions base;
+  base.coarse.object.unknown_object_probability = 0.95;
+  for (int v = 0; v <= static_cast<int>(V::plain); ++v) {
+    const V variant = static_cast<V>(v);
+    INFO(cfp::to_string(variant));
+    const cfp::FrameOptions o = cfp::variant_options(variant, base);
+    const bool removes = variant == V::no_ksp || variant == V::only_boxes,
+               no_objects = removes || variant == V::cfp_minus;
+    CHECK(o.coarse.use_object_probability == !no_objects);
+    CHECK(o.coarse.object.unknown_object_probability == (no_objects ? base.object_threshold : 0.95));
+    CHECK(o.fine.enabled == !removes);
+    CHECK((o.map_point.weight == cfp::WeightRule::product) == (removes || variant == V::no_posterior));
+    CHECK((o.tracker.max_coast == 0) == (variant == V::no_mdc || variant == V::only_boxes));
+    CHECK(o.coarse.use_depth_foreground == !(variant == V::no_dbscan || variant == V::only_boxes));
+    CHECK(o.coarse.soft_background == (variant != V::no_ksp));
+    CHECK(o.use_boxes == (variant != V::plain));
+  }
+}

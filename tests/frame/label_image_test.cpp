@@ -17,6 +17,13 @@ TEST_CASE("A label is read at the nearest pixel, rows being as far apart as the 
     CHECK(cfp::label_at(image, 0.0, outside + 1) == 0);
   }
   CHECK(cfp::label_at(cfp::LabelImage{}, 0.0, 0.0) == 0);
+  const std::array<std::uint8_t, 4> full = {1, 1, 1, 1};
+  for (int k = -6; k <= 14; ++k) {  // the border of the first pixels belongs to the image, that of the last does not
+    const double x = 0.25 * k;
+    const int inside = x >= -0.5 && x < 1.5 ? 1 : 0;
+    CHECK(cfp::label_at({full.data(), 2, 2, 2}, x, 1.0) == inside);
+    CHECK(cfp::label_at({full.data(), 2, 2, 2}, 1.0, x) == inside);
+  }
 }
 
 TEST_CASE("The detections of a label image span their labels", "[frame]") {

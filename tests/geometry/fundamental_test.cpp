@@ -166,6 +166,10 @@ TEST_CASE("Pairs that do not determine F are reported", "[geometry]") {
   CHECK(cfp::fundamental_7point(PointPairs{first_seven(plane.prev), first_seven(plane.cur)}, solutions) == 0);
   std::vector<std::array<double, 2>> equal(20, {3.0, 4.0});
   CHECK(cfp::fundamental_8point(PointPairs{equal, equal}, F) == Status::degenerate);
+  auto tiny = make_two_view_scene<double>(random, clean(200));  // all within a ten-billionth of a pixel: one place
+  for (auto& p : tiny.prev) p = {2e-13 * p[0], 2e-13 * p[1]};
+  CHECK(cfp::fundamental_8point(PointPairs{tiny.prev, tiny.cur}, F) == Status::degenerate);
+  CHECK(cfp::fundamental_8point(PointPairs{tiny.cur, tiny.prev}, F) == Status::degenerate);
   const std::vector<std::array<double, 2>> few(7, {3.0, 4.0});
   CHECK(cfp::fundamental_8point(PointPairs{few, few}, F) == Status::not_enough_data);
   CHECK(cfp::fundamental_7point(PointPairs{few, few}, solutions) == 0);

@@ -157,6 +157,19 @@ TEST_CASE("A small triangle far away, a thin one and one seen edge-on are as goo
   }
 }
 
+TEST_CASE("Points a thousand times as far as others lose few digits", "[geometry]") {
+  cfp::Random random(48, "p3p");
+  constexpr int problems = 40000;
+  int poor = 0;
+  for (int k = 0; k < problems; ++k) {
+    std::array<Vector3<double>, 3> points;
+    for (Vector3<double>& x : points) x = std::pow(10, random.uniform(-3, 3)) * random_ray(random);
+    const Problem<double> problem = view(random, points);
+    poor += best_error(p3p(problem), problem.truth) > 1e-7 ? 1 : 0;
+  }
+  CHECK(poor < 0.0015 * problems);
+}
+
 TEST_CASE("Two solutions that meet on the danger cylinder are not lost", "[geometry]") {
   cfp::Random random(46, "p3p");
   constexpr int problems = 5000;

@@ -156,6 +156,11 @@ TEMPLATE_TEST_CASE("A camera from OpenCV's matrices projects as they say", "[int
   CHECK(refused(skewed, {}));
   CHECK(refused(infinite, {}));
   CHECK(refused(flat, {}));
+  for (const double focal_length : {0.0, -535.4}) {
+    flat = K.clone();
+    flat.at<double>(0, 0) = focal_length;
+    CHECK(refused(flat, {}));
+  }
   CHECK(refused({}, {}));
   CHECK(refused(cv::Mat(3, 3, CV_8U), {}));
   CHECK(refused(K, cv::Mat::zeros(1, 8, CV_64F)));

@@ -182,4 +182,7 @@ TEST_CASE("Options outside their range are named", "[optimization][least_squares
     CHECK(bad(&Options::min_relative_decrease, value) == "min_relative_decrease");
     CHECK(bad(&Options::min_absolute_decrease, value) == "min_absolute_decrease");
   }
+  Options crossed;
+  crossed.min_damping = 2 * crossed.max_damping;
+  CHECK(invalid_field(crossed).string() == "max_damping");
 }

@@ -84,6 +84,7 @@ TEMPLATE_TEST_CASE("The batch equals the scalar function for every length, in pl
 TEST_CASE("Equal distances make a step with one half at the threshold", "[probability]") {
   const cfp::ConstraintModel<double> model = fit(std::vector<double>(20, 0.7));
   CHECK(model.status == cfp::Status::degenerate);
+  CHECK(model.slope_per_px == 0);
   CHECK(cfp::static_probability(model, 0.69) == 1);
   CHECK(cfp::static_probability(model, 0.7) == 0.5);
   CHECK(cfp::static_probability(model, 0.71) == 0);

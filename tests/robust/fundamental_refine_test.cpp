@@ -140,3 +140,29 @@ TEST_CASE("The homography's gradient is that of central differences, but for the
   }
   CHECK(system.H.isApprox(system.H.transpose()));
 }
+
+TEST_CASE("A pair far off a homography, or one it maps to infinity, does not move it", "[robust]") {
+  cfp::Random random(45, "homography outliers");
+  const Pairs pairs(random, cfp_test::SceneShape::plane);
+  const auto near = cfp::detail::exact_columns(pairs.arrays);
+  const double scale = 4 * pairs.arrays.factor * pairs.arrays.factor;
+  Matrix3<double> H = Matrix3<double>::Identity();
+  cfp::detail::refine_homography(near, 1.0, 20, H);
+  H.row(2) = Eigen::RowVector3d(0.25, 0, 1);
+  for (const double x : {0.5, -4.0}) {  // the second is mapped to infinity
+    std::vector<double> rows[5];
+    auto more = near;
+    for (std::size_t r = 0; r < 5; ++r) {
+      rows[r].assign(near.row[r], near.row[r] + near.size);
+      rows[r].push_back(r == 0 ? x : r == 4 ? 1.0 : 100.0);
+      more.row[r] = rows[r].data();
+    }
+    more.size = near.size + 1;
+    const cfp::detail::TransferModel<double> few{near, scale}, all{more, scale};
+    cfp::detail::NormalEquations<8> without, with;
+    const double cost = few.linearize(H, without);
+    CHECK_THAT(all.linearize(H, with), WithinAbs(cost + 0.9, 1e-9 * cost));
+    CHECK(with.g == without.g);
+    CHECK(with.H == without.H);
+  }
+}

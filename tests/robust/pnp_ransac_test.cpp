@@ -184,6 +184,19 @@ TEST_CASE("A rigid motion of the world moves the pose with it", "[robust]") {
   CHECK(cfp_test::pose_distance<double>(result.T_cam_world * T, expected.T_cam_world)[0] < 1e-3);
 }
 
+TEST_CASE("A search that ends before the confidence is reached says so", "[robust]") {
+  cfp::Random random(61, "pnp");
+  const auto scene = make_absolute_pose_scene<double>(random, camera<double>, scene_options(300, 0.5));
+  PnpRansacWorkspace workspace;
+  PnpRansacOptions options;
+  for (const std::size_t limit : {20U, 1000U}) {  // half of the matches are right: 35 samples for 99 %
+    options.max_iterations = limit;
+    const auto result = pnp_ransac(scene.world, scene.pixels, {}, camera<double>, options, workspace);
+    CHECK(result.found());
+    CHECK(result.status == (limit == 20 ? RansacStatus::iteration_limit : RansacStatus::ok));
+  }
+}
+
 TEST_CASE("Same matches and seed give the same bits", "[robust]") {
   cfp::Random random(57, "pnp");
   PnpRansacWorkspace used;
