@@ -90,8 +90,9 @@ struct BoxFilter {
 namespace detail {
 inline namespace CFP_ISA {
 
-inline constexpr double box_farthest_px = 1e7;  // centres and velocities are kept below, far outside any image
-inline constexpr double box_largest_px = 1e5;   // sizes lie between 1 px and this
+// Centres and velocities are kept below: far outside any image, and a box of 1 px there has a width in float.
+inline constexpr double box_farthest_px = 1e6;
+inline constexpr double box_largest_px = 1e5;                  // sizes lie between 1 px and this
 inline constexpr double box_largest_log = 11.512925464970229;  // log of the line above
 
 // Keeps a value in its range, where it stops at the border, and its rate and covariance finite.
@@ -139,7 +140,7 @@ template <typename Scalar>
 }
 
 /// Moves the filter dt seconds ahead (finite, >= 0). Sizes stay within [1, 1e5] px, where their rate becomes 0 (so they
-/// are positive after any number of predictions), and the centre within +-1e7 px: nothing overflows. Equal to the EKF
+/// are positive after any number of predictions), and the centre within +-1e6 px: nothing overflows. Equal to the EKF
 /// up to there.
 template <typename Scalar>
 void predict_box(BoxFilter<Scalar>& filter, non_deduced<Scalar> dt_s, const BoxMotionOptions& options) noexcept {
