@@ -42,6 +42,7 @@ std::vector<Schedule> schedules() {
   const cfp::PoseRound last{LossType::geman_mcclure, 1.5}, first{LossType::geman_mcclure, 30};
   list.push_back({"Huber 1, GM 1.5", with_rounds({{LossType::huber, 1}, last})});
   list.push_back({"Cauchy 4, GM 1.5", with_rounds({{LossType::cauchy, 4}, last})});
+  list.push_back({"Cauchy 16, GM 1.5", with_rounds({{LossType::cauchy, 16}, last})});
   list.push_back({"GM 5, GM 1.5", with_rounds({{LossType::geman_mcclure, 5}, last})});
   list.push_back({"GM 10, GM 1.5", with_rounds({{LossType::geman_mcclure, 10}, last})});
   list.push_back({"GM 20, GM 1.5", with_rounds({{LossType::geman_mcclure, 20}, last})});
@@ -81,7 +82,7 @@ int main(int argc, char** argv) {
                         {1000, 0.1, 0, 0.02, 1}, {1000, 0.3, 0, 0.02, 1}, {300, 0.1, 0.2, 0.02, 1},
                         {300, 0.3, 0, 0.2, 8},   {300, 0, 0, 0.8, 30},    {300, 0.1, 0, 0.8, 30},
                         {300, 0.3, 0, 0.8, 30},  {30, 0.3, 0, 0.8, 30},   {300, 0.7, 0, 0.2, 8},
-                        {300, 0.3, 0, 1.2, 50}};
+                        {300, 0.3, 0, 1.2, 50},  {100, 0.3, 0.3, 0.2, 8}, {300, 0.1, 0.4, 0.02, 1}};
   std::printf("error relative to the floor (median) / data passes (median) / failures\n%-34s", "");
   for (const Case& c : cases)
     std::printf(" N%d o%.0f m%.0f %gcm,%gdeg |", c.points, 100 * c.outliers, 100 * c.moving, 100 * c.start_m,

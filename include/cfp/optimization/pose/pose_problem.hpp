@@ -55,7 +55,9 @@ struct PoseOptions {
   int min_observations = 3;    ///< fewer usable observations, or inliers, leave the pose untouched, >= 3
   /// The rounds, in order. Default: Geman-McClure, so wide that most starts reach the minimum, until pixels move by
   /// half a sigma, then narrow to 0.1 sigma of the pose. Its error is 2 % to 4 % above least squares on the true
-  /// inliers where a hard cut's is 9 % to 11 %, and stopping later gains nothing (cfp_pose_loss_study).
+  /// inliers where a hard cut's is 9 % to 11 %, and stopping later gains nothing (cfp_pose_loss_study). From starts 30
+  /// degrees off it fails in 1 % to 5 %, 50 degrees off in 26 %; {cauchy, 16} first: 0.1 % and 10 %, in 1.1 to 1.4
+  /// times the time.
   std::array<PoseRound, max_rounds> rounds = {PoseRound{LossType::geman_mcclure, 30},
                                               PoseRound{LossType::geman_mcclure, 1.5}};
   std::size_t round_count = 2;     ///< in [1, max_rounds]
