@@ -1,8 +1,12 @@
 // Poses, fundamental matrices, homographies and maps from hostile numbers: what is called solved is finite.
+#include <algorithm>
 #include <array>
+#include <cmath>
 
+#include "cfp/geometry/fundamental.hpp"
 #include "cfp/geometry/p3p.hpp"
 #include "cfp/geometry/radial_tangential_camera.hpp"
+#include "cfp/math/matrix3.hpp"
 #include "cfp/optimization/bundle/bundle_adjustment.hpp"
 #include "cfp/optimization/pose/pose_refinement.hpp"
 #include "cfp/robust/fundamental_ransac.hpp"
@@ -17,6 +21,17 @@ template <typename Scalar>
 [[nodiscard]] bool is_pose(const cfp::SE3<Scalar>& T) {
   return T.rotation.allFinite() && T.translation.allFinite() &&
          (T.rotation * T.rotation.transpose() - cfp::Matrix3<Scalar>::Identity()).norm() < Scalar(1e-3);
+}
+
+/// A fundamental matrix of rank two, up to the rounding of its scalar and of pixels up to some thousands.
+template <typename Scalar>
+[[nodiscard]] bool is_fundamental(const cfp::Matrix3<Scalar>& F) {
+  const cfp::Matrix3<double> D = F.template cast<double>();
+  return D.allFinite() && D.norm() > 0.5 && std::abs(cfp::determinant(D)) < 1e-6;
+}
+
+[[nodiscard]] std::size_t count(const std::vector<char>& mask) {
+  return static_cast<std::size_t>(std::count(mask.begin(), mask.end(), char(1)));
 }
 
 /// Points before a camera and their pixels, some of them anything.
@@ -70,9 +85,16 @@ void pose(FuzzInput& in) {
   ransac.max_iterations = 50;
   cfp_fuzz::disturb(in, ransac, {&ransac.threshold_px, &ransac.confidence});
   cfp::PnpRansacWorkspace pnp;
-  const auto found = cfp::pnp_ransac(cfp::PointSpan<Scalar, 3>(seen.points), cfp::PointSpan<Scalar, 2>(seen.pixels),
-                                     cfp::span<const Scalar>(seen.weights), camera, ransac, pnp);
-  if (found.found()) CFP_PROMISE(is_pose(found.T_cam_world));
+  std::vector<char> mask(seen.points.size());
+  const auto solve = [&] {
+    return cfp::pnp_ransac(cfp::PointSpan<Scalar, 3>(seen.points), cfp::PointSpan<Scalar, 2>(seen.pixels),
+                           cfp::span<const Scalar>(seen.weights), camera, ransac, pnp, mask);
+  };
+  const auto found = solve();
+  CFP_PROMISE(is_pose(found.T_cam_world) && count(mask) == found.inliers);
+  CFP_PROMISE(!found.found() || found.inliers >= ransac.min_inliers);
+  const auto again = solve();
+  CFP_PROMISE(again.T_cam_world.rotation == found.T_cam_world.rotation && again.inliers == found.inliers);
 }
 
 template <typename Scalar>
@@ -87,7 +109,7 @@ void minimal(FuzzInput& in) {
   CFP_PROMISE(solved.count >= 0 && solved.count <= 4 && (solved.count > 0) == (solved.status == cfp::Status::ok));
   for (int k = 0; k < solved.count; ++k) {
     const auto& T = solved.T_cam_world[static_cast<std::size_t>(k)];
-    CFP_PROMISE(T.rotation.allFinite() && T.translation.allFinite());
+    CFP_PROMISE(is_pose(T));
   }
   cfp::RadialTangentialCamera<Scalar> camera;
   camera.fx = camera.fy = 500;
@@ -98,7 +120,11 @@ void minimal(FuzzInput& in) {
   const cfp::Vector2<Scalar> pixel(FuzzInput::to<Scalar>(in.number(-500, 500)),
                                    FuzzInput::to<Scalar>(in.number(-500, 500)));
   cfp::Vector2<Scalar> again;
-  if (camera.unproject(pixel, ray)) CFP_PROMISE(ray.allFinite());
+  if (camera.unproject(pixel, ray)) {
+    CFP_PROMISE(ray.allFinite() && ray.z() == Scalar(1));
+    CFP_PROMISE(camera.project(ray, again));
+    CFP_PROMISE((again - pixel).norm() <= Scalar(0.01) + Scalar(1e-4) * pixel.norm());
+  }
   if (camera.project(problem.world[0], again)) CFP_PROMISE(again.allFinite());
 }
 
@@ -123,8 +149,20 @@ void two_views(FuzzInput& in) {
   std::vector<char> inliers(n);
   const cfp::PinholeCamera<float> camera{525, 525, 320, 240};
   const auto result = cfp::fundamental_ransac(pairs, camera, options, workspace, inliers);
-  if (result.found()) CFP_PROMISE(result.F.allFinite() && result.F.norm() > 0);
-  CFP_PROMISE(result.homography.allFinite());
+  CFP_PROMISE(result.found() ? is_fundamental(result.F) : result.F.isZero(0));
+  CFP_PROMISE(result.homography.allFinite() && count(inliers) == result.inliers);
+  const auto again = cfp::fundamental_ransac(pairs, camera, options, workspace, inliers);
+  CFP_PROMISE(again.F == result.F && again.homography == result.homography && again.status == result.status);
+
+  cfp::Matrix3<float> F;
+  const cfp::Status linear = cfp::fundamental_8point(pairs, F);
+  CFP_PROMISE(linear == cfp::Status::ok ? is_fundamental(F) : F.isZero(0));
+  if (n < 7) return;
+  previous.resize(7), current.resize(7);
+  const cfp::PointPairs<float> seven{previous, current};
+  std::array<cfp::Matrix3<float>, 3> solutions;
+  const int solved = cfp::fundamental_7point(seven, solutions);
+  for (int k = 0; k < solved; ++k) CFP_PROMISE(is_fundamental(solutions[static_cast<std::size_t>(k)]));
 }
 
 void bundle(FuzzInput& in) {

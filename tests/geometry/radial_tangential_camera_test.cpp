@@ -126,6 +126,15 @@ TEMPLATE_TEST_CASE("Coefficients that are not finite give no ray, at the princip
       }
     }
   }
+  // Where the fold's polynomial overflows nothing is projected, so there is no ray.
+  for (T cfp::RadialTangentialCamera<T>::*field :
+       {&cfp::RadialTangentialCamera<T>::k1, &cfp::RadialTangentialCamera<T>::k2,
+        &cfp::RadialTangentialCamera<T>::k3}) {
+    cfp::RadialTangentialCamera<T> camera = good;
+    camera.*field = (std::numeric_limits<T>::max)();
+    cfp::Vector3<T> none;
+    CHECK_FALSE(camera.unproject({T(320), T(240)}, none));
+  }
   cfp::Vector3<T> ray;
   CHECK(good.unproject({T(320), T(240)}, ray));
 }

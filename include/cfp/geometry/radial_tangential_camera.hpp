@@ -68,8 +68,9 @@ template <typename Scalar>
   const Scalar target_x = (pixel.x() - camera.cx) / camera.fx;
   const Scalar target_y = (pixel.y() - camera.cy) / camera.fy;
   Scalar error_sq = target_x * target_x + target_y * target_y;
-  if (!is_finite(error_sq) || !is_finite(Scalar(camera.k1 + camera.k2 + camera.k3 + camera.p1 + camera.p2)))
-    return false;
+  // With the factors that the fold's polynomial gives the coefficients: what is no ray there is none here.
+  const Scalar radial = Scalar(3) * camera.k1 + Scalar(5) * camera.k2 + Scalar(7) * camera.k3;
+  if (!is_finite(error_sq) || !is_finite(Scalar(radial + camera.p1 + camera.p2))) return false;
   const Scalar unit_roundoff(std::numeric_limits<Scalar>::epsilon());
   const Scalar enough_sq = Scalar(256) * unit_roundoff * unit_roundoff * (Scalar(1) + error_sq);
   // On the axis the distortion is 0 and its Jacobian the identity: the first step is the target itself.
