@@ -1,6 +1,6 @@
 /// @file version.hpp
-/// The version of cfp and the language it needs. Included by every header, so that a project with an older language
-/// setting reads one sentence instead of a page of template errors.
+/// The version of cfp, the language it needs, and what every header needs of it. Included by every header, so that a
+/// project with an older language setting reads one sentence instead of a page of template errors.
 #pragma once
 
 #define CFP_VERSION_MAJOR 0
@@ -18,6 +18,10 @@
 #error \
     "cfp needs C++17: compile with -std=c++17 or newer (a -std=c++11 or -std=c++14 in CMAKE_CXX_FLAGS wins over CMake's own setting)."
 #endif
+
+// The words of every header: std::size_t and the integers of fixed width.
+#include <cstddef>
+#include <cstdint>
 
 // Functions stand in the inline namespace CFP_ISA, types do not: units compiled with different vector flags share
 // types, and never a function, whose instructions the other unit's machine might not have.

@@ -5,9 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <vector>
 
 #include "cfp/clustering/dbscan.hpp"
 #include "cfp/core/numeric.hpp"

@@ -3,8 +3,6 @@
 /// these.
 #pragma once
 
-#include <cstdint>
-
 #include "cfp/version.hpp"
 
 namespace cfp {

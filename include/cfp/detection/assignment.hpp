@@ -8,7 +8,6 @@
 /// the same objective means: as many pairs as possible, and among those matchings the cheapest.
 #pragma once
 
-#include <cstddef>
 #include <type_traits>
 #include <utility>
 #include <vector>

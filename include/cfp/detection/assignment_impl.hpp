@@ -3,12 +3,7 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
-#include <cstddef>
 #include <limits>
-#include <vector>
-
-#include <Eigen/Core>
 
 #include "cfp/detection/assignment.hpp"
 

@@ -3,7 +3,6 @@
 /// algorithm").
 #pragma once
 
-#include <cstddef>
 #include <limits>
 #include <vector>
 

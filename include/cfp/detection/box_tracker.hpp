@@ -7,8 +7,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
-#include <cstdint>
 #include <tuple>
 #include <vector>
 

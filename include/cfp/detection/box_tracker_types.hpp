@@ -2,9 +2,6 @@
 /// What goes into the box tracker and what comes out (paper IV-A).
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
-
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"

@@ -6,10 +6,7 @@
 /// allocate nothing after the first call of a size.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <vector>
 
 #include "cfp/core/options.hpp"

@@ -5,8 +5,6 @@
 
 #include <algorithm>
 #include <bitset>
-#include <cstddef>
-#include <cstdint>
 #include <cstring>
 #include <vector>
 

@@ -3,8 +3,6 @@
 /// objects, or with others, and nothing else in a system would notice.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <optional>
 #include <vector>
 

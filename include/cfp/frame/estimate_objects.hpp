@@ -3,7 +3,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
 #include <utility>
 
 #include "cfp/frame/flow_model.hpp"

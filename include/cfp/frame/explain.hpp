@@ -3,8 +3,6 @@
 /// text.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <string>
 
 #include "cfp/frame/frame_options.hpp"

@@ -3,8 +3,6 @@
 /// own arrays; everything but the keypoints may be missing.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <optional>
 
 #include "cfp/core/span.hpp"

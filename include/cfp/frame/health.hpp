@@ -3,9 +3,6 @@
 /// that needs none of them must not get worse.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
-
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"

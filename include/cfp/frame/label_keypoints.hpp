@@ -4,8 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
-#include <cstdint>
 
 #include "cfp/clustering/depth_foreground.hpp"
 #include "cfp/frame/estimate_objects.hpp"

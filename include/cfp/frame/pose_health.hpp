@@ -6,12 +6,8 @@
 
 #include <array>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <limits>
 #include <optional>
-
-#include <Eigen/Core>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"

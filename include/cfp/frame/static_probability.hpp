@@ -15,8 +15,6 @@
 /// `extern template class cfp::StaticProbability<Camera>;` in its own header, `template class` without extern there.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <vector>
 
 #include "cfp/core/span.hpp"

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
 
 #include "cfp/detection/box_tracker.hpp"
 #include "cfp/frame/frame_options.hpp"

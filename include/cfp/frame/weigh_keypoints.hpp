@@ -4,7 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
 
 #include "cfp/core/span.hpp"
 #include "cfp/frame/frame_options.hpp"

@@ -5,12 +5,9 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <limits>
 #include <type_traits>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"

@@ -8,9 +8,6 @@
 #pragma once
 
 #include <cmath>
-#include <cstddef>
-
-#include <Eigen/Core>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"

@@ -8,10 +8,7 @@
 
 #include <array>
 #include <cmath>
-#include <cstddef>
 #include <utility>
-
-#include <Eigen/Core>
 
 #include "cfp/core/status.hpp"
 #include "cfp/core/types.hpp"

@@ -5,7 +5,6 @@
 #pragma once
 
 #include <cmath>
-#include <cstddef>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"

@@ -5,11 +5,8 @@
 /// (polish of the depths). Departure: unknowns in which a small triangle far away is as regular as any other.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
-#include <utility>
 
 #include "cfp/core/status.hpp"
 #include "cfp/core/types.hpp"

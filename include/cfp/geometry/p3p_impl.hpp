@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Core>
-
 #include "cfp/core/types.hpp"
 #include "cfp/math/cubic.hpp"
 #include "cfp/math/matrix3.hpp"

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Core>
-
 #include "cfp/core/numeric.hpp"
 #include "cfp/geometry/camera.hpp"
 

@@ -7,10 +7,7 @@
 #pragma once
 
 #include <cmath>
-#include <cstddef>
 #include <limits>
-
-#include <Eigen/Core>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"

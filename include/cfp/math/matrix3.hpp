@@ -6,8 +6,6 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Core>
-
 #include "cfp/core/types.hpp"
 
 namespace cfp {

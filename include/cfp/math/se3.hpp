@@ -4,8 +4,6 @@
 /// point p = T * p_b moves by d p / d xi = [I, -hat(p)].
 #pragma once
 
-#include <Eigen/Core>
-
 #include "cfp/math/matrix3.hpp"
 #include "cfp/math/so3.hpp"
 

@@ -6,8 +6,6 @@
 
 #include <cmath>
 
-#include <Eigen/Core>
-
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/types.hpp"
 

@@ -5,7 +5,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"

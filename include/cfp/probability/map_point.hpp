@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"

@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"

@@ -3,7 +3,6 @@
 /// together, and the special rules around them (paper section IV-D).
 #pragma once
 
-#include <cstdint>
 #include <limits>
 
 #include "cfp/core/numeric.hpp"

@@ -3,10 +3,7 @@
 #pragma once
 
 #include <cmath>
-#include <cstddef>
 #include <limits>
-
-#include <Eigen/Core>
 
 #include "cfp/math/matrix3.hpp"
 #include "cfp/math/so3.hpp"

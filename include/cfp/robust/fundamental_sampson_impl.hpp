@@ -3,10 +3,7 @@
 /// equations. Not an interface.
 #pragma once
 
-#include <cstddef>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include "cfp/core/types.hpp"
 #include "cfp/math/matrix3.hpp"

@@ -6,13 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <limits>
 #include <utility>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include "cfp/core/random.hpp"
 #include "cfp/geometry/fundamental.hpp"

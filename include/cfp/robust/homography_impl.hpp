@@ -5,11 +5,7 @@
 
 #include <array>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <limits>
-
-#include <Eigen/Core>
 
 #include "cfp/math/matrix3.hpp"
 #include "cfp/math/so3.hpp"

@@ -5,11 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <limits>
-
-#include <Eigen/Core>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"

@@ -7,11 +7,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <limits>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include "cfp/core/span.hpp"
 

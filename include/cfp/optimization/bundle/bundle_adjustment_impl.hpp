@@ -4,12 +4,8 @@
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
 #include <limits>
 #include <utility>
-#include <vector>
-
-#include <Eigen/Core>
 
 #include "cfp/math/so3.hpp"
 #include "cfp/optimization/bundle/bundle_elimination_impl.hpp"

@@ -10,10 +10,7 @@
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include "cfp/core/types.hpp"
 #include "cfp/optimization/bundle/bundle_linearization_impl.hpp"

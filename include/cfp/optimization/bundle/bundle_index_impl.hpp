@@ -7,7 +7,6 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <vector>
 
 #include "cfp/optimization/bundle/block_cholesky_impl.hpp"

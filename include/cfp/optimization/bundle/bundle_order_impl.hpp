@@ -3,9 +3,7 @@
 /// for the elimination. Linear in the observations.
 #pragma once
 
-#include <algorithm>
 #include <array>
-#include <cstddef>
 #include <vector>
 
 #include "cfp/optimization/bundle/bundle_index_impl.hpp"

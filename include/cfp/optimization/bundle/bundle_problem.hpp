@@ -3,8 +3,6 @@
 /// points are in the world, metres; pixels.
 #pragma once
 
-#include <cstddef>
-
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/geometry/camera.hpp"

@@ -2,12 +2,8 @@
 /// The usable observations of one pose as one array per quantity, for packets (internal to pose_refinement.hpp).
 #pragma once
 
-#include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <type_traits>
-#include <vector>
 
 #include "cfp/geometry/camera.hpp"
 #include "cfp/optimization/pose/pose_problem.hpp"

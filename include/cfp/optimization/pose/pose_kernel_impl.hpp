@@ -14,10 +14,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <limits>
-
-#include <Eigen/Core>
 
 #include "cfp/geometry/camera.hpp"
 #include "cfp/math/normal_equations.hpp"

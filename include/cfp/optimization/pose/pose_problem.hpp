@@ -3,11 +3,7 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
-#include <cstdint>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"

@@ -4,9 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <limits>
-#include <type_traits>
 
 #include "cfp/optimization/least_squares.hpp"
 #include "cfp/optimization/pose/pose_columns_impl.hpp"
