@@ -61,8 +61,6 @@ TEMPLATE_TEST_CASE("One pair's score is the chosen function of the chi-squared d
     options = {};
     options.score = ObjectScore::density;
     CHECK_THAT(cfp::object_score(x, options), WithinAbs(0.5 * std::exp(-d * d / 2), tolerance));
-    options.score = ObjectScore::normalized_density;
-    CHECK_THAT(cfp::object_score(x, options), WithinAbs(std::exp(-d * d / 2), tolerance));
     options = {};
     options.degrees_of_freedom = 1;
     CHECK_THAT(cfp::object_score(x, options), WithinAbs(std::erfc(d / std::sqrt(2.0)), tolerance));
@@ -78,9 +76,8 @@ TEST_CASE("As printed, no object can pass the paper's own threshold", "[probabil
 TEMPLATE_TEST_CASE("Selecting three order statistics equals scoring and sorting all pairs", "[probability]", float,
                    double) {
   cfp::Random random(7, "object selection");
-  for (const ObjectScore score : {ObjectScore::survival, ObjectScore::density, ObjectScore::normalized_density}) {
+  for (const ObjectScore score : {ObjectScore::survival, ObjectScore::density}) {
     for (const double k : {1.0, 2.0, 3.0, 5.0}) {
-      if (score == ObjectScore::normalized_density && k < 2) continue;
       for (const std::size_t n : {1U, 2U, 3U, 9U, 10U, 11U, 30U, 99U, 500U}) {
         ObjectProbabilityOptions options;
         options.score = score;
@@ -142,7 +139,7 @@ TEMPLATE_TEST_CASE("Hostile distances give a probability in range", "[probabilit
   const std::vector<TestType> hostile = {TestType(0),        Limits::denorm_min(), Limits::min(),       Limits::max(),
                                          Limits::infinity(), -Limits::infinity(),  Limits::quiet_NaN(), TestType(1e30),
                                          TestType(-1),       TestType(1)};
-  for (const ObjectScore score : {ObjectScore::survival, ObjectScore::density, ObjectScore::normalized_density}) {
+  for (const ObjectScore score : {ObjectScore::survival, ObjectScore::density}) {
     for (const double k : {0.5, 1.0, 2.0, 7.5}) {
       ObjectProbabilityOptions options;
       options.score = score;
@@ -179,8 +176,7 @@ TEST_CASE("Object options outside their range are named", "[probability]") {
   options.positions[1] = std::numeric_limits<double>::quiet_NaN();
   CHECK(cfp::invalid_field(options).string() == "positions");
   options = {};
-  options.score = ObjectScore::normalized_density;
-  options.degrees_of_freedom = 1;
+  options.degrees_of_freedom = 0;
   CHECK(cfp::invalid_field(options).string() == "degrees_of_freedom");
   options = {};
   options.min_pairs = 0;

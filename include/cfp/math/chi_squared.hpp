@@ -30,18 +30,9 @@ using at_least_double = std::conditional_t<std::is_same_v<Scalar, float>, double
 template <typename T>
 [[nodiscard]] T deviance(double n, const T& y) noexcept {
   using std::log;
-  const T v = (T(n) - y) / (T(n) + y);
-  if (!(v > T(-0.4) && v < T(0.4))) return T(n) * log(T(n) / y) + y - T(n);
-  const T v2 = v * v;
-  T power = T(2 * n) * v;
-  T sum = (T(n) - y) * v;
-  for (int j = 3; j < 60; j += 2) {
-    power *= v2;
-    const T next = sum + power / T(j);
-    if (!(next != sum)) break;
-    sum = next;
-  }
-  return sum;
+  using std::log1p;
+  const T excess = (y - T(n)) / T(n);
+  return excess > T(-0.5) && excess < T(1) ? T(n) * (excess - log1p(excess)) : T(n) * log(T(n) / y) + y - T(n);
 }
 
 /// log Γ(n+1) - (n + 1/2) log n + n - log(2 pi)/2 for n >= 15.
@@ -161,13 +152,6 @@ template <typename Scalar>
   if (k == 1) return erfc(sqrt(Scalar(0.5) * x));
   using Wide = detail::at_least_double<Scalar>;
   return clamp_probability(Scalar(detail::gamma_upper_tail(Wide(0.5) * Wide(x), 0.5 * k)));
-}
-
-/// The density at its mode x = k - 2, for k >= 2: 1/2 for k = 2. +inf for k < 2, where the density has no maximum; so a
-/// score "density over its mode" is possible for k >= 2 only. 0 for a k out of range.
-[[nodiscard]] inline double chi_squared_mode_density(double k) noexcept {
-  if (!detail::is_degrees_of_freedom(k)) return 0.0;
-  return k < 2 ? std::numeric_limits<double>::infinity() : chi_squared_density(k - 2, k);
 }
 
 }  // namespace CFP_ISA

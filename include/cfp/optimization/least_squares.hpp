@@ -86,9 +86,11 @@ inline namespace CFP_ISA {
 ///
 /// A step is judged by its gain = (cost before - cost after) / (predicted decrease); NaN is refused. Accepted (gain
 /// above 1e-3): the damping shrinks by max(1/3, 1 - (2 gain - 1)^3), and does not grow for gain >= 1/2; below
-/// rejected_damping it falls to min_damping at once. Refused: it grows 2, 4, 8, … times.
+/// rejected_damping it falls to min_damping at once. Refused: it grows 2, 4, 8, … times. A step of which even twice the
+/// promise leaves the cost above `bound` counts as one without promise, which ends the loop.
 template <typename Problem>
-LeastSquaresResult minimize_least_squares(Problem& problem, const LevenbergMarquardtOptions& options) {
+LeastSquaresResult minimize_least_squares(Problem& problem, const LevenbergMarquardtOptions& options,
+                                          double bound = std::numeric_limits<double>::infinity()) {
   LeastSquaresResult result;
   double cost = problem.linearize();
   result.status = SolverStatus::not_finite;
@@ -102,7 +104,8 @@ LeastSquaresResult minimize_least_squares(Problem& problem, const LevenbergMarqu
   double damping = clamped(options.initial_damping), growth = 2;
   while (result.iterations < options.max_iterations) {
     ++result.iterations;
-    const double promised = problem.propose(damping);
+    double promised = problem.propose(damping);
+    if (cost - 2 * promised > bound) promised = 0;
     if (is_finite(promised)) {
       // A small promise says something about the minimum only where the damping is small, too.
       const bool damped = damping > (std::max)(options.initial_damping, options.rejected_damping);

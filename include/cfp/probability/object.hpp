@@ -21,9 +21,8 @@ namespace cfp {
 /// at two degrees of freedom, so the paper's threshold of 0.9 could never be passed and its low-dynamic branch would be
 /// dead; the related open code uses twice the density, which for two degrees of freedom is the survival function.
 enum class ObjectScore : std::uint8_t {
-  survival,           ///< Q(x; k), the upper tail: the default
-  density,            ///< the density, as printed in the paper, clamped to [0, 1]
-  normalized_density  ///< the density divided by its largest value; k >= 2 only
+  survival,  ///< Q(x; k), the upper tail: the default
+  density    ///< the density, as printed in the paper, clamped to [0, 1]
 };
 
 struct ObjectProbabilityOptions {
@@ -51,7 +50,6 @@ inline namespace CFP_ISA {
 
 [[nodiscard]] inline OptionPath invalid_field(const ObjectProbabilityOptions& o) noexcept {
   if (!detail::positive(o.degrees_of_freedom)) return "degrees_of_freedom";
-  if (o.score == ObjectScore::normalized_density && o.degrees_of_freedom < 2) return "degrees_of_freedom";
   if (!detail::positive(o.sigma_px)) return "sigma_px";
   if (!detail::non_negative(o.noise_factor)) return "noise_factor";
   if (!(o.positions[0] > 0 && o.positions[0] <= o.positions[1] && o.positions[1] <= o.positions[2] &&
@@ -90,19 +88,8 @@ template <typename Scalar>
   if (!is_finite(epipolar_distance_px)) return Scalar(0);
   const Scalar r = epipolar_distance_px / Scalar(options.sigma_px);
   const double k = options.degrees_of_freedom;
-  switch (options.score) {
-    case ObjectScore::survival:
-      return clamp_probability(chi_squared_survival(r * r, k));
-    case ObjectScore::density:
-      return clamp_probability(chi_squared_density(r * r, k));
-    case ObjectScore::normalized_density: {
-      // At k = 2 the mode is at 0, where the printed density is 0 by definition: a distance of 0 is the limit from
-      // above.
-      const Scalar x = (std::max)(r * r, (std::numeric_limits<Scalar>::min)());
-      return clamp_probability(chi_squared_density(x, k) / Scalar(chi_squared_mode_density(k)));
-    }
-  }
-  return Scalar(0);
+  return clamp_probability(options.score == ObjectScore::survival ? chi_squared_survival(r * r, k)
+                                                                  : chi_squared_density(r * r, k));
 }
 
 /// O = mean of the ascending scores at the 1-based positions ceil(q M), q in `options.positions`, at least 1 (paper

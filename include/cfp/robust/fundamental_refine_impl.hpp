@@ -11,7 +11,6 @@
 #include "cfp/math/matrix3.hpp"
 #include "cfp/math/normal_equations.hpp"
 #include "cfp/math/so3.hpp"
-#include "cfp/optimization/least_squares.hpp"
 #include "cfp/robust/fundamental_pairs_impl.hpp"
 #include "cfp/simd/packet.hpp"
 
@@ -205,36 +204,8 @@ struct SampsonModel {
 template <typename T>
 double refine_fundamental(const PairColumns<T>& pairs, double scale, int max_steps, double tolerance,
                           FactoredF<double>& F, double bound = std::numeric_limits<double>::infinity()) noexcept {
-  using Model = SampsonModel<T>;
-  using Base = DenseLeastSquares<7, FactoredF<double>, Model>;
-  struct Problem : Base {
-    double cost = 0, trial_cost = 0, bound;
-
-    Problem(Model& model, const FactoredF<double>& start, double most) : Base(model, start), bound(most) {}
-    double linearize() { return cost = Base::linearize(); }
-    double propose(double damping) {
-      const double promised = Base::propose(damping);
-      return cost - 2 * promised > bound ? 0 : promised;
-    }
-    double linearize_trial() { return trial_cost = Base::linearize_trial(); }
-    void accept() {
-      Base::accept();
-      cost = trial_cost;
-    }
-  };
-  LevenbergMarquardtOptions options;
-  options.max_iterations = max_steps;
-  options.initial_damping = 1e-6;
-  options.min_damping = 1e-9;
-  options.rejected_damping = 1e-4;
-  options.max_damping = 1e6;
-  options.min_relative_decrease = tolerance;
-  options.min_absolute_decrease = 0;
-  Model model{pairs, scale};
-  Problem problem(model, F, bound);
-  const LeastSquaresResult result = minimize_least_squares(problem, options);
-  F = problem.state();
-  return result.status == SolverStatus::not_finite ? std::numeric_limits<double>::infinity() : result.final_cost;
+  SampsonModel<T> model{pairs, scale};
+  return refine<7>(model, max_steps, tolerance, F, bound);
 }
 
 }  // namespace CFP_ISA

@@ -103,7 +103,8 @@ void refine_homography(const PairColumns<T>& pairs, double scale, int max_steps,
   const Matrix3<double> start = H / H(2, 2);
   if (!start.allFinite()) return;
   TransferModel<T> model{pairs, scale};
-  H = refined<8>(model, start, max_steps, 1e-3);
+  H = start;
+  refine<8>(model, max_steps, 1e-3, H);
 }
 
 }  // namespace CFP_ISA

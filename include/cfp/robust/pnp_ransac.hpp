@@ -162,7 +162,7 @@ struct PnpProblem {
 
   void refine(T scale, int max_steps, Model& pose) const {
     ReprojectionModel<T> model{in, scale};
-    pose = refined<6>(model, pose, max_steps, 1e-4);
+    cfp::detail::refine<6>(model, max_steps, 1e-4, pose);
   }
 
   // A wide loss: four squared thresholds.

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
 #include <vector>
 
 #include "cfp/core/span.hpp"
@@ -54,17 +55,23 @@ void finish(RansacColumns<Rows>& columns) noexcept {
                  [](double x) { return static_cast<float>(x); });
 }
 
-// The state after at most max_steps that each lower the model's cost by more than `tolerance` of it.
+// Takes at most max_steps that each lower the model's cost by more than `tolerance` of it, and may bring it below
+// `bound`. Returns the cost, infinite when it is not finite at the start.
 template <int N, typename Model, typename State>
-[[nodiscard]] State refined(Model& model, const State& start, int max_steps, double tolerance) {
+double refine(Model& model, int max_steps, double tolerance, State& state,
+              double bound = std::numeric_limits<double>::infinity()) {
   LevenbergMarquardtOptions options;
   options.max_iterations = max_steps;
-  options.initial_damping = options.min_damping = 1e-9;
+  options.initial_damping = 1e-6;
+  options.min_damping = 1e-9;
+  options.rejected_damping = 1e-4;
+  options.max_damping = 1e6;
   options.min_relative_decrease = tolerance;
   options.min_absolute_decrease = 0;
-  DenseLeastSquares<N, State, Model> problem(model, start);
-  (void)minimize_least_squares(problem, options);
-  return problem.state();
+  DenseLeastSquares<N, State, Model> problem(model, state);
+  const LeastSquaresResult result = minimize_least_squares(problem, options, bound);
+  state = problem.state();
+  return result.status == SolverStatus::not_finite ? std::numeric_limits<double>::infinity() : result.final_cost;
 }
 
 // Fills the counts, the share and the mask (empty, or one per datum of the caller, all 0). Too few inliers are no
