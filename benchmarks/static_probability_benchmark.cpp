@@ -86,8 +86,10 @@ void stage_two(const Matches<Scalar>& in, const cfp::SE3<Scalar>& T, const cfp::
   cfp::epipolar_distances(F, in.prev, in.cur, b.epipolar);
   const auto by_projection = cfp::fit_constraint(b.projection, options, b.scratch);
   const auto by_line = cfp::fit_constraint(b.epipolar, options, b.scratch);
-  cfp::static_probabilities(by_projection, b.projection, b.k_projection);
-  cfp::static_probabilities(by_line, b.epipolar, b.k_epipolar);
+  for (std::size_t i = 0; i < b.k.size(); ++i) {
+    b.k_projection[i] = cfp::static_probability(by_projection, b.projection[i]);
+    b.k_epipolar[i] = cfp::static_probability(by_line, b.epipolar[i]);
+  }
   if (!combined) return;
   const Scalar cs = cfp::statistical_confidence(pose_inliers, Scalar(20));
   const Scalar ct = cs * by_projection.calculation_confidence, cf = cs * by_line.calculation_confidence;

@@ -69,7 +69,6 @@ static void instantiate_geometry() noexcept {
   use(&cfp::iou<Scalar>);
   use(&cfp::clip<Scalar>);
   use(&cfp::has_distance<Scalar>);
-  use(&cfp::essential_from_pose<Scalar>);
   use(&cfp::epipolar_line<Scalar>);
   use(&cfp::epipolar_distance<Scalar>);
   use(&cfp::sampson_distance<Scalar>);
@@ -139,7 +138,6 @@ static void instantiate_probability() noexcept {
   use(&cfp::calculation_confidence<std::vector<Scalar>>);
   use(&cfp::fit_constraint<std::vector<Scalar>>);
   use(&cfp::static_probability<Scalar>);
-  use(&cfp::static_probabilities<Scalar>);
   use(&cfp::fuse_high_dynamic<Scalar>);
   use(&cfp::fuse_low_dynamic<Scalar>);
   use(&cfp::second_stage_probability<Scalar>);

@@ -39,7 +39,7 @@ double rounding(double scale) {
 template <typename Scalar>
 void formulas(const Inputs<Scalar>& in, Results& results) {
   const std::size_t n = in.previous.size();
-  std::vector<Scalar> distances(n), k(n), scratch(n);
+  std::vector<Scalar> distances(n), scratch(n);
   cfp::Vector6<double> xi;
   xi << 0.05, -0.02, 0.03, 0.01, -0.02, 0.005;
   const cfp::SE3<double> T = cfp::se3_exp(xi);
@@ -56,8 +56,8 @@ void formulas(const Inputs<Scalar>& in, Results& results) {
   results.add("threshold", model.threshold_px, 0);
   results.add("minimum", model.minimum_px, 0);
   results.add("calculation confidence", model.calculation_confidence, rounding<Scalar>(1));
-  cfp::static_probabilities(model, drawn, k);
-  results.add_all("static probability", k, rounding<Scalar>(1));
+  for (const Scalar d : drawn)
+    results.add("static probability", cfp::static_probability(model, d), rounding<Scalar>(1));
   for (const Scalar d : drawn) results.add("chi-squared", cfp::chi_squared_survival(d, 2), rounding<Scalar>(1));
   const auto object = cfp::object_probability(drawn, cfp::ObjectProbabilityOptions{}, scratch);
   results.add("object probability", object.static_probability, rounding<Scalar>(1));
@@ -149,10 +149,10 @@ void judgement(const std::vector<cfp_test::BaScene>& scenes, Results& results) {
       truth.push_back({static_cast<double>(i), scene.true_poses[i].inverse()});
       estimate.push_back({static_cast<double>(i), scene.poses[i].inverse()});
     }
-    results.add("trajectory error",
-                cfp::absolute_trajectory_error(truth, estimate, cfp::AbsoluteErrorOptions{}, workspace)
-                    .translation_m.rmse,
-                1e-9);
+    results.add(
+        "trajectory error",
+        cfp::absolute_trajectory_error(truth, estimate, cfp::AbsoluteErrorOptions{}, workspace).translation_m.rmse,
+        1e-9);
     for (const auto& measured : scene.pixels) {
       cfp::Vector3<double> ray = cfp::Vector3<double>::Zero();
       results.add("ray of a pixel", lens.unproject(measured, ray) ? ray.x() : -1, 1e-9);

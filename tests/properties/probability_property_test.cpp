@@ -135,14 +135,6 @@ TEST_CASE("Properties of the constraint sigmoid", "[properties]") {
     RC_ASSERT(std::abs(cfp::static_probability(a, x) - cfp::static_probability(b, x * scale)) < 1e-9);
     RC_ASSERT(std::abs(a.calculation_confidence - b.calculation_confidence) < 1e-9);
   });
-  rc::prop("The batch equals the scalar function", [] {
-    const auto model = fit(*distances(10));
-    const auto d = *rc::gen::container<std::vector<double>>(any_double());
-    std::vector<double> out(d.size());
-    cfp::static_probabilities(model, d, out);
-    for (std::size_t i = 0; i < d.size(); ++i)
-      RC_ASSERT(std::abs(out[i] - cfp::static_probability(model, d[i])) < 1e-12);
-  });
 }
 
 TEST_CASE("Properties of the fusion", "[properties]") {

@@ -13,9 +13,6 @@
 
 namespace cfp {
 
-template <typename T>
-class span;
-
 namespace detail {
 
 template <typename C, typename = void>
@@ -25,24 +22,11 @@ template <typename C>
 struct is_strided_eigen<C, std::void_t<typename C::PlainObject>>
     : std::bool_constant<!std::is_same_v<typename C::PlainObject, C>> {};
 
-// By overload, not by partial specialisation: there Clang reports data() of std::vector<bool>, which is protected, as
-// an error.
-struct no_data {};
-template <typename C, typename = decltype(std::declval<C&>().size())>
-auto data_of(int) -> decltype(std::declval<C&>().data());
-template <typename C>
-no_data* data_of(...);
-template <typename C>
-using data_element = std::remove_pointer_t<
-    std::conditional_t<std::is_pointer_v<decltype(data_of<C>(0))>, decltype(data_of<C>(0)), no_data*>>;
-template <typename C, typename T>
-struct is_contiguous_of : std::bool_constant<std::is_convertible_v<data_element<C> (*)[], T (*)[]> &&
-                                             !is_strided_eigen<std::remove_const_t<C>>::value> {};
-
-template <typename T>
-struct is_span : std::false_type {};
-template <typename T>
-struct is_span<span<T>> : std::true_type {};
+// Exists where C has data() and size() over adjacent elements that a span<T> may view.
+template <typename C, typename T, typename = decltype(std::declval<C&>().size())>
+using contiguous_of =
+    std::enable_if_t<std::is_convertible_v<std::remove_pointer_t<decltype(std::declval<C&>().data())> (*)[], T (*)[]> &&
+                     !is_strided_eigen<std::remove_const_t<C>>::value>;
 
 }  // namespace detail
 
@@ -56,8 +40,8 @@ using non_deduced = std::common_type_t<T>;
 template <typename Range>
 using range_value_t = std::remove_cv_t<std::remove_pointer_t<decltype(std::declval<const Range&>().data())>>;
 
-/// Pointer and length, as C++20's std::span with dynamic extent. Converts from arrays, std::vector, std::array,
-/// std::span, plain Eigen vectors: whatever has data() and size() over adjacent elements.
+/// Pointer and length, as C++20's std::span with dynamic extent. Converts from arrays, std::vector, std::array, other
+/// spans, plain Eigen vectors: whatever has data() and size() over adjacent elements.
 template <typename T>
 class span {
  public:
@@ -69,17 +53,12 @@ class span {
   constexpr span(T* data, std::size_t size) noexcept : data_(data), size_(size) {}
   template <std::size_t N>
   constexpr span(T (&array)[N]) noexcept : data_(array), size_(N) {}
-  template <
-      typename C,
-      std::enable_if_t<!detail::is_span<std::remove_cv_t<C>>::value && detail::is_contiguous_of<C, T>::value, int> = 0>
+  template <typename C, typename = detail::contiguous_of<C, T>>
   constexpr span(C& container) noexcept : data_(container.data()), size_(static_cast<std::size_t>(container.size())) {}
-  template <typename C, std::enable_if_t<std::is_const_v<T> && !detail::is_span<C>::value &&
-                                             detail::is_contiguous_of<const C, T>::value,
-                                         int> = 0>
+  template <typename C, typename = detail::contiguous_of<const C, T>,
+            std::enable_if_t<std::is_const_v<T>, C>* = nullptr>
   constexpr span(const C& container) noexcept
       : data_(container.data()), size_(static_cast<std::size_t>(container.size())) {}
-  template <typename U, std::enable_if_t<std::is_convertible_v<U (*)[], T (*)[]>, int> = 0>
-  constexpr span(const span<U>& other) noexcept : data_(other.data()), size_(other.size()) {}
 
   [[nodiscard]] constexpr T* data() const noexcept { return data_; }
   [[nodiscard]] constexpr std::size_t size() const noexcept { return size_; }

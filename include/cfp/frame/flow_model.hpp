@@ -65,34 +65,6 @@ struct FlowModelWorkspace {
   FundamentalRansacWorkspace ransac;
 };
 
-inline namespace CFP_ISA {
-
-[[nodiscard]] inline OptionPath invalid_field(const FlowModelOptions& o) noexcept {
-  if (o.min_outside_pairs < 8) return "min_outside_pairs";
-  if (const OptionPath field = nested("motion", invalid_field(o.motion))) return field;
-  return nested("ransac", invalid_field(o.ransac));
-}
-
-/// The distance of every pair under the model, in pixels; no_distance for all without one.
-template <typename Scalar>
-void flow_distances(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow, const PinholeCamera<Scalar>& camera,
-                    const FlowModelOptions& options, span<Scalar> out) noexcept {
-  switch (model.kind) {
-    case FlowModelKind::motion:
-      return motion_distances(flow.previous, flow.previous_depths, flow.current, model.T_cur_prev, camera,
-                              model.sigma_px > Scalar(0) ? model.sigma_px : Scalar(options.motion.min_sigma_px),
-                              options.motion.distance, out);
-    case FlowModelKind::fundamental:
-      return epipolar_distances(model.matrix, flow.previous, flow.current, out);
-    case FlowModelKind::homography:
-      return transfer_distances(model.matrix, flow.previous, flow.current, out);
-    case FlowModelKind::none:
-      std::fill(out.begin(), out.end(), Scalar(no_distance<double>));
-  }
-}
-
-}  // namespace CFP_ISA
-
 namespace detail {
 inline namespace CFP_ISA {
 
@@ -151,6 +123,30 @@ void measure_sigma(const FlowPairs<Scalar>& flow, span<const char> outside, cons
 }  // namespace detail
 
 inline namespace CFP_ISA {
+
+[[nodiscard]] inline OptionPath invalid_field(const FlowModelOptions& o) noexcept {
+  if (o.min_outside_pairs < 8) return "min_outside_pairs";
+  if (const OptionPath field = nested("motion", invalid_field(o.motion))) return field;
+  return nested("ransac", invalid_field(o.ransac));
+}
+
+/// The distance of every pair under the model, in pixels; no_distance for all without one.
+template <typename Scalar>
+void flow_distances(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow, const PinholeCamera<Scalar>& camera,
+                    const FlowModelOptions& options, span<Scalar> out) noexcept {
+  switch (model.kind) {
+    case FlowModelKind::motion:
+      return motion_distances(flow.previous, flow.previous_depths, flow.current, model.T_cur_prev, camera,
+                              model.sigma_px > Scalar(0) ? model.sigma_px : Scalar(options.motion.min_sigma_px),
+                              options.motion.distance, out);
+    case FlowModelKind::fundamental:
+      return epipolar_distances(model.matrix, flow.previous, flow.current, out);
+    case FlowModelKind::homography:
+      return transfer_distances(model.matrix, flow.previous, flow.current, out);
+    case FlowModelKind::none:
+      std::fill(out.begin(), out.end(), Scalar(no_distance<double>));
+  }
+}
 
 /// What the pairs of the undistorted image are judged by, from those that `outside` marks as outside all boxes: the
 /// camera's motion if enough of them have a depth and agree, else the two-view model, for which all pairs serve where

@@ -62,6 +62,11 @@ struct PoseStep {
   double dt_s = 0;  ///< time between them, > 0
 };
 
+struct FrameIntervalOptions {
+  double factor = 3;        ///< a gap is longer than the usual interval times this, >= 1,
+  double shortest_s = 0.2;  ///< and than this: over less, a velocity may be believed; > 0
+};
+
 inline namespace CFP_ISA {
 
 /// The enumerator's name, for reports.
@@ -162,15 +167,6 @@ template <typename Scalar>
   }
   return out;
 }
-
-}  // namespace CFP_ISA
-
-struct FrameIntervalOptions {
-  double factor = 3;        ///< a gap is longer than the usual interval times this, >= 1,
-  double shortest_s = 0.2;  ///< and than this: over less, a velocity may be believed; > 0
-};
-
-inline namespace CFP_ISA {
 
 [[nodiscard]] inline OptionPath invalid_field(const FrameIntervalOptions& o) noexcept {
   if (!(o.factor >= 1) || !is_finite(o.factor)) return "factor";

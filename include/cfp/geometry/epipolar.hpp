@@ -34,14 +34,8 @@ template <typename Scalar>
 /// F over its largest coefficient, so that squares neither over- nor underflow; zero when F is zero or not finite.
 template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> unit_scale(const Matrix3<Scalar>& F) noexcept {
-  using std::abs;
-  Scalar largest(0);
-  for (Eigen::Index i = 0; i < 9; ++i) {
-    const Scalar size = abs(F(i));
-    if (!is_finite(size)) return Matrix3<Scalar>::Zero();
-    if (size > largest) largest = size;
-  }
-  if (!(largest > Scalar(0))) return Matrix3<Scalar>::Zero();
+  const Scalar largest = F.cwiseAbs().maxCoeff();
+  if (!is_finite(Scalar(F.cwiseAbs().mean())) || !(largest > Scalar(0))) return Matrix3<Scalar>::Zero();
   return F / largest;
 }
 
@@ -67,19 +61,14 @@ template <typename Scalar>
 
 inline namespace CFP_ISA {
 
-/// E = [t]x R of T_cur_prev = (R, t): y_cur^T E y_prev = 0 for rays y = K^-1 x. Zero when t is zero.
-template <typename Scalar>
-[[nodiscard]] Matrix3<Scalar> essential_from_pose(const SE3<Scalar>& T_cur_prev) noexcept {
-  return hat(T_cur_prev.translation) * T_cur_prev.rotation;
-}
-
 /// F = K_cur^-T [t]x R K_prev^-1. The scale is that of t in metres; zero when t is zero, which every distance then
 /// reports.
 template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> fundamental_from_pose(const PinholeCamera<Scalar>& camera_prev,
                                                     const PinholeCamera<Scalar>& camera_cur,
                                                     const SE3<Scalar>& T_cur_prev) noexcept {
-  return inverse(camera_cur.matrix()).transpose() * essential_from_pose(T_cur_prev) * inverse(camera_prev.matrix());
+  const Matrix3<Scalar> E = hat(T_cur_prev.translation) * T_cur_prev.rotation;
+  return inverse(camera_cur.matrix()).transpose() * E * inverse(camera_prev.matrix());
 }
 template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> fundamental_from_pose(const PinholeCamera<Scalar>& camera,

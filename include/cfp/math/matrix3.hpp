@@ -17,35 +17,6 @@ struct SVD3 {
   Vector3<Scalar> sigma;
 };
 
-inline namespace CFP_ISA {
-
-template <typename A, typename B>
-[[nodiscard]] Vector3<typename A::Scalar> cross(const Eigen::MatrixBase<A>& a, const Eigen::MatrixBase<B>& b) noexcept {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
-template <typename Scalar>
-[[nodiscard]] Scalar determinant(const Matrix3<Scalar>& M) noexcept {
-  return M.col(0).dot(cross(M.col(1), M.col(2)));
-}
-
-/// det(M) M^-T: its columns are the cross products of M's columns. Exists for every M.
-template <typename Scalar>
-[[nodiscard]] Matrix3<Scalar> cofactors(const Matrix3<Scalar>& M) noexcept {
-  Matrix3<Scalar> C;
-  for (int i = 0; i < 3; ++i) C.col(i) = cross(M.col((i + 1) % 3), M.col((i + 2) % 3));
-  return C;
-}
-
-/// Not finite for a singular M.
-template <typename Scalar>
-[[nodiscard]] Matrix3<Scalar> inverse(const Matrix3<Scalar>& M) noexcept {
-  const Matrix3<Scalar> C = cofactors(M);
-  return C.transpose() / M.col(0).dot(C.col(0));
-}
-
-}  // namespace CFP_ISA
-
 namespace detail {
 inline namespace CFP_ISA {
 
@@ -86,6 +57,31 @@ void orthogonalize_columns(Eigen::Matrix<Scalar, N, N>& A, Eigen::Matrix<Scalar,
 }  // namespace detail
 
 inline namespace CFP_ISA {
+
+template <typename A, typename B>
+[[nodiscard]] Vector3<typename A::Scalar> cross(const Eigen::MatrixBase<A>& a, const Eigen::MatrixBase<B>& b) noexcept {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+template <typename Scalar>
+[[nodiscard]] Scalar determinant(const Matrix3<Scalar>& M) noexcept {
+  return M.col(0).dot(cross(M.col(1), M.col(2)));
+}
+
+/// det(M) M^-T: its columns are the cross products of M's columns. Exists for every M.
+template <typename Scalar>
+[[nodiscard]] Matrix3<Scalar> cofactors(const Matrix3<Scalar>& M) noexcept {
+  Matrix3<Scalar> C;
+  for (int i = 0; i < 3; ++i) C.col(i) = cross(M.col((i + 1) % 3), M.col((i + 2) % 3));
+  return C;
+}
+
+/// Not finite for a singular M.
+template <typename Scalar>
+[[nodiscard]] Matrix3<Scalar> inverse(const Matrix3<Scalar>& M) noexcept {
+  const Matrix3<Scalar> C = cofactors(M);
+  return C.transpose() / M.col(0).dot(C.col(0));
+}
 
 /// The singular value decomposition of any finite M, rank-deficient ones included.
 template <typename Scalar>

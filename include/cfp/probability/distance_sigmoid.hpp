@@ -23,17 +23,6 @@ struct ConstraintOptions {
   std::size_t min_samples = 10;
 };
 
-inline namespace CFP_ISA {
-
-[[nodiscard]] inline OptionPath invalid_field(const ConstraintOptions& o) noexcept {
-  if (!(o.quantile > 0 && o.quantile <= 1)) return "quantile";
-  if (!detail::positive(o.steepness)) return "steepness";
-  if (o.min_samples < 1) return "min_samples";
-  return {};
-}
-
-}  // namespace CFP_ISA
-
 /// The sigmoid of one frame, fitted to the keypoints outside all boxes of potentially moving objects.
 template <typename Scalar>
 struct ConstraintModel {
@@ -46,6 +35,13 @@ struct ConstraintModel {
 };
 
 inline namespace CFP_ISA {
+
+[[nodiscard]] inline OptionPath invalid_field(const ConstraintOptions& o) noexcept {
+  if (!(o.quantile > 0 && o.quantile <= 1)) return "quantile";
+  if (!detail::positive(o.steepness)) return "steepness";
+  if (o.min_samples < 1) return "min_samples";
+  return {};
+}
 
 /// C_c = 1 - sum(d) / (n D_Th) over the n distances with 0 <= d < D_Th (paper eq. C_C). In [0, 1]; no such distance: 0.
 /// Compares with D_Th by that sum alone, so distances above the threshold (moving or mismatched) do not lower it.
@@ -108,14 +104,6 @@ template <typename Scalar>
     return distance_px > model.threshold_px ? Scalar(0) : Scalar(0.5);
   }
   return logistic((model.threshold_px - distance_px) * model.slope_per_px);
-}
-
-/// static_probability of every distance. `out` may be the same memory.
-template <typename Scalar>
-void static_probabilities(const ConstraintModel<Scalar>& model, span<const non_deduced<Scalar>> distances_px,
-                          span<non_deduced<Scalar>> out) noexcept {
-  CFP_ASSERT(out.size() == distances_px.size());
-  for (std::size_t i = 0; i < out.size(); ++i) out[i] = static_probability(model, distances_px[i]);
 }
 
 }  // namespace CFP_ISA

@@ -44,22 +44,6 @@ struct MapPointOptions {
   double background_prior = 0.9;
 };
 
-inline namespace CFP_ISA {
-
-[[nodiscard]] inline OptionPath invalid_field(const MapPointOptions& o) noexcept {
-  if (!(o.rate > 0 && o.rate <= 1)) return "rate";
-  // Nearer to 1 a float has too few numbers left: M would not move, or be NaN.
-  if (!(o.evidence_limit >= 1e-4 && o.evidence_limit < 0.5)) return "evidence_limit";
-  if (!(o.deletion_threshold >= 0 && o.deletion_threshold <= 1)) return "deletion_threshold";
-  if (!(o.mismatch_threshold > 0 && o.mismatch_threshold <= 1)) return "mismatch_threshold";
-  if (!(o.constraint_power > 0 && o.constraint_power <= 1)) return "constraint_power";
-  if (!detail::inside_unit_interval(o.foreground_prior)) return "foreground_prior";
-  if (!detail::inside_unit_interval(o.background_prior)) return "background_prior";
-  return {};
-}
-
-}  // namespace CFP_ISA
-
 namespace detail {
 inline namespace CFP_ISA {
 
@@ -83,6 +67,18 @@ template <typename Scalar>
 }  // namespace detail
 
 inline namespace CFP_ISA {
+
+[[nodiscard]] inline OptionPath invalid_field(const MapPointOptions& o) noexcept {
+  if (!(o.rate > 0 && o.rate <= 1)) return "rate";
+  // Nearer to 1 a float has too few numbers left: M would not move, or be NaN.
+  if (!(o.evidence_limit >= 1e-4 && o.evidence_limit < 0.5)) return "evidence_limit";
+  if (!(o.deletion_threshold >= 0 && o.deletion_threshold <= 1)) return "deletion_threshold";
+  if (!(o.mismatch_threshold > 0 && o.mismatch_threshold <= 1)) return "mismatch_threshold";
+  if (!(o.constraint_power > 0 && o.constraint_power <= 1)) return "constraint_power";
+  if (!detail::inside_unit_interval(o.foreground_prior)) return "foreground_prior";
+  if (!detail::inside_unit_interval(o.background_prior)) return "background_prior";
+  return {};
+}
 
 /// M after the keypoint's second-stage K: see MapPointPolicy. In [0, 1], non-decreasing in both arguments; with the
 /// exponential mean, K = M is a fixed point. A K or M that is NaN counts as 0.

@@ -46,6 +46,13 @@ struct ObjectProbabilityOptions {
   double unknown_object_probability = 0.5;
 };
 
+/// The static probability of one object and where it comes from.
+struct ObjectProbability {
+  double static_probability = 0;            ///< O in [0, 1]; unknown_object_probability when the status is not ok
+  std::size_t pairs = 0;                    ///< usable pairs: finite, non-negative distances
+  Status status = Status::not_enough_data;  ///< not_enough_data: O is unknown
+};
+
 inline namespace CFP_ISA {
 
 [[nodiscard]] inline OptionPath invalid_field(const ObjectProbabilityOptions& o) noexcept {
@@ -59,17 +66,6 @@ inline namespace CFP_ISA {
   if (!(o.unknown_object_probability >= 0 && o.unknown_object_probability <= 1)) return "unknown_object_probability";
   return {};
 }
-
-}  // namespace CFP_ISA
-
-/// The static probability of one object and where it comes from.
-struct ObjectProbability {
-  double static_probability = 0;            ///< O in [0, 1]; unknown_object_probability when the status is not ok
-  std::size_t pairs = 0;                    ///< usable pairs: finite, non-negative distances
-  Status status = Status::not_enough_data;  ///< not_enough_data: O is unknown
-};
-
-inline namespace CFP_ISA {
 
 /// The options on the scale of a measured noise, one standard deviation in pixels of one coordinate; as they are where
 /// there is no measure (sigma 0) or noise_factor is 0. A distance from a line sees one of two coordinates and counts as

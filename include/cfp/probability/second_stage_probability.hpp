@@ -18,6 +18,28 @@ struct Evidence {
   bool available = false;  ///< false: no depth, behind the camera, translation below t_Th, constraint not fitted
 };
 
+/// All that the second stage needs to know of one keypoint inside a box.
+template <typename Scalar>
+struct SecondStageKeypoint {
+  Evidence<Scalar> projection;               ///< K^T
+  Evidence<Scalar> epipolar;                 ///< K^F
+  Scalar object_probability = Scalar(0);     ///< O of the box that rules this keypoint
+  Scalar map_point_probability = Scalar(1);  ///< M of its map point; 1 where there is none
+  bool foreground = true;                    ///< from the depth clustering
+  bool matched = false;                      ///< has a match in frame k-1
+  bool box_associated = true;                ///< its box continues a box of frame k-1
+};
+
+/// The rules of the second stage, in the paper's order. A match without any available constraint (no depth and too
+/// little translation) counts as no match.
+enum class SecondStageRule : std::uint8_t {
+  new_object,            ///< foreground of a box without one in frame k-1, whose matches are false: 0
+  unmatched_foreground,  ///< no match in k-1: 0
+  unmatched_background,  ///< no match in k-1: M
+  high_dynamic,          ///< O <= O_Th: fuse_high_dynamic
+  low_dynamic            ///< O > O_Th: fuse_low_dynamic
+};
+
 inline namespace CFP_ISA {
 
 /// For O <= O_Th: K^T K^F, a point must satisfy both; with one constraint, that one's K (paper eq. for high-dynamic
@@ -44,32 +66,6 @@ template <typename Scalar>
   const Scalar share = ct / sum;
   return clamp_probability(projection.static_probability * share + epipolar.static_probability * (Scalar(1) - share));
 }
-
-}  // namespace CFP_ISA
-
-/// All that the second stage needs to know of one keypoint inside a box.
-template <typename Scalar>
-struct SecondStageKeypoint {
-  Evidence<Scalar> projection;               ///< K^T
-  Evidence<Scalar> epipolar;                 ///< K^F
-  Scalar object_probability = Scalar(0);     ///< O of the box that rules this keypoint
-  Scalar map_point_probability = Scalar(1);  ///< M of its map point; 1 where there is none
-  bool foreground = true;                    ///< from the depth clustering
-  bool matched = false;                      ///< has a match in frame k-1
-  bool box_associated = true;                ///< its box continues a box of frame k-1
-};
-
-/// The rules of the second stage, in the paper's order. A match without any available constraint (no depth and too
-/// little translation) counts as no match.
-enum class SecondStageRule : std::uint8_t {
-  new_object,            ///< foreground of a box without one in frame k-1, whose matches are false: 0
-  unmatched_foreground,  ///< no match in k-1: 0
-  unmatched_background,  ///< no match in k-1: M
-  high_dynamic,          ///< O <= O_Th: fuse_high_dynamic
-  low_dynamic            ///< O > O_Th: fuse_low_dynamic
-};
-
-inline namespace CFP_ISA {
 
 /// Whether a constraint has something to say: a match without any (no depth and too little translation) is as none.
 template <typename Scalar>

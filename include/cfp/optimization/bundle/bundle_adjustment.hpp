@@ -250,18 +250,14 @@ template <typename Camera, typename Scalar, typename Executor,
   detail::build_index(problem, workspace.index, result);
   detail::prepare(problem, workspace, result);
   if (result.used > 0) {
-    LeastSquaresResult solved;
     with_loss<double>(options.loss, std::sqrt(options.chi2_mono), [&](auto mono) {
       auto stereo = mono;
       stereo.delta = std::sqrt(options.chi2_stereo);
       detail::BundleLeastSquares<BundleProblem<Camera, Scalar>, decltype(mono), decltype(stereo),
                                  std::remove_reference_t<Executor>>
           least_squares{problem, mono, stereo, workspace, executor};
-      solved = minimize_least_squares(least_squares, options.levenberg_marquardt);
+      static_cast<LeastSquaresResult&>(result) = minimize_least_squares(least_squares, options.levenberg_marquardt);
     });
-    result.status = solved.status;
-    result.initial_cost = solved.initial_cost, result.final_cost = solved.final_cost;
-    result.iterations = solved.iterations, result.accepted = solved.accepted;
     if (result.accepted > 0) detail::write_back(problem, workspace);
   }
   if (!squared_errors.empty()) detail::write_squared_errors(problem, squared_errors);

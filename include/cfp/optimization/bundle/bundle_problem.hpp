@@ -44,13 +44,9 @@ struct BundleOptions {
   double chi2_stereo = 7.815;  ///< delta^2 of the loss for three residuals, > 0: 3 degrees of freedom
 };
 
-/// Every observation is counted once: used + zero_weight + invalid + behind = all.
-struct BundleResult {
-  SolverStatus status = SolverStatus::not_enough_data;
-  double initial_cost = 0;      ///< sum of w rho(|r|^2 / sigma^2) over the used observations
-  double final_cost = 0;        ///< of the poses and points returned, <= initial_cost
-  int iterations = 0;           ///< steps tried
-  int accepted = 0;             ///< steps taken
+/// Costs are sums of w rho(|r|^2 / sigma^2) over the used observations; the final one is that of the poses and points
+/// returned. Every observation is counted once: used + zero_weight + invalid + behind = all.
+struct BundleResult : LeastSquaresResult {
   std::size_t used = 0;         ///< observations in the cost
   std::size_t zero_weight = 0;  ///< left out: w = 0
   std::size_t invalid = 0;      ///< left out: see BundleObservations

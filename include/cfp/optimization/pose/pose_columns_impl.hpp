@@ -69,20 +69,6 @@ void reserve_columns(std::size_t n, std::size_t lanes, PoseWorkspace<Scalar>& wo
   }
 }
 
-/// Values, or the same one for all when there are none.
-template <typename Input>
-struct ValueOrConstant {
-  Input constant;
-  const Input* data;
-  std::size_t stride;
-
-  ValueOrConstant(span<const Input> values, Input otherwise) noexcept
-      : constant(otherwise), data(values.data()), stride(values.empty() ? 0 : 1) {}
-  [[nodiscard]] double operator[](std::size_t i) const noexcept {
-    return static_cast<double>((stride > 0 ? data : &constant)[stride * i]);
-  }
-};
-
 /// Weights by their mean, information from sigma or 1 / sigma^2, nothing left out, no errors yet; slots up to a whole
 /// packet are filled.
 template <typename Scalar>
@@ -118,9 +104,11 @@ void load_columns(const PoseObservations<Input>& observations, const Camera& cam
   }
   const double b = observations.baseline_fx > 0 && observations.baseline_fx <= 1e6 ? observations.baseline_fx : 0;
   const bool has_sigmas = !observations.sigmas.empty(), has_depths = !observations.depths.empty();
-  const ValueOrConstant<Input> weights(observations.weights, Input(1)),
-      noise(has_sigmas ? observations.sigmas : observations.inverse_sigmas_sq, Input(1)),
-      rights(has_depths ? observations.depths : observations.u_right, Input(0));
+  const span<const Input> noise = has_sigmas ? observations.sigmas : observations.inverse_sigmas_sq,
+                          rights = has_depths ? observations.depths : observations.u_right;
+  const auto value = [](span<const Input> values, std::size_t i, double otherwise) {
+    return values.empty() ? otherwise : static_cast<double>(values[i]);
+  };
   const double widest = has_sigmas ? 1e6 : 1e12;
   std::size_t mono = 0, stereo = columns.stereo_begin;
   double sum = 0, sum_sq = 0;
@@ -129,14 +117,14 @@ void load_columns(const PoseObservations<Input>& observations, const Camera& cam
                  y = static_cast<double>(observations.points(i, 1)) - centre.y(),
                  z = static_cast<double>(observations.points(i, 2)) - centre.z();
     const double u = static_cast<double>(observations.pixels(i, 0)), v = static_cast<double>(observations.pixels(i, 1));
-    const double w = weights[i], given = noise[i];
+    const double w = value(observations.weights, i, 1), given = value(noise, i, 1);
     // A sum with NaN or infinity is not below its bound.
     if (!(std::abs(x) + std::abs(y) + std::abs(z) <= 1e9 && std::abs(u - cu) + std::abs(v - cv) <= 1e7 && w >= 1e-30 &&
           w <= 1e30 && given >= 1 / widest && given <= widest)) {
       ++(w >= 0 && w < 1e-30 ? result.zero_weight : result.invalid);
       continue;
     }
-    double right = b > 0 ? rights[i] : 0.0;
+    double right = b > 0 ? value(rights, i, 0) : 0.0;
     if (has_depths) right = is_valid_depth(right) ? u - b / right : 0.0;
     const bool has_right = right > 0 && right <= 1e7;
     const std::size_t slot = has_right ? stereo++ : mono++;
