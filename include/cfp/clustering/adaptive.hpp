@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "cfp/clustering/dbscan.hpp"
-#include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/geometry/depth_noise.hpp"

@@ -19,7 +19,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/types.hpp"

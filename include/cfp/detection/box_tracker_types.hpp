@@ -2,7 +2,6 @@
 /// What goes into the box tracker and what comes out (paper IV-A).
 #pragma once
 
-#include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/status.hpp"

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <algorithm>
-#include <limits>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/status.hpp"

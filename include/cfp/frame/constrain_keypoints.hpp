@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <iterator>
-#include <limits>
 
 #include "cfp/core/span.hpp"
 #include "cfp/frame/frame_options.hpp"

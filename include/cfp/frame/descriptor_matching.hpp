@@ -8,7 +8,6 @@
 #include <cstring>
 #include <vector>
 
-#include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 

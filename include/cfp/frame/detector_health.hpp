@@ -3,6 +3,7 @@
 /// objects, or with others, and nothing else in a system would notice.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <vector>
 
@@ -110,12 +111,10 @@ class DetectorHealth {
 
  private:
   [[nodiscard]] bool repeats(span<const Detection<Scalar>> now) const noexcept {
-    if (now.empty() || now.size() != last_.size()) return false;
-    for (std::size_t i = 0; i < now.size(); ++i) {
-      const Box<Scalar>&a = now[i].box, &b = last_[i].box;
-      if (!(a.x1 == b.x1 && a.y1 == b.y1 && a.x2 == b.x2 && a.y2 == b.y2)) return false;
-    }
-    return true;
+    const auto same = [](const Detection<Scalar>& a, const Detection<Scalar>& b) {
+      return a.box.x1 == b.box.x1 && a.box.y1 == b.box.y1 && a.box.x2 == b.box.x2 && a.box.y2 == b.box.y2;
+    };
+    return !now.empty() && std::equal(now.begin(), now.end(), last_.begin(), last_.end(), same);
   }
   [[nodiscard]] bool leaves(const Box<Scalar>& box) const noexcept {
     const double width = options_.image_width, margin = options_.border_share * width;

@@ -3,7 +3,6 @@
 /// that needs none of them must not get worse.
 #pragma once
 
-#include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/frame/frame.hpp"

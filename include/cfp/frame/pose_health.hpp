@@ -6,10 +6,8 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 #include <optional>
 
-#include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/math/normal_equations.hpp"
@@ -149,22 +147,15 @@ template <typename Scalar>
   for (const bool cell : occupied) out.spread += cell ? 1.0 / (columns * rows) : 0.0;
   const bool determined = pose_sigmas(pose.information, out.position_sigma_m, out.rotation_sigma_rad);
 
-  if (!is_solved(pose.status)) {
-    out.status = PoseHealth::not_solved;
-  } else if (!(out.inliers >= options.min_inliers)) {
-    out.status = PoseHealth::too_few_inliers;
-  } else if (!(out.inlier_share >= options.min_inlier_share)) {
-    out.status = PoseHealth::few_agree;
-  } else if (sized && !(out.spread >= options.min_spread)) {
-    out.status = PoseHealth::crowded;
-  } else if (!determined || !(out.position_sigma_m <= options.max_position_sigma_m) ||
-             !(out.rotation_sigma_rad <= options.max_rotation_sigma_rad)) {
-    out.status = PoseHealth::uncertain;
-  } else if (step && is_jump(*step, options)) {
-    out.status = PoseHealth::jump;
-  } else {
-    out.status = PoseHealth::ok;
-  }
+  const bool certain = determined && out.position_sigma_m <= options.max_position_sigma_m &&
+                       out.rotation_sigma_rad <= options.max_rotation_sigma_rad;
+  out.status = !is_solved(pose.status)                           ? PoseHealth::not_solved
+               : !(out.inliers >= options.min_inliers)           ? PoseHealth::too_few_inliers
+               : !(out.inlier_share >= options.min_inlier_share) ? PoseHealth::few_agree
+               : sized && !(out.spread >= options.min_spread)    ? PoseHealth::crowded
+               : !certain                                        ? PoseHealth::uncertain
+               : step && is_jump(*step, options)                 ? PoseHealth::jump
+                                                                 : PoseHealth::ok;
   return out;
 }
 

@@ -5,7 +5,6 @@
 #pragma once
 
 #include <array>
-#include <limits>
 #include <type_traits>
 #include <vector>
 
@@ -60,12 +59,8 @@ struct PinholeCamera {
 
   /// The intrinsic matrix.
   [[nodiscard]] CFP_INLINE Matrix3<Scalar> matrix() const noexcept {
-    Matrix3<Scalar> K = Matrix3<Scalar>::Identity();
-    K(0, 0) = fx;
-    K(1, 1) = fy;
-    K(0, 2) = cx;
-    K(1, 2) = cy;
-    return K;
+    const Scalar zero(0), one(1);
+    return Matrix3<Scalar>{{fx, zero, cx}, {zero, fy, cy}, {zero, zero, one}};
   }
 
   template <typename Other>

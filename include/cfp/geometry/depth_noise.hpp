@@ -2,7 +2,6 @@
 /// How well a depth measurement is known, and what is assumed of a depth that was not measured.
 #pragma once
 
-#include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 
 namespace cfp {

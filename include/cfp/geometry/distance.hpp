@@ -2,8 +2,6 @@
 /// What all pixel distances of cfp share: the value that stands for "no distance".
 #pragma once
 
-#include <limits>
-
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 

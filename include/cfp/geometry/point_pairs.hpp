@@ -54,19 +54,11 @@ template <typename T>
 // The same as a matrix of homogeneous pixels, and its inverse.
 template <typename T = double>
 [[nodiscard]] Matrix3<T> scaling_matrix(const PixelScaling& s) noexcept {
-  Matrix3<T> M = Matrix3<T>::Identity();
-  M(0, 0) = M(1, 1) = s.factor;
-  M(0, 2) = -s.factor * s.x;
-  M(1, 2) = -s.factor * s.y;
-  return M;
+  return Matrix3<T>{{s.factor, 0, -s.factor * s.x}, {0, s.factor, -s.factor * s.y}, {0, 0, 1}};
 }
 template <typename T = double>
 [[nodiscard]] Matrix3<T> unscaling_matrix(const PixelScaling& s) noexcept {
-  Matrix3<T> M = Matrix3<T>::Identity();
-  M(0, 0) = M(1, 1) = 1 / s.factor;
-  M(0, 2) = s.x;
-  M(1, 2) = s.y;
-  return M;
+  return Matrix3<T>{{1 / s.factor, 0, s.x}, {0, 1 / s.factor, s.y}, {0, 0, 1}};
 }
 
 // F of pixels from F of scaled pixels, unit norm.

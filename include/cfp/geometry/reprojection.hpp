@@ -7,7 +7,6 @@
 #pragma once
 
 #include <cmath>
-#include <limits>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"

@@ -11,7 +11,6 @@
 #pragma once
 
 #include <cmath>
-#include <limits>
 #include <type_traits>
 
 #include "cfp/core/numeric.hpp"

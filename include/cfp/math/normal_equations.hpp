@@ -76,9 +76,7 @@ template <int N>
 template <int N>
 [[nodiscard]] double predicted_decrease(const Eigen::Matrix<double, N, N>& H, const Eigen::Matrix<double, N, 1>& g,
                                         double damping, const Eigen::Matrix<double, N, 1>& step) noexcept {
-  double decrease = 0;
-  for (int i = 0; i < N; ++i) decrease += step[i] * (damping * H(i, i) * step[i] - g[i]);
-  return decrease;
+  return step.dot(damping * H.diagonal().cwiseProduct(step) - g);
 }
 
 }  // namespace CFP_ISA

@@ -15,14 +15,8 @@ inline namespace CFP_ISA {
 /// The skew-symmetric matrix with hat(a) b = a x b.
 template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> hat(const Vector3<Scalar>& a) noexcept {
-  Matrix3<Scalar> m = Matrix3<Scalar>::Zero();
-  m(0, 1) = -a.z();
-  m(0, 2) = a.y();
-  m(1, 0) = a.z();
-  m(1, 2) = -a.x();
-  m(2, 0) = -a.y();
-  m(2, 1) = a.x();
-  return m;
+  const Scalar zero(0);
+  return Matrix3<Scalar>{{zero, -a.z(), a.y()}, {a.z(), zero, -a.x()}, {-a.y(), a.x(), zero}};
 }
 
 /// I + a hat(w) + b hat(w)^2, the form of everything below.

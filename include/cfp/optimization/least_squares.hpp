@@ -13,10 +13,8 @@
 #pragma once
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
-#include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/math/normal_equations.hpp"
 

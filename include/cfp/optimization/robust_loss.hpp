@@ -10,7 +10,6 @@
 #pragma once
 
 #include <cmath>
-#include <limits>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/simd/packet.hpp"

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 
-#include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/status.hpp"

@@ -7,7 +7,6 @@
 #include <array>
 #include <cmath>
 
-#include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/status.hpp"

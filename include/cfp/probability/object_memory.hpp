@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/status.hpp"
 #include "cfp/probability/object.hpp"

@@ -3,8 +3,6 @@
 /// together, and the special rules around them (paper section IV-D).
 #pragma once
 
-#include <limits>
-
 #include "cfp/core/numeric.hpp"
 #include "cfp/probability/first_stage_probability.hpp"
 

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/math/matrix3.hpp"

@@ -5,7 +5,6 @@
 
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "cfp/math/matrix3.hpp"
 #include "cfp/math/so3.hpp"

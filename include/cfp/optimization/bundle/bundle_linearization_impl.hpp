@@ -9,7 +9,6 @@
 #pragma once
 
 #include <algorithm>
-#include <limits>
 #include <vector>
 
 #include "cfp/core/types.hpp"

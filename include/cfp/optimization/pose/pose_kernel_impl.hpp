@@ -14,7 +14,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "cfp/geometry/camera.hpp"
 #include "cfp/math/normal_equations.hpp"

@@ -12,7 +12,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "cfp/geometry/camera.hpp"
 #include "cfp/optimization/least_squares.hpp"
