@@ -15,7 +15,26 @@
 #include "cfp/math/matrix3.hpp"
 #include "cfp/math/se3.hpp"
 
-namespace cfp::detail {
+namespace cfp {
+
+/// Three points and the rays on which a camera sees them.
+template <typename Scalar>
+struct P3PProblem {
+  std::array<Vector3<Scalar>, 3> world;  ///< in metres or any other unit
+  std::array<Vector3<Scalar>, 3> rays;   ///< in the camera frame, of any length (PinholeCamera::unproject)
+};
+
+/// Up to four poses.
+template <typename Scalar>
+struct P3PSolutions {
+  std::array<SE3<Scalar>, 4> T_cam_world;  ///< the first `count` are set
+  int count = 0;
+  /// ok: count > 0. degenerate: the points are collinear or coincide, or no pose puts such a triangle on these rays.
+  /// invalid_input: a coordinate is not finite or beyond 1e100.
+  Status status = Status::degenerate;
+};
+
+namespace detail {
 
 // (u, v, w); T is a scalar, or an array that holds one for each of two points or lines.
 template <typename T>
@@ -170,26 +189,7 @@ template <typename Real>
 }
 
 }  // namespace CFP_ISA
-}  // namespace cfp::detail
-
-namespace cfp {
-
-/// Three points and the rays on which a camera sees them.
-template <typename Scalar>
-struct P3PProblem {
-  std::array<Vector3<Scalar>, 3> world;  ///< in metres or any other unit
-  std::array<Vector3<Scalar>, 3> rays;   ///< in the camera frame, of any length (PinholeCamera::unproject)
-};
-
-/// Up to four poses.
-template <typename Scalar>
-struct P3PSolutions {
-  std::array<SE3<Scalar>, 4> T_cam_world;  ///< the first `count` are set
-  int count = 0;
-  /// ok: count > 0. degenerate: the points are collinear or coincide, or no pose puts such a triangle on these rays.
-  /// invalid_input: a coordinate is not finite or beyond 1e100.
-  Status status = Status::degenerate;
-};
+}  // namespace detail
 
 inline namespace CFP_ISA {
 

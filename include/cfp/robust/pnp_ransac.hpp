@@ -17,7 +17,26 @@
 #include "cfp/robust/ransac.hpp"
 #include "cfp/robust/ransac_data_impl.hpp"
 
-namespace cfp::detail {
+namespace cfp {
+
+/// The threshold is a reprojection distance: 2.45 sigma hold 95 %. At least 4 inliers: any three observations have a
+/// pose. Samples enough for nine mismatches in ten without weights (cfp_pnp_ransac_study); where the data hold no pose,
+/// all of them are drawn, about 2 us each for 300 observations: lower the limit when hopeless calls must be short.
+struct PnpRansacOptions : RansacOptions {
+  constexpr PnpRansacOptions() noexcept {
+    threshold_px = 2.5;
+    min_iterations = 5;
+    max_iterations = 10000;
+    min_inliers = 8;
+  }
+};
+
+template <typename Scalar>
+struct PnpRansacResult : RansacReport {
+  SE3<Scalar> T_cam_world;  ///< identity unless found()
+};
+
+namespace detail {
 
 // The observations present. Points are relative to `origin`; a measurement is its ray (x, y, 1) and the upper
 // triangular S with S^T S = A^T A, A = d pixel / d (x, y) at the ray: |S d| is the pixel distance of a step d in the
@@ -178,26 +197,7 @@ struct PnpProblem {
 };
 
 }  // namespace CFP_ISA
-}  // namespace cfp::detail
-
-namespace cfp {
-
-/// The threshold is a reprojection distance: 2.45 sigma hold 95 %. At least 4 inliers: any three observations have a
-/// pose. Samples enough for nine mismatches in ten without weights (cfp_pnp_ransac_study); where the data hold no pose,
-/// all of them are drawn, about 2 us each for 300 observations: lower the limit when hopeless calls must be short.
-struct PnpRansacOptions : RansacOptions {
-  constexpr PnpRansacOptions() noexcept {
-    threshold_px = 2.5;
-    min_iterations = 5;
-    max_iterations = 10000;
-    min_inliers = 8;
-  }
-};
-
-template <typename Scalar>
-struct PnpRansacResult : RansacReport {
-  SE3<Scalar> T_cam_world;  ///< identity unless found()
-};
+}  // namespace detail
 
 /// Scratch memory of pnp_ransac: keep one per thread. After a call with n observations, calls with up to n allocate
 /// nothing.
