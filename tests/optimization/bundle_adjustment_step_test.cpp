@@ -22,10 +22,9 @@ struct AnyCamera {
   }
 };
 
-cfp::Vector3<double> residual(const cfp_test::BaScene& scene, std::size_t i, const BundlePose& pose, const double* x) {
-  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> R(pose.rotation);
-  const cfp::Vector3<double> p =
-      R * (Eigen::Map<const cfp::Vector3<double>>(x) - Eigen::Map<const cfp::Vector3<double>>(pose.center));
+cfp::Vector3<double> residual(const cfp_test::BaScene& scene, std::size_t i, const BundlePose& pose,
+                              const cfp::Vector3<double>& x) {
+  const cfp::Vector3<double> p = pose.rotation * (x - pose.center);
   cfp::Vector2<double> pixel = cfp::Vector2<double>::Zero();
   REQUIRE(scene.camera.project(p, pixel));
   const double right = scene.u_right[i] > 0 ? pixel.x() - scene.baseline_fx / p.z() - scene.u_right[i] : 0.0;
@@ -35,7 +34,7 @@ cfp::Vector3<double> residual(const cfp_test::BaScene& scene, std::size_t i, con
 /// The pose after the library's own update.
 BundlePose moved(const cfp::BundleWorkspace& work, std::size_t rank, const cfp::Vector6<double>& xi) {
   cfp::detail::BundleSchur schur;
-  schur.point_steps.assign(work.state.points.size(), 0.0);
+  schur.point_steps.assign(3 * work.state.points.size(), 0.0);
   schur.pose_steps.assign(6 * work.state.poses.size(), 0.0);
   for (std::size_t e = 0; e < 6; ++e) schur.pose_steps[6 * rank + e] = xi[static_cast<int>(e)];
   cfp::detail::BundleState next = work.state;
@@ -60,7 +59,7 @@ DenseSystem dense_system(const cfp_test::BaScene& scene, const cfp::BundleWorksp
     const std::size_t rank = to_index(index.pose_number[to_index(scene.pose[i])]),
                       j = to_index(index.point_number[to_index(scene.point[i])]);
     const BundlePose& pose = work.state.poses[rank];
-    const double* x = work.state.points.data() + 3 * j;
+    const cfp::Vector3<double>& x = work.state.points[j];
     const cfp::Vector3<double> r = residual(scene, i, pose, x);
     Eigen::MatrixXd J = Eigen::MatrixXd::Zero(3, n);
     constexpr double h = 1e-6;
@@ -70,10 +69,9 @@ DenseSystem dense_system(const cfp_test::BaScene& scene, const cfp::BundleWorksp
           (residual(scene, i, moved(work, rank, xi), x) - residual(scene, i, moved(work, rank, -xi), x)) / (2 * h);
     }
     for (int e = 0; e < 3; ++e) {
-      const cfp::Vector3<double> base(x[0], x[1], x[2]), step = h * cfp::Vector3<double>::Unit(e);
-      const cfp::Vector3<double> up = base + step, down = base - step;
+      const cfp::Vector3<double> step = h * cfp::Vector3<double>::Unit(e), up = x + step, down = x - step;
       J.col(6 * poses + 3 * static_cast<int>(j) + e) =
-          (residual(scene, i, pose, up.data()) - residual(scene, i, pose, down.data())) / (2 * h);
+          (residual(scene, i, pose, up) - residual(scene, i, pose, down)) / (2 * h);
     }
     const double inv_sigma_sq = 1 / (scene.sigma[i] * scene.sigma[i]);
     const Loss& loss = scene.u_right[i] > 0 ? stereo : mono;
@@ -130,8 +128,9 @@ void check_step(const Loss& mono, double stereo_share, const Camera& camera, boo
     const Eigen::VectorXd h = -damped.ldlt().solve(system.g);
     CHECK((Eigen::Map<const Eigen::VectorXd>(work.schur.pose_steps.data(), poses) - h.head(poses)).norm() <
           1e-5 * h.head(poses).norm());
-    const Eigen::VectorXd points = Eigen::Map<const Eigen::VectorXd>(work.next_state.points.data(), h.size() - poses) -
-                                   Eigen::Map<const Eigen::VectorXd>(work.state.points.data(), h.size() - poses);
+    const Eigen::VectorXd points =
+        Eigen::Map<const Eigen::VectorXd>(work.next_state.points[0].data(), h.size() - poses) -
+        Eigen::Map<const Eigen::VectorXd>(work.state.points[0].data(), h.size() - poses);
     CHECK((points - h.tail(h.size() - poses)).norm() < 1e-5 * h.norm());
     CHECK_THAT(promised / h.dot(lambda * (system.D * h) - system.g), WithinAbs(1, 1e-5));
   }

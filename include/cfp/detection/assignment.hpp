@@ -185,7 +185,7 @@ AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_co
   workspace.distance.resize(costs.cols);
   workspace.open_saving.resize(costs.cols);
   workspace.row_of_column.assign(costs.cols, unassigned);
-  workspace.visits.resize(costs.rows + 1);
+  workspace.visits.resize(costs.rows);  // a search visits every row once at most
   const Eigen::Map<const Eigen::ArrayXd> allowed(workspace.costs.data(), Eigen::Index(workspace.costs.size()));
   const double gate = detail::effective_gate(allowed, max_cost, (std::min)(costs.rows, costs.cols));
   detail::AssignmentSearch<AssignmentWorkspace> search{workspace, column_of_row, gate};

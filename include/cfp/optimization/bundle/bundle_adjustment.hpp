@@ -78,7 +78,7 @@ void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& work
   schur.point_steps.resize(3 * index.points);
   for (BundleState* state : {&workspace.state, &workspace.next_state}) {
     state->poses.resize(poses);
-    state->points.resize(3 * index.points);
+    state->points.resize(index.points);
   }
   for (BundleLinearization* linear : {&workspace.linear, &workspace.next_linear}) {
     linear->slots.resize(BundleLinearization::slot_doubles * slots);
@@ -89,14 +89,10 @@ void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& work
   for (std::size_t k = 0; k < poses; ++k) {
     const SE3<double>& pose = problem.poses[to_index(index.caller_pose[k])];
     const Matrix3<double> rotation = normalized_rotation(pose.rotation);
-    const Vector3<double> center = -(rotation.transpose() * pose.translation);
-    for (int e = 0; e < 9; ++e) workspace.state.poses[k].rotation[e] = rotation(e / 3, e % 3);
-    for (int e = 0; e < 3; ++e) workspace.state.poses[k].center[e] = center[e];
+    workspace.state.poses[k] = {rotation, -(rotation.transpose() * pose.translation)};
   }
-  for (std::size_t j = 0; j < index.points; ++j) {
-    const Vector3<double>& x = problem.points[to_index(index.caller_point[j])];
-    std::copy(x.data(), x.data() + 3, workspace.state.points.data() + 3 * j);
-  }
+  for (std::size_t j = 0; j < index.points; ++j)
+    workspace.state.points[j] = problem.points[to_index(index.caller_point[j])];
 }
 
 /// The steps applied; fixed poses are copied.
@@ -104,12 +100,11 @@ inline void move(const BundleIndex& index, const BundleState& state, const Bundl
                  BundleState& next) noexcept {
   std::copy(state.poses.begin(), state.poses.end(), next.poses.begin());
   for (std::size_t k = 0; k < index.free_poses; ++k) {
-    const double* xi = schur.pose_steps.data() + 6 * k;
-    Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> rotation(next.poses[k].rotation);
-    rotation = Matrix3<double>(rotation) * so3_exp(Vector3<double>(xi[3], xi[4], xi[5]));
-    for (std::size_t e = 0; e < 3; ++e) next.poses[k].center[e] -= xi[e];
+    const Eigen::Map<const Vector6<double>> xi(schur.pose_steps.data() + 6 * k);
+    next.poses[k] = {state.poses[k].rotation * so3_exp(xi.tail<3>()), state.poses[k].center - xi.head<3>()};
   }
-  for (std::size_t e = 0; e < state.points.size(); ++e) next.points[e] = state.points[e] + schur.point_steps[e];
+  for (std::size_t j = 0; j < index.points; ++j)
+    next.points[j] = state.points[j] + Eigen::Map<const Vector3<double>>(schur.point_steps.data() + 3 * j);
 }
 
 /// Bundle adjustment as minimize_least_squares wants it.
@@ -180,16 +175,12 @@ void write_back(const BundleProblem<Camera, Scalar>& problem, const BundleWorksp
   const BundleIndex& index = workspace.index;
   for (std::size_t k = 0; k < index.free_poses; ++k) {
     const BundlePose& from = workspace.state.poses[k];
-    Matrix3<double> rotation;
-    for (int e = 0; e < 9; ++e) rotation(e / 3, e % 3) = from.rotation[e];
     SE3<double>& pose = problem.poses[to_index(index.caller_pose[k])];
-    pose.rotation = normalized_rotation(rotation);
-    pose.translation = -(pose.rotation * Vector3<double>(from.center[0], from.center[1], from.center[2]));
+    pose.rotation = normalized_rotation(from.rotation);
+    pose.translation = -(pose.rotation * from.center);
   }
-  for (std::size_t j = 0; j < index.points; ++j) {
-    const double* x = workspace.state.points.data() + 3 * j;
-    problem.points[to_index(index.caller_point[j])] = Vector3<double>(x[0], x[1], x[2]);
-  }
+  for (std::size_t j = 0; j < index.points; ++j)
+    problem.points[to_index(index.caller_point[j])] = workspace.state.points[j];
 }
 
 template <typename Camera, typename Scalar>

@@ -63,8 +63,7 @@ struct BundleKind {
 
 /// d = x - c
 [[nodiscard]] inline Vector3<double> offset(const BundleState& state, std::size_t pose, std::size_t point) noexcept {
-  const double *const x = state.points.data() + 3 * point, *const c = state.poses[pose].center;
-  return {x[0] - c[0], x[1] - c[1], x[2] - c[2]};
+  return state.points[point] - state.poses[pose].center;
 }
 
 /// out = G M = [M; hat(d) M], 3 numbers of M and 6 of G M per column. Number by number: a vector read back at once from

@@ -17,10 +17,10 @@
 
 namespace cfp::detail {
 
-/// p_cam = rotation (x - center), rows of the rotation one after the other: exact for cameras far from the origin.
+/// p_cam = rotation (x - center): exact for cameras far from the origin.
 struct BundlePose {
-  double rotation[9];
-  double center[3];
+  Matrix3<double> rotation;
+  Vector3<double> center;
 };
 
 /// Up to 32 observations of one pose: rows and residuals of u, v and u_right. What fills up the lanes has weight 0.
@@ -37,7 +37,7 @@ struct BundleChunk {
 
 struct BundleState {
   std::vector<BundlePose> poses;
-  std::vector<double> points;  // three per point
+  std::vector<Vector3<double>> points;
 };
 
 /// The normal equations at one state.
@@ -67,20 +67,17 @@ inline namespace CFP_ISA {
 template <typename Camera>
 void project_chunk(const Camera& camera, const BundlePose& pose, int count, BundleChunk& chunk) noexcept {
   using Real = typename Camera::ScalarType;
-  const double* R = pose.rotation;
+  const Matrix3<double> R = pose.rotation;
   for (int i = 0; i < count; ++i) {
-    const double x = chunk.d[0][i], y = chunk.d[1][i], z = chunk.d[2][i];
-    const Vector3<double> p(R[0] * x + R[1] * y + R[2] * z, R[3] * x + R[4] * y + R[5] * z,
-                            R[6] * x + R[7] * y + R[8] * z);
+    const Vector3<double> p = R * Vector3<double>(chunk.d[0][i], chunk.d[1][i], chunk.d[2][i]);
     Vector2<Real> pixel = Vector2<Real>::Zero();
     Matrix23<Real> A = Matrix23<Real>::Zero();
     const bool seen = camera.project(p.template cast<Real>(), pixel, &A);
+    const Matrix23<double> rows = A.template cast<double>().lazyProduct(R);
     chunk.depth[i] = seen ? p.z() : 0.0;
     for (int r = 0; r < 2; ++r) {
       chunk.residual[r][i] = static_cast<double>(pixel[r]);
-      for (int c = 0; c < 3; ++c)
-        chunk.row[r][c][i] = static_cast<double>(A(r, 0)) * R[c] + static_cast<double>(A(r, 1)) * R[3 + c] +
-                             static_cast<double>(A(r, 2)) * R[6 + c];
+      for (int c = 0; c < 3; ++c) chunk.row[r][c][i] = rows(r, c);
     }
   }
 }
@@ -88,28 +85,29 @@ void project_chunk(const Camera& camera, const BundlePose& pose, int count, Bund
 /// The same for the pinhole camera, without a branch.
 template <typename Real>
 void project_chunk(const PinholeCamera<Real>& camera, const BundlePose& pose, int count, BundleChunk& chunk) noexcept {
-  const double* R = pose.rotation;
+  const Matrix3<double> R = pose.rotation;
   const auto fx = static_cast<double>(camera.fx), fy = static_cast<double>(camera.fy);
   const auto cx = static_cast<double>(camera.cx), cy = static_cast<double>(camera.cy);
   for (int i = 0; i < count; ++i) {
     const double x = chunk.d[0][i], y = chunk.d[1][i], z = chunk.d[2][i];
-    const double depth = R[6] * x + R[7] * y + R[8] * z;
+    const double depth = R(2, 0) * x + R(2, 1) * y + R(2, 2) * z;
     const double inv_z = 1 / depth;
-    const double a = (R[0] * x + R[1] * y + R[2] * z) * inv_z, b = (R[3] * x + R[4] * y + R[5] * z) * inv_z;
+    const double a = (R(0, 0) * x + R(0, 1) * y + R(0, 2) * z) * inv_z,
+                 b = (R(1, 0) * x + R(1, 1) * y + R(1, 2) * z) * inv_z;
     const double su = fx * inv_z, sv = fy * inv_z;
     chunk.depth[i] = depth;
     chunk.residual[0][i] = fx * a + cx;
     chunk.residual[1][i] = fy * b + cy;
     for (int c = 0; c < 3; ++c) {
-      chunk.row[0][c][i] = su * (R[c] - a * R[6 + c]);
-      chunk.row[1][c][i] = sv * (R[3 + c] - b * R[6 + c]);
+      chunk.row[0][c][i] = su * (R(0, c) - a * R(2, c));
+      chunk.row[1][c][i] = sv * (R(1, c) - b * R(2, c));
     }
   }
 }
 
 /// Residuals, omega and the cost of the chunk.
 template <bool Stereo, typename Loss>
-double weigh_chunk(int padded, double baseline_fx, const Loss& loss, const double* rotation,
+double weigh_chunk(int padded, double baseline_fx, const Loss& loss, const Matrix3<double>& rotation,
                    BundleChunk& chunk) noexcept {
   double cost = 0;
   for (int i = 0; i < padded; ++i) {
@@ -120,7 +118,7 @@ double weigh_chunk(int padded, double baseline_fx, const Loss& loss, const doubl
       chunk.residual[2][i] = ru + chunk.disparity[i] - baseline_fx / chunk.depth[i];
       s += chunk.residual[2][i] * chunk.residual[2][i];
       const double t = baseline_fx / (chunk.depth[i] * chunk.depth[i]);
-      for (int c = 0; c < 3; ++c) chunk.row[2][c][i] = chunk.row[0][c][i] + t * rotation[6 + c];
+      for (int c = 0; c < 3; ++c) chunk.row[2][c][i] = chunk.row[0][c][i] + t * rotation(2, c);
     }
     s *= chunk.information[i];
     const bool seen = chunk.depth[i] > Tolerance<double>::min_depth;
@@ -191,7 +189,7 @@ inline void store_pose(const BundlePoseSums& sums, double* target) noexcept {
 /// One range of observations of one pose: fills its slots, adds to the pose's sums and returns the cost.
 template <bool Stereo, typename Camera, typename Loss>
 double linearize_range(span<const BundleMeasurement> range, const Camera& camera, double baseline_fx, const Loss& loss,
-                       const BundlePose& pose, const std::vector<double>& points, std::vector<double>& slots,
+                       const BundlePose& pose, const std::vector<Vector3<double>>& points, std::vector<double>& slots,
                        BundlePoseSums& sums) noexcept {
   BundleChunk chunk;
   double cost = 0;
@@ -200,7 +198,7 @@ double linearize_range(span<const BundleMeasurement> range, const Camera& camera
     const int padded = (count + BundleChunk::lanes - 1) / BundleChunk::lanes * BundleChunk::lanes;
     for (int i = 0; i < padded; ++i) {
       const BundleMeasurement& m = range[first + to_index((std::min)(i, count - 1))];
-      for (int c = 0; c < 3; ++c) chunk.d[c][i] = points[to_index(3 * m.point + c)] - pose.center[c];
+      for (int c = 0; c < 3; ++c) chunk.d[c][i] = points[to_index(m.point)][c] - pose.center[c];
       chunk.u[i] = m.u, chunk.v[i] = m.v, chunk.disparity[i] = m.disparity;
       chunk.weight[i] = i < count ? m.weight : 0, chunk.information[i] = m.information;
     }
