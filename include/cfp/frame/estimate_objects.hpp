@@ -84,11 +84,9 @@ void collect_object_distances(const Frame<Scalar>& frame, const TrackedBox<Scala
   scratch.mask.assign(scratch.samples.size(), char(1));
   const ForegroundInput<Scalar> in{scratch.depths, scratch.points, box.box, remembered_depth(box, state)};
   if (depth_foreground(in, options.foreground, scratch.foreground, scratch.mask).status != ForegroundStatus::ok) return;
-  std::size_t kept = 0;
   for (std::size_t i = 0; i < scratch.samples.size(); ++i) {
-    if (scratch.mask[i] != 0) scratch.samples[kept++] = scratch.samples[i];
+    if (scratch.mask[i] == 0) scratch.samples[i] = Scalar(no_distance<double>);
   }
-  scratch.samples.resize(kept);
 }
 
 }  // namespace CFP_ISA

@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "cfp/math/matrix3.hpp"
-#include "cfp/math/so3.hpp"
 #include "cfp/robust/fundamental_pairs_impl.hpp"
 
 namespace cfp::detail {

@@ -200,10 +200,8 @@ PoseResult refine_pose_with(const PoseObservations<Input>& observations, const C
   }
   result.T_cam_world = {pose.rotation, pose.translation - pose.rotation * centre};
   const double scale = model.influence > 0 ? counted / model.influence : 1.0;
-  for (int i = 0; i < 6; ++i) {
-    for (int j = 0; j < 6; ++j)
-      result.information(i, j) = equations.H((std::min)(i, j), (std::max)(i, j)) * model.columns.mean_weight * scale;
-  }
+  const Matrix6<double> H = equations.H.selfadjointView<Eigen::Upper>();
+  result.information = H * model.columns.mean_weight * scale;
   return result;
 }
 
