@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "cfp/core/options.hpp"
-#include "cfp/math/logistic.hpp"
 
 namespace cfp {
 
@@ -46,17 +45,17 @@ struct MapPointOptions {
 namespace detail {
 inline namespace CFP_ISA {
 
-/// log(p / (1 - p)) of p kept in [limit, 1 - limit].
+/// The odds against p, (1 - p) / p, of p kept in [limit, 1 - limit].
 template <typename Scalar>
-[[nodiscard]] Scalar bounded_log_odds(Scalar p, Scalar limit) noexcept {
-  using std::log;
+[[nodiscard]] Scalar odds_against(Scalar p, Scalar limit) noexcept {
   const Scalar bounded = (std::min)((std::max)(p, limit), Scalar(1) - limit);
-  return log(bounded / (Scalar(1) - bounded));
+  return (Scalar(1) - bounded) / bounded;
 }
 
 template <typename Scalar>
 [[nodiscard]] Scalar log_odds_update(Scalar k, Scalar m, Scalar rate, Scalar limit) noexcept {
-  const Scalar updated = logistic(bounded_log_odds(m, limit) + rate * bounded_log_odds(k, limit));
+  using std::pow;
+  const Scalar updated = Scalar(1) / (Scalar(1) + odds_against(m, limit) * pow(odds_against(k, limit), rate));
   // A K beyond the bound never lowers M: a point that was never in doubt keeps the weight 1 that it has without this
   // library.
   return k > Scalar(1) - limit && updated < m ? m : (std::min)((std::max)(updated, limit), Scalar(1) - limit);
@@ -104,11 +103,12 @@ template <typename Scalar>
 template <typename Scalar>
 [[nodiscard]] Scalar posterior_probability(Scalar keypoint_probability, Scalar object_evidence,
                                            Scalar map_point_probability, const MapPointOptions& options) noexcept {
-  const auto evidence = [limit = Scalar(options.evidence_limit)](Scalar p) {
-    return detail::bounded_log_odds(clamp_probability(p), limit);
+  using std::pow;
+  const auto against = [limit = Scalar(options.evidence_limit)](Scalar p) {
+    return detail::odds_against(clamp_probability(p), limit);
   };
-  return logistic(evidence(map_point_probability) + evidence(object_evidence) +
-                  Scalar(options.constraint_power) * evidence(keypoint_probability));
+  return Scalar(1) / (Scalar(1) + against(map_point_probability) * against(object_evidence) *
+                                      pow(against(keypoint_probability), Scalar(options.constraint_power)));
 }
 
 /// M < 0.3: the host should delete the map point.
