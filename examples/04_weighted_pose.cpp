@@ -9,8 +9,8 @@
 
 int main() {
   const cfp::PinholeCamera<double> camera{535.4, 539.2, 320.1, 247.6};
-  const cfp::SE3<double> truth{cfp::so3_exp<double>({0.1, -0.4, 0.05}), {0.3, -0.1, 0.2}};
-  const cfp::SE3<double> start{cfp::so3_exp<double>({0.01, 0.01, -0.01}) * truth.rotation,
+  const cfp::SE3<double> truth{cfp::so3_exp({0.1, -0.4, 0.05}), {0.3, -0.1, 0.2}};
+  const cfp::SE3<double> start{cfp::so3_exp({0.01, 0.01, -0.01}) * truth.rotation,
                                truth.translation};  // from a motion model, say
 
   // 400 map points and where they were matched; the first 240 are on the person, who took a step of 15 cm to the right.

@@ -81,7 +81,8 @@ class HogDetector final : public Detector {
       // The window it was trained with leaves a margin around the person.
       const auto w = static_cast<float>(found[i].width), h = static_cast<float>(found[i].height);
       const auto x = static_cast<float>(found[i].x) + 0.1F * w, y = static_cast<float>(found[i].y) + 0.07F * h;
-      const auto box = cfp::clip<float>({x, y, x + 0.8F * w, y + 0.8F * h}, float(bgr.cols), float(bgr.rows));
+      const cfp::Box<float> whole{x, y, x + 0.8F * w, y + 0.8F * h};
+      const auto box = cfp::clip(whole, float(bgr.cols), float(bgr.rows));
       if (cfp::is_proper(box)) detections.push_back({box, 0, static_cast<float>(margins[i])});
     }
     return detections;

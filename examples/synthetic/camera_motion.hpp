@@ -49,8 +49,8 @@ class CameraMotion {
         // One axis after the other, as the operators did, with a little of the others.
         T.translation += Eigen::Vector3d(axis(time, 0) * 0.28 * wave(5.2, 0), axis(time, 1) * 0.25 * wave(5.6, 1),
                                          axis(time, 2) * 0.22 * wave(5.0, 2));
-        T.rotation = T.rotation * cfp::so3_exp<double>(
-                                      Eigen::Vector3d(0.038 * wave(3.4, 3), 0.047 * wave(4.1, 4), 0.03 * wave(3, 2)));
+        T.rotation =
+            T.rotation * cfp::so3_exp(Eigen::Vector3d(0.038 * wave(3.4, 3), 0.047 * wave(4.1, 4), 0.03 * wave(3, 2)));
         break;
       case Motion::halfsphere: {
         const double azimuth = 1.35 * wave(13, 0), elevation = 0.55 + 0.6 * wave(9, 1), r = 0.5 * gain;
@@ -58,14 +58,14 @@ class CameraMotion {
                                            r * (0.5 - std::cos(elevation) * std::cos(azimuth)),
                                            r * (std::sin(elevation) - 0.4)),
                     target);
-        T.rotation = T.rotation * cfp::so3_exp<double>(
-                                      Eigen::Vector3d(0.13 * wave(3.4, 2), 0.21 * wave(3.9, 3), 0.14 * wave(4.6, 4)));
+        T.rotation =
+            T.rotation * cfp::so3_exp(Eigen::Vector3d(0.13 * wave(3.4, 2), 0.21 * wave(3.9, 3), 0.14 * wave(4.6, 4)));
         break;
       }
       case Motion::rpy: {
         const Eigen::Vector3d w(axis(time, 0) * 0.30 * wave(4.4, 0), axis(time, 1) * 0.48 * wave(5.2, 1),
                                 axis(time, 2) * 0.42 * wave(4.7, 2));
-        T.rotation = T.rotation * cfp::so3_exp<double>(w);
+        T.rotation = T.rotation * cfp::so3_exp(w);
         T.translation += Eigen::Vector3d(0.065 * wave(4.9, 3), 0.045 * wave(5.7, 4), 0.055 * wave(4.3, 2));
         break;
       }
@@ -77,7 +77,7 @@ class CameraMotion {
       t[a] = k * (0.004 * wave(3.1 + a, 5 + a) + 0.0003 * wave(0.21 + 0.03 * a, 8 + a));
       w[a] = k * (0.004 * wave(2.7 + a, 11 + a) + 0.0006 * wave(0.19 + 0.02 * a, 14 + a));
     }
-    return T * cfp::SE3<double>{cfp::so3_exp<double>(w), t};
+    return T * cfp::SE3<double>{cfp::so3_exp(w), t};
   }
 
  private:

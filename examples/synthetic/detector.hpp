@@ -38,7 +38,7 @@ class Detector {
                                 int height) {
     std::vector<Detection> found;
     const auto add = [&](cfp::Box<double> box, double score) {
-      box = cfp::clip<double>(box, width, height);
+      box = cfp::clip(box, width, height);
       if (cfp::area(box) > 100) found.push_back({box, std::clamp(score, 0.26, 0.97)});
     };
     for (std::size_t who = 0; who < people.size(); ++who) {

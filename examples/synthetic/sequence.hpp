@@ -117,7 +117,7 @@ class Sequence {
   [[nodiscard]] double rotation_rate(int frame) const {
     const int other = frame == 0 ? std::min(1, options_.frames - 1) : frame - 1;
     const double dt = std::max(1e-3, std::abs(time_of(frame) - time_of(other)));
-    return cfp::so3_log<double>(T_world_cam(other).rotation.transpose() * T_world_cam(frame).rotation).norm() / dt;
+    return cfp::so3_log((T_world_cam(other).inverse() * T_world_cam(frame)).rotation).norm() / dt;
   }
   /// Everything in the scene at a time, people last.
   [[nodiscard]] std::vector<Surface> surfaces_at(double time) const {

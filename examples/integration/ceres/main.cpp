@@ -29,8 +29,8 @@ Scene MakeScene(std::uint64_t seed) {
     return cfp::Vector3<double>(size * random.normal(), size * random.normal(), size * random.normal());
   };
   Scene scene;
-  const cfp::SE3<double> truth{cfp::so3_exp<double>(vector(1)), vector(2)};
-  scene.start = cfp::SE3<double>{cfp::so3_exp<double>(vector(0.01)), vector(0.02)} * truth;
+  const cfp::SE3<double> truth{cfp::so3_exp(vector(1)), vector(2)};
+  scene.start = cfp::SE3<double>{cfp::so3_exp(vector(0.01)), vector(0.02)} * truth;
   const cfp::SE3<double> T_world_cam = truth.inverse();
   for (int i = 0; i < 250; ++i) {
     const bool moves = i < 75;

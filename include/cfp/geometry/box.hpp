@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "cfp/core/numeric.hpp"
+#include "cfp/core/span.hpp"
 
 namespace cfp {
 
@@ -58,7 +59,8 @@ template <typename Scalar>
 /// The part of the box inside the image [0, image_width] x [0, image_height]; improper when it lies outside or the
 /// image has no size.
 template <typename Scalar>
-[[nodiscard]] constexpr Box<Scalar> clip(const Box<Scalar>& box, Scalar image_width, Scalar image_height) noexcept {
+[[nodiscard]] constexpr Box<Scalar> clip(const Box<Scalar>& box, non_deduced<Scalar> image_width,
+                                         non_deduced<Scalar> image_height) noexcept {
   return intersection(box, Box<Scalar>{Scalar(0), Scalar(0), image_width, image_height});
 }
 
