@@ -23,6 +23,7 @@ void for_each_option(Options& o, const Visit& visit) {
   visit("keypoint_sigma_px", o.keypoint_sigma_px);
   visit("baseline_fx", o.baseline_fx);
   visit("unproven_share", o.unproven_share);
+  visit("min_known_share", o.min_known_share);
   visit("probability.object_threshold", p.object_threshold);
   visit("probability.min_creation_probability", p.min_creation_probability);
   visit("probability.min_inlier_weight", p.min_inlier_weight);

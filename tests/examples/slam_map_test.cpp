@@ -56,6 +56,25 @@ TEST_CASE("The place of a point that has gone is another's only when nobody know
   CHECK(map.points.size() == 2);
 }
 
+TEST_CASE("A world that is given up leaves the others as they were", "[slam]") {
+  Map map;
+  const int a = map.add({}), once = map.add({});
+  add_keyframe(map, {a, once});
+  for (int k = 0; k < 3; ++k) add_keyframe(map, {a});
+  REQUIRE_FALSE(map.is_proven(once));
+  CHECK(map.begin_world() == 1);
+  CHECK(map.is_proven(once));  // nothing is known of the new world, and all that is seen counts
+  const int b = map.add({});
+  add_keyframe(map, {b, a});
+  map.drop_world();
+  CHECK(map.newest_world() == 0);
+  CHECK(map.keyframes.size() == 4);
+  CHECK_FALSE(map.is_alive(b));
+  CHECK(map.point(a).observations.size() == 4);
+  CHECK(map.is_proven(a));
+  CHECK_FALSE(map.is_proven(once));
+}
+
 TEST_CASE("Keyframes whose points three others see go, and with them nothing that is needed", "[slam]") {
   Map map;
   std::vector<int> points;

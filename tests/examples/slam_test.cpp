@@ -234,18 +234,20 @@ const std::filesystem::path& empty_room() {
 }
 
 /// That room under a stress.
-StressResult under(const char* name, std::vector<FrameRecord>& records) {
+StressResult under(const Stress& stress, std::vector<FrameRecord>& records) {
   const Sequence sequence(empty_room());
-  for (const Stress& stress : stresses(120, 30, sequence.calibration())) {
-    if (stress.name != name) continue;
-    NoDetector none;
-    StressedDetector detector(none, sequence, stress);
-    StressObserver observer;
-    Options options;
-    options.threads = false;
-    const RunResult result = run_slam(stressed(sequence, stress, 120), detector, options, observer);
-    records = observer.records;
-    return judge(sequence, stress, records, result);
+  NoDetector none;
+  StressedDetector detector(none, sequence, stress);
+  StressObserver observer;
+  Options options;
+  options.threads = false;
+  const RunResult result = run_slam(stressed(sequence, stress, 120), detector, options, observer);
+  records = observer.records;
+  return judge(sequence, stress, records, result);
+}
+StressResult under(const char* name, std::vector<FrameRecord>& records) {
+  for (const Stress& stress : stresses(120, 30, Sequence(empty_room()).calibration())) {
+    if (stress.name == name) return under(stress, records);
   }
   FAIL("no stress " << name);
   return {};
@@ -273,6 +275,28 @@ TEST_CASE("What crosses the view and no detector knows does not take the camera 
   const StressResult result = under("board over 40 %", records);
   CHECK(result.wrong == 0);
   CHECK(result.right >= 105);
+}
+
+TEST_CASE("A new map of what covers the view is given up when that goes, and no pose in it was called tracked",
+          "[slam]") {
+  const double units = Sequence(empty_room()).calibration().depth_units_per_metre;
+  Stress stress;
+  stress.name = "board over all";
+  stress.first = 45;
+  stress.last = 95;
+  stress.image = [=](std::size_t k, cfp_examples::SequenceFrame& f) {
+    cfp_slam::detail::carry_board(0.3 + 0.4 * static_cast<double>(k - 45) / 50, 3.0, 1.1, units, f);
+  };
+  std::vector<FrameRecord> records;
+  const StressResult result = under(stress, records);
+  CAPTURE(result.reported);
+  CHECK(result.reported.find("1x new map") != std::string::npos);
+  CHECK(result.reported.find("1x the new map is given up") != std::string::npos);
+  for (std::size_t k = 45; k < 95; ++k) CHECK(records[k].outcome != Outcome::tracked);
+  CHECK(records.back().outcome == Outcome::tracked);
+  CHECK(result.wrong == 0);
+  CHECK(result.right == result.poses);
+  CHECK(result.poses <= 70);  // none of those before the board is left
 }
 
 TEST_CASE("A camera that goes there and back needs no larger map the longer it does", "[slam]") {

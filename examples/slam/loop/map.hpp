@@ -53,23 +53,34 @@ class Map {
   }
   // Whether keyframes agree about it, as soon as there are some in its world.
   [[nodiscard]] bool is_proven(int index) const {
-    return keyframes.size() < first_of_world_ + 3 || point(index).observations.size() >= 2;
+    return keyframes.size() < first_of_world_.back() + 3 || point(index).observations.size() >= 2;
   }
   // The keyframes to come are in a world of their own.
   int begin_world() {
-    first_of_world_ = keyframes.size();
-    return ++newest_world_;
+    first_of_world_.push_back(keyframes.size());
+    return newest_world();
   }
-  [[nodiscard]] int newest_world() const { return newest_world_; }
+  [[nodiscard]] int newest_world() const { return static_cast<int>(first_of_world_.size()) - 1; }
+  // As if the newest world had never been. Precondition: it is not the first one, and not part of another.
+  void drop_world() {
+    const std::size_t first = first_of_world_.back();
+    first_of_world_.pop_back();
+    for (std::size_t k = first; k < keyframes.size(); ++k) {
+      for (const int p : std::vector<int>(keyframes[k].frame.map_point)) {
+        if (is_alive(p)) erase_observation(p, static_cast<int>(k));
+      }
+    }
+    keyframes.erase(keyframes.begin() + static_cast<std::ptrdiff_t>(first), keyframes.end());
+  }
   // Moves the newest world onto another, of which it is a part from now on.
   void join(int other, const cfp::SE3<double>& T_other_newest) {
     for (MapPoint& p : points) {
-      if (!p.alive || keyframe(p.created_by).world != newest_world_) continue;
+      if (!p.alive || keyframe(p.created_by).world != newest_world()) continue;
       p.position = T_other_newest * p.position;
       p.normal = T_other_newest.rotation * p.normal;
     }
     for (Keyframe& k : keyframes) {
-      if (k.world != newest_world_) continue;
+      if (k.world != newest_world()) continue;
       k.frame.T_cam_world = k.frame.T_cam_world * T_other_newest.inverse();
       k.world = other;
     }
@@ -168,8 +179,7 @@ class Map {
 
  private:
   std::vector<int> dead_, free_;  // points that have gone: since the last recycle(), and before
-  int newest_world_ = 0;
-  std::size_t first_of_world_ = 0;
+  std::vector<std::size_t> first_of_world_{0};
 };
 
 }  // namespace cfp_slam

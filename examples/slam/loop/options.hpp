@@ -50,8 +50,8 @@ struct Options {
   int max_idle = 30;                   // frames over which boxes are carried on while the detector is not believed
   double new_map_after_s = 1;          // of being lost
   cfp::FrameIntervalOptions interval;  // the motion model is not asked over a gap
-  double unproven_share = 0.1;         // in the pose: weight of what fewer than two keyframes saw, relative to all else
-  double min_known_share = 0.1;        // of the proven points that should be in view: fewer found, and it is not there
+  double unproven_share = 0.01;        // in the pose: weight of what fewer than two keyframes saw, relative to all else
+  double min_known_share = 0.05;       // of the proven points that should be in view: fewer found, and it is not there
   int probation = 5;                   // frames after a relocalisation in which the map learns nothing
   std::size_t enough_matches = 40;     // with the last frame; with fewer the search is widened
   std::size_t min_initial_points = 100;
@@ -66,11 +66,12 @@ struct Options {
     health.max_rotation_sigma_rad = 0.05;
     return health;
   }
-  // Nothing but the image speaks for it.
+  // Nothing but the image speaks for it: 2.5 standard deviations are the 5 cm of a right pose.
   static cfp::PoseHealthOptions relocalised_pose_health() {
     cfp::PoseHealthOptions health;
     health.min_inliers = 30;
     health.min_inlier_share = 0.4;
+    health.max_position_sigma_m = 0.02;
     return health;
   }
 

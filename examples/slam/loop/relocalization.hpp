@@ -26,7 +26,8 @@ class Relocalization {
     return from_keyframes(frame, map, 8, -1, probability, camera);
   }
 
-  // The same from so many keyframes, going on where the last call ended, but none of world `not_of`.
+  // The same from so many keyframes, going on where the last call ended, but none of world `not_of`. What was found
+  // with one of these is looked for there again.
   bool from_keyframes(Frame& frame, const Map& map, int most, int not_of,
                       const cfp::StaticProbability<Camera>& probability, const cfp::PinholeCamera<float>& camera) {
     // The newest first, a few in each lost frame, so that a lost frame costs no more than a bounded time.
@@ -37,7 +38,7 @@ class Relocalization {
       if (keyframe.world == not_of || keyframe.parent >= 0) continue;
       ++tries;
       if (try_points(frame, map, keyframe.frame.map_point, probability, camera)) {
-        next_ = 0;
+        next_ = not_of < 0 ? 0 : next_ - 1;
         return true;
       }
     }

@@ -61,6 +61,7 @@ class Tracking {
     if (map_.keyframes.empty()) {
       initialize(frame, record);
     } else {
+      follow_trial(frame, record);
       follow_probation(frame, record);
       if (frame.has_pose) {
         world_ = map_.keyframe(local_map_.reference()).world;
@@ -101,6 +102,10 @@ class Tracking {
     double time_s = 0;
     int reference = 0;
     cfp::SE3<double> T_cam_reference;
+  };
+  struct Trial {  // of the newest map
+    double end_s = 0;
+    std::size_t first_pose = 0;  // of poses_
   };
 
   static void note(FrameRecord& record, const std::string& what) {
@@ -202,14 +207,45 @@ class Tracking {
 
   // With the local map.
   void second_pose(Frame& frame, cfp::span<const float> weight) {
+    if (relocalised_) (void)from_local_map(frame, local_map_, weight, true);
+    pose_ = from_local_map(frame, local_map_, weight, false);
+    frame.has_pose = pose_.health.ok();
+  }
+
+  // What is new is searched for twice: a wide search finds many a wrong match, a narrow one from there tells what the
+  // pose is worth.
+  RefinedPose from_local_map(Frame& frame, LocalMap& local_map, cfp::span<const float> weight, bool wide) {
     {
       const Part part(observer_, Module::matching);
-      local_map_.search(frame, grid_, map_, view_, relocalised_);
+      local_map.search(frame, grid_, map_, view_, wide);
     }
     const Part part(observer_, Module::pose);
-    pose_ = refine(frame, weight, local_map_.expected_proven(), true,
-                   relocalised_ ? options_.relocalised_health : options_.health);
-    frame.has_pose = pose_.health.ok();
+    return refine(frame, weight, local_map.expected_proven(), true,
+                  relocalised_ ? options_.relocalised_health : options_.health);
+  }
+
+  // What took the view may take it for as long again as it has: so long a new map is on trial. Is it lost within that,
+  // or an older one found, it goes, with its poses.
+  void follow_trial(const Frame& frame, FrameRecord& record) {
+    if (!trial_) return;
+    const int reference = local_map_.reference();
+    const bool in_it = frame.has_pose && map_.keyframe(reference).world == map_.newest_world();
+    if (!in_it) {
+      end_trial(record);
+      local_map_.set_reference(frame.has_pose ? reference : 0);
+      seen_s_ = frame.time_s;
+    } else if (frame.time_s >= trial_->end_s) {
+      trial_.reset();
+    }
+  }
+  void end_trial(FrameRecord& record) {
+    take_bundle(true);
+    poses_.resize(trial_->first_pose);
+    map_.drop_world();
+    trial_.reset();
+    believed_.reset();
+    probation_ = 0;
+    note(record, "the new map is given up, its poses are taken back");
   }
 
   // A pose from the map alone is on probation until some frames have been tracked from it. When it turns out to have
@@ -272,12 +308,15 @@ class Tracking {
     world_ = map_.begin_world();
     frames_since_join_ = 0;
     T_old_new_.reset();
+    trial_ = Trial{2 * frame.time_s - seen_s_, poses_.size()};
     initialize(frame, record);
+    record.outcome = Outcome::relocalised;
     note(record, "new map");
     return true;
   }
 
-  // Looks for the older maps now and then. Two finds in a row that agree join the newest map to the one found.
+  // Looks for the older maps now and then. Two finds in a row that agree join the newest map to the one found, or do
+  // without it, if it is on trial.
   void join_worlds(Frame& frame, FrameRecord& record) {
     constexpr int interval = 5;             // frames
     const int world = map_.newest_world();  // the one that can be joined
@@ -290,20 +329,27 @@ class Tracking {
     std::optional<cfp::SE3<double>> T_old_new;
     if (relocalize_.from_keyframes(probe, map_, 3, world, probability_, view_.camera)) {
       LocalMap around(options_.features);
-      around.search(probe, grid_, map_, view_, true);
       relocalised_ = true;  // the step to this pose is none of the camera's
-      if (refine(probe, frame.static_probability, around.expected_proven(), true, options_.relocalised_health)
-              .health.ok())
-        T_old_new = probe.T_cam_world.inverse() * frame.T_cam_world;
+      (void)from_local_map(probe, around, frame.static_probability, true);
+      const RefinedPose pose = from_local_map(probe, around, frame.static_probability, false);
       relocalised_ = false;
+      if (pose.health.ok()) T_old_new = probe.T_cam_world.inverse() * frame.T_cam_world;
       if (T_old_new && T_old_new_ && agree(*T_old_new, *T_old_new_, frame)) {
         take_bundle(true);
-        map_.join(map_.keyframe(around.reference()).world, *T_old_new);
-        note(record, "joined to the old map");
         last_.T_cam_world = last_.T_cam_world * T_old_new->inverse();
         frame = probe;
+        pose_ = pose;
         local_map_.set_reference(around.reference());
         world_ = map_.keyframe(around.reference()).world;
+        if (trial_) {
+          end_trial(record);
+          relocalised_ = true;
+          probation_ = options_.probation;
+          first_on_probation_ = poses_.size();
+        } else {
+          map_.join(world_, *T_old_new);
+          note(record, "joined to the old map");
+        }
       }
     }
     T_old_new_ = T_old_new;
@@ -317,7 +363,7 @@ class Tracking {
 
   void extend_map(Frame& frame, FrameRecord& record) {
     const bool on_probation = relocalised_ || probation_ > 0;
-    record.outcome = on_probation ? Outcome::relocalised : Outcome::tracked;
+    record.outcome = on_probation || trial_ ? Outcome::relocalised : Outcome::tracked;
     update_points(map_, frame, probability_, !on_probation, detector_ok_);
     ++frames_since_keyframe_;
     if (!on_probation &&
@@ -379,6 +425,7 @@ class Tracking {
   double seen_s_ = 0;                          // when that was
   std::optional<cfp::SE3<double>> T_old_new_;  // of the last look for older maps
   int frames_since_join_ = 0;
+  std::optional<Trial> trial_;
   std::vector<std::int32_t> no_match_;
   int probation_ = 0;                   // frames left
   std::size_t first_on_probation_ = 0;  // of poses_
