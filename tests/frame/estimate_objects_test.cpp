@@ -27,6 +27,25 @@ TEST_CASE("The host's F is taken as it is", "[frame]") {
   CHECK(run.state.objects[0].static_probability != objects[0].static_probability);
 }
 
+TEST_CASE("The host's motion is taken as it is", "[frame]") {
+  cfp_test::DynamicSceneOptions standing;
+  standing.person_motion_m = 0;
+  const DynamicScene<double> scene = make_dynamic_scene<double>(standing, 61);
+  FrameRun<double> run(scene);
+  cfp::Frame<double> frame = run.frame();
+  frame.flow.previous_depths = scene.previous_depths;
+  frame.T_cur_prev = scene.T_cur_prev;
+  const cfp::FrameReport report = run.coarse({}, frame, scene.camera);
+  CHECK(report.flow_model == cfp::FlowModelKind::motion);
+  CHECK(report.flow_support == cfp::FlowSupport::caller);
+  CHECK(report.unknown_objects == 0);
+  const std::vector<cfp::ObjectProbability> objects = run.state.objects;
+  frame.T_cur_prev = scene.T_cur_prev.inverse();
+  FrameRun<double> other(scene);
+  other.coarse({}, frame, scene.camera);
+  CHECK(other.state.objects[0].static_probability < objects[0].static_probability);
+}
+
 TEST_CASE("Through a lens O is measured in the undistorted image", "[frame]") {
   const DynamicScene<double> straight = make_dynamic_scene<double>({}, 62);
   const auto& c = straight.camera;
