@@ -65,7 +65,7 @@ template <typename Scalar>
   const Scalar target_x = (pixel.x() - camera.cx) / camera.fx;
   const Scalar target_y = (pixel.y() - camera.cy) / camera.fy;
   Scalar error_sq = target_x * target_x + target_y * target_y;
-  // With the factors that the fold's polynomial gives the coefficients: what is no ray there is none here.
+  // With the factors they have in the polynomial of the fold: where that is not finite, nothing is projected.
   const Scalar radial = Scalar(3) * camera.k1 + Scalar(5) * camera.k2 + Scalar(7) * camera.k3;
   if (!is_finite(error_sq) || !is_finite(Scalar(radial + camera.p1 + camera.p2))) return false;
   const Scalar unit_roundoff(std::numeric_limits<Scalar>::epsilon());
