@@ -18,14 +18,15 @@ class MotionModel {
 
   [[nodiscard]] Prediction predict(const Frame& last, double time_s, const View& view) const {
     if (!last.has_pose || !velocity_ || !(time_s > last.time_s)) return {last.T_cam_world, std::nullopt};
-    const cfp::SE3<double> motion = cfp::se3_exp<double>(*velocity_ * std::min(time_s - last.time_s, longest_s));
+    const cfp::Vector6<double> step = *velocity_ * std::min(time_s - last.time_s, longest_s);
+    const cfp::SE3<double> motion = cfp::se3_exp(step);
     return {motion * last.T_cam_world, cfp::rotation_homography(view.camera, motion.rotation.cast<float>())};
   }
 
   void learn(const Frame& last, const Frame& frame) {
     velocity_.reset();
     if (frame.has_pose && last.has_pose && frame.time_s > last.time_s)
-      velocity_ = cfp::se3_log<double>(frame.T_cam_world * last.T_cam_world.inverse()) / (frame.time_s - last.time_s);
+      velocity_ = cfp::se3_log(frame.T_cam_world * last.T_cam_world.inverse()) / (frame.time_s - last.time_s);
   }
 
  private:

@@ -261,9 +261,10 @@ class Tracking {
     probation_ = !frame.has_pose ? 0 : relocalised_ ? options_.probation : std::max(probation_ - 1, 0);
   }
   [[nodiscard]] bool is_jump(const Frame& frame) const {
-    return believed_ && cfp::is_jump<double>(
-                            {frame.T_cam_world * believed_->T_cam_world.inverse(), frame.time_s - believed_->time_s},
-                            options_.health);
+    if (!believed_) return false;
+    const cfp::PoseStep<double> step{frame.T_cam_world * believed_->T_cam_world.inverse(),
+                                     frame.time_s - believed_->time_s};
+    return cfp::is_jump(step, options_.health);
   }
 
   // The stage's weights hold M of what the last frame saw; that of points which joined since comes on top.
@@ -358,7 +359,7 @@ class Tracking {
   // Where the camera of a frame is by two transformations.
   static bool agree(const cfp::SE3<double>& a, const cfp::SE3<double>& b, const Frame& frame) {
     const cfp::SE3<double> difference = (a * frame.T_cam_world.inverse()).inverse() * (b * frame.T_cam_world.inverse());
-    return difference.translation.norm() < 0.05 && cfp::so3_log<double>(difference.rotation).norm() < 0.03;
+    return difference.translation.norm() < 0.05 && cfp::so3_log(difference.rotation).norm() < 0.03;
   }
 
   void extend_map(Frame& frame, FrameRecord& record) {
