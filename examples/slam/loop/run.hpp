@@ -14,6 +14,7 @@ namespace cfp_slam {
 
 // The frames that a run sees, in the order of time: a recording's, or what somebody made of them.
 struct FrameSource {
+  FrameSource() = default;
   // The recording must stay.
   FrameSource(const cfp_examples::Sequence& sequence)  // NOLINT: a recording is a source
       : calibration(sequence.calibration()),
@@ -23,7 +24,7 @@ struct FrameSource {
 
   cfp_examples::TumCamera calibration;
   cfp::RadialTangentialCamera<double> camera;
-  std::size_t size;
+  std::size_t size = 0;
   std::function<cfp_examples::SequenceFrame(std::size_t)> load;
 };
 
