@@ -3,8 +3,7 @@
 /// detections of this one, and what finds no detection is output as a *compensated* box; every output box says whether
 /// its object had a box in frame k-1. Departures: the paper filters twice per frame (to compensate, then to associate
 /// adjacent frames). Here one track carries both answers, since a compensated box belongs to its track by construction;
-/// and how long a box may be compensated, which the paper leaves open, is an option. Association: minimum of
-/// sum(1 - IoU), gated, per class ("Hungarian algorithm").
+/// and how long a box may be compensated, which the paper leaves open, is an option.
 #pragma once
 
 #include <algorithm>
@@ -12,37 +11,12 @@
 #include <vector>
 
 #include "cfp/core/types.hpp"
-#include "cfp/detection/assignment.hpp"
+#include "cfp/detection/box_association.hpp"
 #include "cfp/detection/box_motion.hpp"
 #include "cfp/detection/box_tracker_types.hpp"
 
 namespace cfp {
-
-struct BoxAssociationWorkspace {
-  std::vector<double> costs;
-  AssignmentWorkspace assignment;
-};
-
 inline namespace CFP_ISA {
-
-/// partner[i] (one per left box) becomes the index of the right box associated with left box i, or `unassigned`. `left`
-/// and `right` are vectors of anything with a `box` and a `class_id`, such as Detection. Pairs need equal class and IoU
-/// > min_iou, in [0, 1). Among those the assignment minimises sum(1 - IoU) + (1 - min_iou) * (pairs left out). Improper
-/// boxes stay alone. Allocates only while the workspace grows.
-template <typename Left, typename Right>
-AssignmentResult associate_boxes(const Left& left, const Right& right, double min_iou,
-                                 BoxAssociationWorkspace& workspace, span<int> partner) {
-  workspace.costs.resize(left.size() * right.size());
-  double* cost = workspace.costs.data();
-  for (const auto& a : left) {
-    for (const auto& b : right) {
-      const bool same = a.class_id == b.class_id;
-      *cost++ = same ? 1.0 - static_cast<double>(iou(a.box, b.box)) : std::numeric_limits<double>::infinity();
-    }
-  }
-  return solve_assignment(CostMatrix(workspace.costs, left.size(), right.size()), 1.0 - min_iou, workspace.assignment,
-                          partner);
-}
 
 /// Not thread-safe; one tracker per camera. After warm-up (as many tracks and detections as before) a frame allocates
 /// nothing. Equal calls give equal bits. The order of a frame's detections changes nothing but their indices, unless

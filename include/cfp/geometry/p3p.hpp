@@ -5,13 +5,12 @@
 /// (polish of the depths). Departure: unknowns in which a small triangle far away is as regular as any other.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "cfp/core/status.hpp"
 #include "cfp/core/types.hpp"
-#include "cfp/math/cubic.hpp"
+#include "cfp/geometry/p3p_impl.hpp"
 #include "cfp/math/matrix3.hpp"
 #include "cfp/math/se3.hpp"
 
@@ -33,163 +32,6 @@ struct P3PSolutions {
   /// invalid_input: a coordinate is not finite or beyond 1e100.
   Status status = Status::degenerate;
 };
-
-namespace detail {
-
-// (u, v, w); T is a scalar, or an array that holds one for each of two points or lines.
-template <typename T>
-struct Triple {
-  T u, v, w;
-};
-
-// p^T C p for p = (u, v, w), C symmetric.
-template <typename Real>
-struct Conic {
-  Real uu, uv, vv, uw, vw, ww;
-};
-
-inline namespace CFP_ISA {
-
-template <typename T>
-[[nodiscard]] CFP_INLINE T squared_norm(const Triple<T>& x) noexcept {
-  return x.u * x.u + x.v * x.v + x.w * x.w;
-}
-
-// Three unit rays y_i meet a triangle at the depths d_i: |d_i y_i - d_j y_j|^2 = (d_i - d_j)^2 + d_i d_j e_ij with
-// e_ij = |y_i - y_j|^2. The unit of length is the triangle's longest edge, which joins points 1 and 2. In the unknowns
-// (u, v, w) = (d1 - d0, d2 - d0, d0) nothing cancels, however far away and small the triangle is.
-template <typename Real>
-struct P3PEquations {
-  Real a, b;           // squared edges 01 and 02
-  Real e01, e02, e12;  // squared distances of the rays' ends
-
-  // The squared edges 01, 02 and 12 minus what they should be.
-  template <typename T>
-  [[nodiscard]] CFP_INLINE Triple<T> residual(const Triple<T>& p) const noexcept {
-    const T w1 = p.w + p.u, w2 = p.w + p.v, difference = p.u - p.v;
-    return {p.u * p.u + e01 * p.w * w1 - a, p.v * p.v + e02 * p.w * w2 - b,
-            difference * difference + e12 * w1 * w2 - Real(1)};
-  }
-
-  // The Newton step from p with residual r, to be subtracted: the Jacobian is [A 0 B; 0 C D; E F G].
-  template <typename T>
-  [[nodiscard]] CFP_INLINE Triple<T> step(const Triple<T>& p, const Triple<T>& r) const noexcept {
-    const T w1 = p.w + p.u, w2 = p.w + p.v, twice = Real(2) * (p.u - p.v);
-    const T A = Real(2) * p.u + e01 * p.w, B = e01 * (p.w + w1);
-    const T C = Real(2) * p.v + e02 * p.w, D = e02 * (p.w + w2);
-    const T E = e12 * w2 + twice, F = e12 * w1 - twice, G = e12 * (w1 + w2);
-    const T minor = C * G - D * F, inverse = Real(1) / (A * minor - B * C * E);
-    return {inverse * (minor * r.u + B * (F * r.v - C * r.w)),
-            inverse * (D * (E * r.u - A * r.w) + (A * G - B * E) * r.v),
-            inverse * (A * (C * r.w - F * r.v) - C * E * r.u)};
-  }
-
-  // Newton steps for as long as they help; false when they lead to no solution.
-  [[nodiscard]] bool polish(Triple<Real>& p) const noexcept {
-    Triple<Real> r = residual(p);
-    for (int i = 0; i < 8; ++i) {
-      const Triple<Real> change = step(p, r), next{p.u - change.u, p.v - change.v, p.w - change.w};
-      const Triple<Real> next_r = residual(next);
-      if (!(squared_norm(next_r) < squared_norm(r))) break;
-      p = next, r = next_r;
-    }
-    return squared_norm(r) < Real(1e-20);
-  }
-
-  // The conics C1: edge01 = a edge12 and C2: edge02 = b edge12; s such that det(C1 + s C2) vanishes, the best separated
-  // root of c0 + c1 s + c2 s^2 + c3 s^3.
-  [[nodiscard]] CFP_INLINE Real degenerate_conic() const noexcept {
-    const Real k1 = e01 - a * e12, k2 = e02 - b * e12, half = Real(0.5) * e12, quarter = half * half;
-    const Real D1 = k1 * (Real(1) - a * half - Real(0.25) * k1) + quarter * a * (Real(1) - a);
-    const Real D2 = k2 * (Real(1) - b * half - Real(0.25) * k2) + quarter * b * (Real(1) - b);
-    const Real mixed = (Real(1) - half) * (Real(0.5) * e01 * e02 - k1 - k2) + quarter * (a + b - Real(1));
-    const Real c0 = -a * D1, c1 = a * mixed + (Real(1) - b) * D1;
-    const Real c3 = -b * D2, c2 = b * mixed + (Real(1) - a) * D2;
-    // A c3 that is nearly zero means a root near infinity, C2 itself.
-    const Real inverse = Real(1) / (c3 + std::copysign(Real(1e-18) * (std::abs(c1) + std::abs(c2)), c3));
-    return isolated_cubic_root(c2 * inverse, c1 * inverse, c0 * inverse);
-  }
-
-  // f C1 + g C2.
-  [[nodiscard]] CFP_INLINE Conic<Real> pencil(Real f, Real g) const noexcept {
-    const Real m = f * a + g * b, me = Real(0.5) * m * e12, f1 = Real(0.5) * f * e01, g2 = Real(0.5) * g * e02;
-    return {f - m, m - me, g - m, f1 - me, g2 - me, Real(2) * (f1 + g2 - me)};
-  }
-};
-
-// The lines l, m of the degenerate conic C = l m^T + m l^T, up to scale: its adjugate is -(l x m)(l x m)^T, and
-// C + hat(l x m) has rank one. False when they are not real.
-template <typename Real>
-[[nodiscard]] CFP_INLINE bool line_pair(const Conic<Real>& C, Triple<Eigen::Array<Real, 2, 1>>& lines) noexcept {
-  const Real a01 = C.uw * C.vw - C.uv * C.ww, a02 = C.uv * C.vw - C.vv * C.uw, a12 = C.uv * C.uw - C.uu * C.vw;
-  const Real a00 = C.vv * C.ww - C.vw * C.vw, a11 = C.uu * C.ww - C.uw * C.uw, a22 = C.uu * C.vv - C.uv * C.uv;
-  Triple<Real> v{a02, a12, a22};
-  Real square = a22;
-  if (a00 < square) v = {a00, a01, a02}, square = a00;
-  if (a11 < square) v = {a01, a11, a12}, square = a11;
-  if (!(square < Real(0))) return false;
-  const Real scale = std::sqrt(-square);
-  const Real uu = scale * C.uu, vv = scale * C.vv, uw = scale * C.uw, vw = scale * C.vw;
-  const Real uv = scale * C.uv - v.w, vu = scale * C.uv + v.w;
-  // The column and the row of the largest elements; a line whose u and v vanish is at infinity and holds no solution.
-  const Real diagonal = uu * uu - vv * vv, other = uv * uv - vu * vu;
-  const bool column = diagonal > other, row = diagonal + other > Real(0);
-  lines.u = {column ? uu : uv, row ? uu : vu};
-  lines.v = {column ? vu : vv, row ? uv : vv};
-  lines.w = {column ? uw - v.v : vw + v.u, row ? uw + v.v : vw - v.u};
-  return true;
-}
-
-// All solutions with positive depths; returns their number.
-template <typename Real>
-[[nodiscard]] CFP_INLINE int p3p_depths(const P3PEquations<Real>& q, Triple<Real> (&solutions)[4]) noexcept {
-  using Pair = Eigen::Array<Real, 2, 1>;
-  const Real s = q.degenerate_conic(), scale = Real(1) / (Real(1) + std::abs(s));
-  Triple<Pair> l;
-  if (!line_pair(q.pencil(scale, s * scale), l)) return 0;
-
-  // Where both lines meet C1 or C2: points (-lw lu, -lw lv, n), the nearest to the origin of the plane w = 1, plus
-  // t (-lv, lu, 0); qa t^2 + 2 qb t + qc = 0.
-  const bool second = std::abs(s) < Real(1);
-  const Conic<Real> C = q.pencil(second ? Real(0) : Real(1), second ? Real(1) : Real(0));
-  const Pair n = l.u * l.u + l.v * l.v;
-  const Pair gu = C.uu * l.u + C.uv * l.v, gv = C.uv * l.u + C.vv * l.v, g = l.u * gu + l.v * gv;
-  const Pair qa = (C.uu + C.vv) * n - g;
-  const Pair qb = n * (C.vw * l.u - C.uw * l.v) - l.w * (l.u * gv - l.v * gu);
-  const Pair qc = l.w * (l.w * g - Real(2) * n * (C.uw * l.u + C.vw * l.v)) + C.ww * n * n;
-  const Pair square = qb * qb, product = qa * qc, discriminant = square - product;
-  const Pair margin = Real(-1e-8) * (square + product.abs()), root = (discriminant.max)(Real(0)).sqrt();
-
-  int count = 0;
-  for (int i = 0; i < 2; ++i) {
-    // A slightly negative discriminant is a double root after rounding; the polish tells.
-    if (!(discriminant[i] > margin[i])) continue;
-    const Real sum = -(qb[i] + std::copysign(root[i], qb[i]));
-    const Pair t = Pair(sum, qc[i]) / Pair(qa[i], sum);
-    Triple<Pair> p{-l.w[i] * l.u[i] - t * l.v[i], -l.w[i] * l.v[i] + t * l.u[i], Pair::Constant(n[i])};
-    const Pair w1 = p.w + p.u, w2 = p.w + p.v;
-    const Pair unit = ((p.u - p.v) * (p.u - p.v) + q.e12 * w1 * w2).sqrt().inverse();
-    p = {p.u * unit, p.v * unit, p.w * unit};
-    const Triple<Pair> change = q.step(p, q.residual(p));
-    const Pair change_sq = squared_norm(change);
-    for (int k = 0; k < 2; ++k) {
-      Triple<Real>& x = solutions[count];
-      x = {p.u[k], p.v[k], p.w[k]};
-      // The equations are quadratic: what a step leaves is of the order of its square.
-      if (change_sq[k] < Real(1e-20)) {
-        x = {x.u - change.u[k], x.v - change.v[k], x.w - change.w[k]};
-      } else if (!q.polish(x)) {
-        continue;
-      }
-      if (!(x.w + (std::min)(x.u, x.v) > Real(0) && x.w > Real(0))) continue;
-      ++count;
-    }
-  }
-  return count;
-}
-
-}  // namespace CFP_ISA
-}  // namespace detail
 
 inline namespace CFP_ISA {
 

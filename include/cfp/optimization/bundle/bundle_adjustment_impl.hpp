@@ -1,0 +1,189 @@
+/// @file bundle_adjustment_impl.hpp
+/// Inside bundle_adjustment.hpp: the problem that the least-squares loop minimises, and the way between the caller's
+/// arrays and the solver's.
+#pragma once
+
+#include <algorithm>
+#include <utility>
+
+#include "cfp/math/so3.hpp"
+#include "cfp/optimization/bundle/bundle_elimination_impl.hpp"
+#include "cfp/optimization/bundle/bundle_order_impl.hpp"
+#include "cfp/optimization/bundle/bundle_problem.hpp"
+#include "cfp/optimization/least_squares.hpp"
+
+namespace cfp {
+
+/// Scratch memory of adjust_bundle; keeps what it has grown to. One per thread that calls.
+struct BundleWorkspace {
+  CFP_INLINE BundleWorkspace() = default;  // sets members by vector instructions
+  // Internal: the stages of adjust_bundle work on these.
+  detail::BundleIndex index;
+  detail::BundleState state, next_state;
+  detail::BundleLinearization linear, next_linear;
+  detail::BundleSchur schur;
+};
+
+}  // namespace cfp
+
+namespace cfp::detail {
+inline namespace CFP_ISA {
+
+template <typename Camera, typename Scalar>
+void assert_shapes([[maybe_unused]] const BundleProblem<Camera, Scalar>& problem) noexcept {
+  [[maybe_unused]] const auto& o = problem.observations;
+  [[maybe_unused]] const std::size_t n = o.pose.size();
+  CFP_ASSERT(o.point.size() == n && o.pixels.size() == n);
+  CFP_ASSERT(o.u_right.empty() || o.u_right.size() == n);
+  CFP_ASSERT(o.sigmas.empty() || o.sigmas.size() == n);
+  CFP_ASSERT(o.weights.empty() || o.weights.size() == n);
+  CFP_ASSERT(problem.fixed_poses.empty() || problem.fixed_poses.size() == problem.poses.size());
+  CFP_ASSERT(n == 0 || problem.cameras.size() == 1 || problem.cameras.size() == problem.poses.size());
+}
+
+/// Sizes every array and copies the poses and points that take part.
+template <typename Camera, typename Scalar>
+void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& workspace, BundleResult& result) {
+  const BundleIndex& index = workspace.index;
+  BundleSchur& schur = workspace.schur;
+  const std::size_t poses = index.caller_pose.size(), slots = index.slot_pose.size();
+  if (index.eliminate_poses)
+    find_envelope<6>(index, index.points, schur.envelope);
+  else
+    find_envelope<3>(index, index.free_poses, schur.envelope);
+  result.free_poses = index.free_poses;
+  result.adjusted_points = index.points;
+  result.factor_blocks = schur.envelope.blocks;
+  const std::size_t kept_size = index.eliminate_poses ? 3 : 6;
+  for (std::size_t part = 0; part < bundle_parts; ++part) {
+    schur.blocks[part].resize(kept_size * kept_size * schur.envelope.blocks);
+    schur.right_side[part].resize(kept_size * schur.envelope.first.size());
+  }
+  schur.triangles.resize((index.eliminate_poses ? 42 : 12) * index.eliminated_part.back());
+  schur.couplings.resize(18 * slots);
+  schur.coupled.resize(slots);
+  schur.coupled_end.resize(index.eliminated_part.back());
+  schur.pose_steps.resize(6 * index.free_poses);
+  schur.point_steps.resize(3 * index.points);
+  for (BundleState* state : {&workspace.state, &workspace.next_state}) {
+    state->poses.resize(poses);
+    state->points.resize(index.points);
+  }
+  for (BundleLinearization* linear : {&workspace.linear, &workspace.next_linear}) {
+    linear->slots.resize(BundleLinearization::slot_doubles * slots);
+    linear->points.resize(BundleLinearization::point_doubles * index.points);
+    linear->poses.resize(BundleLinearization::pose_doubles * index.free_poses);
+    linear->costs.resize(poses);
+  }
+  for (std::size_t k = 0; k < poses; ++k) {
+    const SE3<double>& pose = problem.poses[to_index(index.caller_pose[k])];
+    const Matrix3<double> rotation = normalized_rotation(pose.rotation);
+    workspace.state.poses[k] = {rotation, -(rotation.transpose() * pose.translation)};
+  }
+  for (std::size_t j = 0; j < index.points; ++j)
+    workspace.state.points[j] = problem.points[to_index(index.caller_point[j])];
+}
+
+/// The steps applied; fixed poses are copied.
+inline void move(const BundleIndex& index, const BundleState& state, const BundleSchur& schur,
+                 BundleState& next) noexcept {
+  std::copy(state.poses.begin(), state.poses.end(), next.poses.begin());
+  for (std::size_t k = 0; k < index.free_poses; ++k) {
+    const Eigen::Map<const Vector6<double>> xi(schur.pose_steps.data() + 6 * k);
+    next.poses[k] = {state.poses[k].rotation * so3_exp(xi.tail<3>()), state.poses[k].center - xi.head<3>()};
+  }
+  for (std::size_t j = 0; j < index.points; ++j)
+    next.points[j] = state.points[j] + Eigen::Map<const Vector3<double>>(schur.point_steps.data() + 3 * j);
+}
+
+/// Bundle adjustment as minimize_least_squares wants it.
+template <typename Problem, typename MonoLoss, typename StereoLoss, typename Executor>
+struct BundleLeastSquares {
+  // Below so many observations a phase is over before another thread has woken up.
+  static constexpr std::size_t worth_sharing = 4000;
+  const Problem& problem;
+  const MonoLoss& mono;
+  const StereoLoss& stereo;
+  BundleWorkspace& workspace;
+  Executor& executor;
+
+  double linearize() { return linearize_at(workspace.state, workspace.linear); }
+  /// NaN when a point is behind a camera that used to see it.
+  double linearize_trial() { return linearize_at(workspace.next_state, workspace.next_linear); }
+  void accept() {
+    std::swap(workspace.state, workspace.next_state);
+    std::swap(workspace.linear, workspace.next_linear);
+  }
+  double propose(double damping) {
+    if (!(workspace.index.eliminate_poses ? solve<6>(damping) : solve<3>(damping)))
+      return std::numeric_limits<double>::quiet_NaN();
+    const BundleSchur& schur = workspace.schur;
+    move(workspace.index, workspace.state, schur, workspace.next_state);
+    return promised_by<3>(workspace.linear, schur.point_steps, damping) +
+           promised_by<6>(workspace.linear, schur.pose_steps, damping);
+  }
+
+ private:
+  template <typename Task>
+  void run(const Task& task) {
+    const int parts = static_cast<int>(bundle_parts);
+    if (workspace.index.observations.size() >= worth_sharing) {
+      executor(parts, task);
+    } else {
+      for (int part = 0; part < parts; ++part) task(part);
+    }
+  }
+
+  double linearize_at(const BundleState& state, BundleLinearization& linear) {
+    const BundleIndex& index = workspace.index;
+    run([&](int part) {
+      for (std::size_t k = index.pose_part[to_index(part)]; k < index.pose_part[to_index(part) + 1]; ++k)
+        linearize_pose(index, k, camera_of(problem.cameras, index.caller_pose[k]), problem.baseline_fx, mono, stereo,
+                       state, linear);
+    });
+    linearize_points(index, linear);
+    double cost = 0;
+    for (const double c : linear.costs) cost += c;
+    return cost;
+  }
+
+  template <int E>
+  [[nodiscard]] bool solve(double damping) {
+    bool definite[bundle_parts];
+    run([&](int part) {
+      definite[part] =
+          eliminate<E>(workspace.index, workspace.state, workspace.linear, damping, to_index(part), workspace.schur);
+    });
+    return std::all_of(definite, definite + bundle_parts, [](bool part) { return part; }) &&
+           solve_reduced<E>(workspace.index, workspace.schur);
+  }
+};
+
+template <typename Camera, typename Scalar>
+void write_back(const BundleProblem<Camera, Scalar>& problem, const BundleWorkspace& workspace) noexcept {
+  const BundleIndex& index = workspace.index;
+  for (std::size_t k = 0; k < index.free_poses; ++k) {
+    const BundlePose& from = workspace.state.poses[k];
+    SE3<double>& pose = problem.poses[to_index(index.caller_pose[k])];
+    pose.rotation = normalized_rotation(from.rotation);
+    pose.translation = -(pose.rotation * from.center);
+  }
+  for (std::size_t j = 0; j < index.points; ++j)
+    problem.points[to_index(index.caller_point[j])] = workspace.state.points[j];
+}
+
+template <typename Camera, typename Scalar>
+void write_squared_errors(const BundleProblem<Camera, Scalar>& problem, span<double> squared_errors) noexcept {
+  const auto& observations = problem.observations;
+  CFP_ASSERT(squared_errors.size() == observations.pose.size());
+  for (std::size_t i = 0; i < squared_errors.size(); ++i) {
+    BundleMeasurement m;
+    double error = -1;
+    const bool judged = read_measurement(observations, i, problem.baseline_fx, m) && is_inside(problem, m) &&
+                        squared_error(problem, m, error);
+    squared_errors[i] = judged && is_finite(error) ? error : -1;
+  }
+}
+
+}  // namespace CFP_ISA
+}  // namespace cfp::detail

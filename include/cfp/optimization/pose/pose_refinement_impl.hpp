@@ -1,0 +1,201 @@
+/// @file pose_refinement_impl.hpp
+/// The machinery of pose_refinement.hpp: the model that the least-squares loop minimises, and the rounds.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "cfp/geometry/camera.hpp"
+#include "cfp/optimization/least_squares.hpp"
+#include "cfp/optimization/pose/pose_columns_impl.hpp"
+#include "cfp/optimization/pose/pose_kernel_impl.hpp"
+#include "cfp/optimization/pose/pose_problem.hpp"
+#include "cfp/simd/packet.hpp"
+
+namespace cfp::detail {
+inline namespace CFP_ISA {
+
+template <typename Camera>
+[[nodiscard]] bool is_usable_camera(const Camera& camera) noexcept {
+  if constexpr (is_pinhole<Camera>) {
+    const PinholeCamera<double> c = camera.template cast<double>();
+    return c.fx >= 1e-3 && c.fx <= 1e6 && c.fy >= 1e-3 && c.fy <= 1e6 && std::abs(c.cx) <= 1e7 && std::abs(c.cy) <= 1e7;
+  } else {
+    return true;
+  }
+}
+
+/// What the loop minimises: the pose relative to the start position, so that float serves wherever the origin is.
+/// P: the packet, or the scalar, that walks over the columns.
+template <typename P, typename Camera>
+struct PoseModel {
+  using Scalar = simd::scalar_of<P>;
+  const Camera& camera;
+  const PoseOptions& options;
+  PoseColumns<Scalar> columns;  // errors are those at last_pose
+  PoseRound round;
+  SE3<double> last_pose;
+  double influence = 0;  // at last_pose: sum of w rho'(s)
+  int evaluations = 0;
+
+  double linearize(const SE3<double>& T, NormalEquations<6>& equations) noexcept {
+    PoseSystem system;
+    for_each_kind(columns, options, [&](std::size_t begin, std::size_t end, double chi2, auto stereo) {
+      const double delta = round.scale * std::sqrt(chi2);
+      if constexpr (is_pinhole<Camera>) {
+        with_loss<P>(round.loss, P(static_cast<Scalar>(delta)), [&](const auto& loss) {
+          add_pinhole<P, decltype(stereo)::value>(columns, begin, end, camera, columns.baseline_fx, T, loss, system);
+        });
+      } else {
+        with_loss<double>(round.loss, delta, [&](const auto& loss) {
+          add_camera<decltype(stereo)::value>(columns, begin, end, camera, columns.baseline_fx, T, loss, system);
+        });
+      }
+    });
+    equations = system.equations;
+    influence = system.influence;
+    last_pose = T;
+    ++evaluations;
+    return system.cost;
+  }
+  [[nodiscard]] SE3<double> moved(const SE3<double>& T, const Vector6<double>& step) const noexcept {
+    return se3_exp(step) * T;
+  }
+};
+
+/// Leaves out the outliers by the stored errors; returns how many observations stay.
+template <typename Scalar>
+int keep_inliers(const PoseOptions& options, PoseColumns<Scalar>& columns, bool& changed) noexcept {
+  int count = 0;
+  changed = false;
+  for_each_observation(columns, options, [&](std::size_t i, bool inlier) {
+    const Scalar active = inlier ? columns.weight[i] : Scalar(0);
+    count += inlier ? 1 : 0;
+    changed = changed || active != columns.active[i];
+    columns.active[i] = active;
+  });
+  return count;
+}
+
+/// Counts and marks the inliers by the stored errors, and sums their w s; returns the sum of their weights in the last
+/// round.
+template <typename Scalar>
+double count_inliers(const PoseOptions& options, const PoseColumns<Scalar>& columns, PoseResult& result,
+                     span<char> inliers) noexcept {
+  double active = 0, chi2_sum = 0;
+  for_each_observation(columns, options, [&](std::size_t i, bool inlier) {
+    result.inliers += inlier ? 1 : 0;
+    chi2_sum += inlier ? static_cast<double>(columns.weight[i] * columns.error[i]) : 0.0;
+    active += inlier ? static_cast<double>(columns.active[i]) : 0.0;
+    if (!inliers.empty()) inliers[columns.index[i]] = inlier ? 1 : 0;
+  });
+  result.chi2 = chi2_sum * columns.mean_weight;
+  return active;
+}
+
+/// When a round ends. Gauss-Newton until a step fails.
+template <typename Scalar>
+[[nodiscard]] LevenbergMarquardtOptions round_options(const PoseOptions& options, bool hands_over, int used) noexcept {
+  LevenbergMarquardtOptions round;
+  round.max_iterations = options.max_iterations;
+  round.initial_damping = round.min_damping = 0;
+  round.rejected_damping = 1e-3;
+  round.max_damping = 1e8;
+  round.min_relative_decrease = static_cast<double>(std::numeric_limits<Scalar>::epsilon());
+  round.min_absolute_decrease =
+      hands_over ? (std::max)(options.min_decrease, options.handover_decrease * used) : options.min_decrease;
+  return round;
+}
+
+/// Runs the rounds from a start at the origin; afterwards model and equations belong to the pose.
+template <typename P, typename Camera>
+SolverStatus run_rounds(PoseModel<P, Camera>& model, const SE3<double>& start, PoseResult& result, SE3<double>& pose,
+                        NormalEquations<6>& equations) noexcept {
+  using Scalar = simd::scalar_of<P>;
+  using Problem = DenseLeastSquares<6, SE3<double>, PoseModel<P, Camera>>;
+  const PoseOptions& options = model.options;
+  SolverStatus status = SolverStatus::not_enough_data;
+  pose = start;
+  for (std::size_t r = 0; r < options.round_count; ++r) {
+    bool changed = false;
+    if (r > 0 && options.inliers_only && keep_inliers(options, model.columns, changed) < options.min_observations)
+      return SolverStatus::not_enough_inliers;
+    if (r > 0 && options.from_start && !changed && options.rounds[r] == model.round) continue;
+    model.round = options.rounds[r];
+    const bool hands_over = !options.from_start && r + 1 < options.round_count;
+    Problem problem(model, options.from_start ? start : pose, static_cast<double>(Tolerance<Scalar>::degenerate));
+    const LeastSquaresResult solved =
+        minimize_least_squares(problem, round_options<Scalar>(options, hands_over, result.used));
+    ++result.rounds;
+    status = solved.status;
+    if (!is_solved(status)) return status;
+    pose = problem.state();
+    equations = problem.equations();
+    result.cost = solved.final_cost * model.columns.mean_weight;
+    if (model.last_pose.rotation != pose.rotation || model.last_pose.translation != pose.translation)
+      (void)model.linearize(pose, equations);  // the last trial was refused
+  }
+  return status;
+}
+
+template <typename Input>
+[[nodiscard]] bool has_valid_shape(const PoseObservations<Input>& observations,
+                                   [[maybe_unused]] span<char> inliers) noexcept {
+  [[maybe_unused]] const auto fits = [n = observations.points.size()](std::size_t size) {
+    return size == 0 || size == n;
+  };
+  CFP_ASSERT(observations.pixels.size() == observations.points.size() && fits(inliers.size()));
+  CFP_ASSERT(fits(observations.weights.size()) && fits(observations.sigmas.size()));
+  CFP_ASSERT(fits(observations.inverse_sigmas_sq.size()) && fits(observations.depths.size()));
+  CFP_ASSERT(fits(observations.u_right.size()));
+  return (observations.sigmas.empty() || observations.inverse_sigmas_sq.empty()) &&
+         (observations.depths.empty() || observations.u_right.empty());
+}
+
+/// refine_pose with the packet type named: P = Scalar is the scalar path.
+template <typename P, typename Input, typename Camera>
+PoseResult refine_pose_with(const PoseObservations<Input>& observations, const Camera& camera,
+                            const SE3<double>& T_cam_world, const PoseOptions& options,
+                            PoseWorkspace<simd::scalar_of<P>>& workspace, span<char> inliers) {
+  CFP_ASSERT(!invalid_field(options));
+  PoseResult result;
+  result.T_cam_world = T_cam_world;
+  for (char& inlier : inliers) inlier = 0;
+  if (!has_valid_shape(observations, inliers) || !is_rigid_motion(T_cam_world) || !is_usable_camera(camera)) {
+    if (!is_finite(T_cam_world.rotation.sum() + T_cam_world.translation.sum())) result.T_cam_world = SE3<double>();
+    result.status = SolverStatus::invalid_input;
+    return result;
+  }
+  const SE3<double> start{normalized_rotation(T_cam_world.rotation), Vector3<double>::Zero()};
+  const Vector3<double> centre = -(start.rotation.transpose() * T_cam_world.translation);
+  PoseModel<P, Camera> model{camera, options, {}, {}, {}};
+  load_columns(observations, camera, centre, static_cast<std::size_t>(simd::lanes_of<P>), workspace, model.columns,
+               result);
+  if (result.used < options.min_observations) {
+    const bool no_weight = result.used == 0 && result.zero_weight > 0 && result.invalid == 0;
+    result.status = no_weight ? SolverStatus::no_weight : SolverStatus::not_enough_data;
+    return result;
+  }
+  SE3<double> pose;
+  NormalEquations<6> equations;
+  result.status = run_rounds(model, start, result, pose, equations);
+  result.evaluations = model.evaluations;
+  double counted = 0;
+  if (is_solved(result.status)) {
+    counted = count_inliers(options, model.columns, result, inliers);
+    if (result.inliers < options.min_observations) result.status = SolverStatus::not_enough_inliers;
+  }
+  if (!is_solved(result.status)) {
+    for (char& inlier : inliers) inlier = 0;
+    result.inliers = 0, result.cost = result.chi2 = 0;
+    return result;
+  }
+  result.T_cam_world = {pose.rotation, pose.translation - pose.rotation * centre};
+  const double scale = model.influence > 0 ? counted / model.influence : 1.0;
+  const Matrix6<double> H = equations.H.selfadjointView<Eigen::Upper>();
+  result.information = H * model.columns.mean_weight * scale;
+  return result;
+}
+
+}  // namespace CFP_ISA
+}  // namespace cfp::detail

@@ -1,0 +1,135 @@
+/// @file fundamental_sampson_impl.hpp
+/// What fundamental_ransac.hpp computes of all its pairs at once under an F: MSAC score, Sampson distances, normal
+/// equations. Not an interface.
+#pragma once
+
+#include <vector>
+
+#include "cfp/core/types.hpp"
+#include "cfp/math/matrix3.hpp"
+#include "cfp/math/normal_equations.hpp"
+#include "cfp/robust/fundamental_pairs_impl.hpp"
+#include "cfp/simd/packet.hpp"
+
+namespace cfp::detail {
+inline namespace CFP_ISA {
+
+// The epipole of the current image, F^T e = 0, unnormalised: F's columns span the plane across it.
+template <typename T>
+[[nodiscard]] Vector3<T> epipole_of(const Matrix3<T>& F) noexcept {
+  const Matrix3<T> candidates = cofactors(F);
+  Eigen::Index best = 0;
+  candidates.colwise().squaredNorm().maxCoeff(&best);
+  return candidates.col(best);
+}
+
+// Of a packet of pairs: the directions l = F p and m = F^T q of the epipolar lines, e = q^T F p and n^2; the Sampson
+// distance is e / n.
+template <typename T>
+struct SampsonPacket {
+  using P = simd::Packet<T>;
+  P p0, p1, q0, q1, l0, l1, m0, m1, e, n2;
+
+  SampsonPacket(const PairColumns<T>& in, std::size_t i, const Matrix3<T>& F) noexcept
+      : p0(simd::load<P>(in.row[0] + i)),
+        p1(simd::load<P>(in.row[1] + i)),
+        q0(simd::load<P>(in.row[2] + i)),
+        q1(simd::load<P>(in.row[3] + i)) {
+    const auto line = [](const P& x, const P& y, T a, T b, T c) {
+      return simd::multiply_add(P(a), x, simd::multiply_add(P(b), y, P(c)));
+    };
+    l0 = line(p0, p1, F(0, 0), F(0, 1), F(0, 2));
+    l1 = line(p0, p1, F(1, 0), F(1, 1), F(1, 2));
+    m0 = line(q0, q1, F(0, 0), F(1, 0), F(2, 0));
+    m1 = line(q0, q1, F(0, 1), F(1, 1), F(2, 1));
+    e = simd::multiply_add(q0, l0, simd::multiply_add(q1, l1, line(p0, p1, F(2, 0), F(2, 1), F(2, 2))));
+    n2 = simd::multiply_add(l0, l0, l1 * l1) + simd::multiply_add(m0, m0, m1 * m1);
+  }
+};
+
+// Sum over the pairs of w min(d^2 / limit, 1), d the Sampson distance of scaled pixels and limit its squared threshold.
+// Gives up with a value above `bound` as soon as the sum exceeds it.
+template <typename T>
+[[nodiscard]] double msac_cost(const PairColumns<T>& in, const Matrix3<double>& F, double limit,
+                               double bound) noexcept {
+  using P = simd::Packet<T>;
+  const Matrix3<T> f = F.template cast<T>();
+  const P most(static_cast<T>(limit)), tiny(T(1e-30));
+  const double stop = bound * limit;
+  double sum = 0;
+  for (std::size_t block = 0; block < in.size; block += PairArrays::block) {
+    P cost(T(0));
+    for (std::size_t i = block; i < block + PairArrays::block; i += static_cast<std::size_t>(simd::lanes_of<P>)) {
+      const SampsonPacket<T> pair(in, i, f);
+      const P d2 = pair.e * pair.e / (pair.n2 + tiny);
+      cost = simd::multiply_add(simd::load<P>(in.row[4] + i), simd::select(d2 < most, d2, most), cost);
+    }
+    sum += static_cast<double>(simd::reduce_add(cost));
+    if (!(sum < stop)) break;
+  }
+  return sum / limit;
+}
+
+// Squared Sampson distances of all pairs, scaled pixels, into `out` of the arrays' capacity; NaN where there is none,
+// so that no comparison takes such a pair for an inlier.
+template <typename T>
+void sampson_distances_sq(const PairColumns<T>& in, const Matrix3<T>& F, std::vector<T>& out) noexcept {
+  using P = simd::Packet<T>;
+  CFP_ASSERT(out.size() >= (in.size + PairArrays::block - 1) / PairArrays::block * PairArrays::block);
+  for (std::size_t i = 0; i < in.size; i += static_cast<std::size_t>(simd::lanes_of<P>)) {
+    const SampsonPacket<T> pair(in, i, F);
+    simd::store(out.data() + i, pair.e * pair.e / pair.n2);
+  }
+}
+
+// Normal equations over the nine entries (row-major) of F of sum w rho(d^2 / scale), and that sum; rho(x) = x / (1 +
+// x), the loss of Geman and McClure: bounded like MSAC's, but smooth, so that pairs near the threshold count by
+// degrees. With d = e / n and k = e / n^2, d(d)/dF_ij = (q_i p_j - k (l_i p_j [i < 2] + m_j q_i [j < 2])) / n. The
+// gradient is exact; H leaves out the k terms, a thousandth of the others for pairs that count, and so is made of 36
+// moments.
+template <typename T>
+double sampson_system(const PairColumns<T>& in, const Matrix3<double>& F, double scale,
+                      NormalEquations<9>& out) noexcept {
+  using P = simd::Packet<T>;
+  const Matrix3<T> f = F.template cast<T>();
+  const P zero(T(0)), one(T(1)), tiny(T(1e-30)), inverse_scale(T(1 / scale));
+  P moments[6][6], g[9], cost = zero;
+  for (auto& row : moments) {
+    for (P& m : row) m = zero;
+  }
+  for (P& h : g) h = zero;
+  for (std::size_t i = 0; i < in.size; i += static_cast<std::size_t>(simd::lanes_of<P>)) {
+    const SampsonPacket<T> pair(in, i, f);
+    const P inverse_n2 = simd::reciprocal(pair.n2 + tiny);
+    const P k = pair.e * inverse_n2;
+    const P x = pair.e * k * inverse_scale;
+    const P s = simd::reciprocal(x + one);
+    const P ws = simd::load<P>(in.row[4] + i) * s;
+    cost = simd::multiply_add(ws, x, cost);
+    const P weight = ws * s * inverse_n2, we = weight * pair.e;
+    const P p[2] = {pair.p0, pair.p1}, wq[2] = {weight * pair.q0, weight * pair.q1}, m[2] = {k * pair.m0, k * pair.m1};
+    const P qq[6] = {wq[0] * pair.q0, wq[0] * pair.q1, wq[0], wq[1] * pair.q1, wq[1], weight};
+    const P pp[5] = {p[0] * p[0], p[0] * p[1], p[0], p[1] * p[1], p[1]};
+    for (int r = 0; r < 6; ++r) {
+      for (int c = 0; c < 5; ++c) moments[r][c] = simd::multiply_add(qq[r], pp[c], moments[r][c]);
+      moments[r][5] += qq[r];
+    }
+    const P a[3] = {we * (pair.q0 - k * pair.l0), we * (pair.q1 - k * pair.l1), we},
+            b[3] = {we * pair.q0, we * pair.q1, we};
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 2; ++c) g[3 * r + c] += a[r] * p[c] - b[r] * m[c];
+      g[3 * r + 2] += a[r];
+    }
+  }
+  constexpr int symmetric[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+  for (int r = 0; r < 9; ++r) {
+    out.g[r] = static_cast<double>(simd::reduce_add(g[r])) / scale;
+    for (int c = 0; c < 9; ++c)
+      out.H(r, c) =
+          static_cast<double>(simd::reduce_add(moments[symmetric[r / 3][c / 3]][symmetric[r % 3][c % 3]])) / scale;
+  }
+  return static_cast<double>(simd::reduce_add(cost));
+}
+
+}  // namespace CFP_ISA
+}  // namespace cfp::detail
