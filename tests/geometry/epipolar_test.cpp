@@ -1,6 +1,7 @@
 #include "cfp/geometry/epipolar.hpp"
 
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "support/allocation_counter.hpp"
@@ -68,6 +69,11 @@ TEST_CASE("distances do not depend on the scale of F, Sampson's not on the order
     CHECK_THAT(cfp::sampson_distance(F_swapped, b, a), WithinAbs(cfp::sampson_distance(F, a, b), 1e-9));
     CHECK(cfp::sampson_distance(F, a, b) <= d);
   }
+  // Not even where the sum of its entries overflows.
+  const Matrix3<double> large = Matrix3<double>::Constant((std::numeric_limits<double>::max)() / 2);
+  const Vector2<double> a(3, 4), b(5, 6);
+  CHECK(cfp::has_distance(cfp::epipolar_distance(large, a, b)));
+  CHECK(cfp::epipolar_distance(large, a, b) == cfp::epipolar_distance(Matrix3<double>(Matrix3<double>::Ones()), a, b));
 }
 
 TEMPLATE_TEST_CASE("where there is no line there is no distance", "[geometry]", float, double) {

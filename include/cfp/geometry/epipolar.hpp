@@ -35,7 +35,7 @@ template <typename Scalar>
 template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> unit_scale(const Matrix3<Scalar>& F) noexcept {
   const Scalar largest = F.cwiseAbs().maxCoeff();
-  if (!is_finite(Scalar(F.cwiseAbs().mean())) || !(largest > Scalar(0))) return Matrix3<Scalar>::Zero();
+  if (!F.allFinite() || !(largest > Scalar(0))) return Matrix3<Scalar>::Zero();
   return F / largest;
 }
 
