@@ -16,7 +16,7 @@ from mutants import ROOT, chosen, written
 from schemata import SWITCH_UNIT, Switched
 
 sys.path.insert(0, str(ROOT / "tests/support"))
-from suite import TESTS, Suite, fresh, tests_of  # noqa: E402
+from suite import ENGINES, TESTS, Suite, fresh, tests_of  # noqa: E402
 
 FIELDS = "id room header line kind before after outcome test seconds".split()
 FLAGS = ["-O1", "-D_GLIBCXX_ASSERTIONS"]
@@ -99,11 +99,12 @@ class Together:
     def built(self, test):
         suite, build = copy.copy(self.suite), self.suite.build
         program = build / "-".join(test.relative_to(TESTS).with_suffix("").parts)
-        target, parts, more = program.with_suffix(".o"), [build / "switch.o"], []
-        if test.parent.name == "frame":
-            parts, more = [*parts, build / "engines.o"], ["-DCFP_TEST_FRAME_ENGINES"]
-            with self.guards["engines"]:
-                if not parts[-1].exists() and not self.compiled(suite, TESTS / "support/frame_engines.cpp", parts[-1], more):
+        target, parts, room = program.with_suffix(".o"), [build / "switch.o"], test.parent.name
+        engines, more = ENGINES.get(room, (None, []))
+        if engines:
+            parts.append(build / f"{room}-engines.o")
+            with self.guards[engines]:
+                if not parts[-1].exists() and not self.compiled(suite, engines, parts[-1], more):
                     return None
         if not suite.is_fresh(test, target):
             program.unlink(missing_ok=True)

@@ -14,6 +14,11 @@ TESTS = ROOT / "tests"
 ROOMS = "core simd math geometry detection clustering probability robust optimization frame evaluation interop properties".split()
 PRECOMPILED = ["support/catch.hpp", *(f"<{h}>" for h in "Eigen/Core algorithm array cmath functional limits string vector".split())]
 
+ENGINES = {  # what the tests of a room instantiate alike, compiled once, and the flag that leaves it to that
+    "frame": (TESTS / "support/frame_engines.cpp", ["-DCFP_TEST_FRAME_ENGINES"]),
+    "interop": (ROOT / "examples/integration/orb_slam/engines.cc", []),
+}
+
 
 def output_of(*command):
     try:
@@ -94,7 +99,7 @@ class Suite:
     def compiled(self, test, target, overlay=None, more=()):
         """True when the test compiles, with the headers of `overlay` in front of the library's."""
         front = [f"-I{overlay}", f"-ffile-prefix-map={overlay}={ROOT}/include"] if overlay else []
-        extra = self.opencv[0] if test.parent.name == "interop" else []
+        extra = self.opencv[0] if test.parent.name in ("interop", "orb_slam") else []
         command = [*self.compiler, *front, *self.flags, *more, *extra, "-include", str(self.build / "all.hpp"), "-c", str(test), "-o", str(target)]
         return self.run(command, 300) == 0
 
