@@ -31,6 +31,7 @@
 #include "cfp/geometry/box.hpp"
 #include "support/detections_file.hpp"
 #include "support/tum.hpp"
+#include "support/write_picture.hpp"
 
 namespace {
 
@@ -105,7 +106,7 @@ int run_sequence(const std::filesystem::path& folder, const std::filesystem::pat
     }
     std::printf("%s\n", image.file.c_str());
     const cv::Mat picture = annotate(rgb, depth, units_per_metre, boxes);
-    cv::imwrite((out / std::filesystem::path(image.file).filename()).string(), picture);
+    cfp_examples::write_picture(out / std::filesystem::path(image.file).filename(), picture);
     if (sheet.size() < 9 && i >= sheet.size() * images.size() / 9) sheet.push_back(picture);
   }
   std::vector<cv::Mat> rows;
@@ -116,7 +117,7 @@ int run_sequence(const std::filesystem::path& folder, const std::filesystem::pat
   if (!rows.empty()) {
     cv::Mat all;
     cv::vconcat(rows, all);
-    cv::imwrite((out / "contact_sheet.png").string(), all);
+    cfp_examples::write_picture(out / "contact_sheet.png", all);
   }
   return 0;
 }

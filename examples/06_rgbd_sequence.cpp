@@ -26,6 +26,7 @@
 #include "support/detections_file.hpp"
 #include "support/tum.hpp"
 #include "support/variant.hpp"
+#include "support/write_picture.hpp"
 
 namespace {
 
@@ -230,7 +231,7 @@ void run(const std::filesystem::path& folder, const std::filesystem::path& out, 
                   state.objects[b].pairs, cfp::to_string(state.objects[b].status));
     }
     draw(picture, current, stage.static_probability, state);
-    cv::imwrite((out / std::filesystem::path(image.file).filename()).string(), picture);
+    cfp_examples::write_picture(out / std::filesystem::path(image.file).filename(), picture);
     // A frame without a pose breaks the chain: what follows is relative to the last pose known.
     cfp::SE3<double> T_world_cam = trajectory.empty() ? cfp::SE3<double>{} : trajectory.back().T_world_cam;
     if (pose.inliers > 0) T_world_cam = T_world_cam * pose.T_cur_prev.inverse();

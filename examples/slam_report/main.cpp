@@ -12,6 +12,7 @@
 #include <CLI/CLI.hpp>
 
 #include "../slam_runs/read_run.hpp"
+#include "../support/write_picture.hpp"
 #include "annotate.hpp"
 #include "calibrate.hpp"
 #include "explained.hpp"
@@ -72,8 +73,8 @@ void write_pictures(const fs::path& folder, const RunRecord& run) {
   for (std::size_t k = 0; k < run.frames.size(); ++k) {
     const cv::Mat image = cv::imread((fs::path(run.recording) / run.frames[k].image).string());
     if (!image.empty())
-      cv::imwrite((folder / (std::to_string(1000000 + k).substr(1) + ".png")).string(),
-                  cfp_slam::annotate(image, run.frames[k]));
+      cfp_examples::write_picture(folder / (std::to_string(1000000 + k).substr(1) + ".png"),
+                                  cfp_slam::annotate(image, run.frames[k]));
   }
 }
 

@@ -17,6 +17,7 @@
 
 #include <opencv2/imgcodecs.hpp>
 
+#include "../support/write_picture.hpp"
 #include "sequence.hpp"
 
 namespace synthetic {
@@ -49,11 +50,9 @@ inline void write_sequence(const Sequence& sequence, const std::filesystem::path
         const std::string name = cfp_examples::fixed(sequence.stamp_of(k), 6) + ".png";
         // Noise does not compress: the fastest level costs a few per cent of space and half the time.
         const std::vector<int> fast{cv::IMWRITE_PNG_COMPRESSION, 1};
-        if (!cv::imwrite((folder / "rgb" / name).string(), frame.color, fast) ||
-            !cv::imwrite((folder / "depth" / name).string(), frame.depth, fast) ||
-            !cv::imwrite((folder / "labels" / name).string(), frame.label, fast)) {
-          throw std::runtime_error("cannot write images into " + folder.string());
-        }
+        cfp_examples::write_picture(folder / "rgb" / name, frame.color, fast);
+        cfp_examples::write_picture(folder / "depth" / name, frame.depth, fast);
+        cfp_examples::write_picture(folder / "labels" / name, frame.label, fast);
         const std::lock_guard<std::mutex> lock(mutex);
         progress(++done);
       } catch (...) {

@@ -1,13 +1,8 @@
 #include "../../examples/slam_runs/run_folder.hpp"
 
-#if defined(__unix__)
-#include <csignal>
-
-#include <sys/resource.h>
-#endif
-
 #include "../../examples/slam_runs/read_run.hpp"
 #include "support/catch.hpp"
+#include "support/full_disk.hpp"
 #include "support/temporary_folder.hpp"
 
 using namespace cfp_slam;
@@ -180,38 +175,18 @@ TEST_CASE("The finished runs of a folder are found, unfinished ones are not", "[
 }
 
 #if defined(__unix__)
-// The disk is full from here on: no file grows beyond so many bytes.
-struct FullDisk {
-  explicit FullDisk(rlim_t bytes) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit limit{bytes, before_.rlim_max};
-    handler_ = std::signal(SIGXFSZ, SIG_IGN);
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-  ~FullDisk() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-
- private:
-  rlimit before_{};
-  void (*handler_)(int);
-};
-
 TEST_CASE("A full disk is an error that names the file, and no file is half of what it says", "[slam]") {
   const TemporaryFolder folder;
   const std::string image = "rgb/" + std::string(6000, 'x') + ".png";
   std::string error;
   {
-    const FullDisk full(4096);
+    const cfp_test::FullDisk full(4096);
     error = error_of([&] { write_run(folder, image); });
   }
   CHECK(error == "cannot write " + (folder.path / "run/frames.txt").string());
   CHECK_FALSE(std::filesystem::exists(folder.path / "run/run.txt"));
   {
-    const FullDisk full(4);
+    const cfp_test::FullDisk full(4);
     error = error_of([&] { run_folder(folder.path / "out", settings_of(folder.path / "recording")); });
   }
   CHECK(error.find("recording.txt") != std::string::npos);
