@@ -1,6 +1,7 @@
 #include "cfp/probability/object.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -165,6 +166,20 @@ TEST_CASE("The object score allocates nothing", "[probability]") {
           volatile double keep = cfp::object_probability(d, options, scratch).static_probability;
           (void)keep;
         }) == 0);
+}
+
+TEST_CASE("Positions are shares in (0, 1] that ascend, equal ones included", "[probability]") {
+  using Positions = std::array<double, 3>;
+  const auto are_valid = [](const Positions& positions) {
+    ObjectProbabilityOptions options;
+    options.positions = positions;
+    return !cfp::invalid_field(options);
+  };
+  for (const Positions& p : {Positions{1e-9, 0.5, 1}, Positions{0.3, 0.3, 0.3}, Positions{1, 1, 1}})
+    CHECK(are_valid(p));
+  for (const Positions& p : {Positions{0, 0.2, 0.3}, Positions{0.2, 0.1, 0.3}, Positions{0.1, 0.3, 0.2},
+                             Positions{0.1, 0.2, 1.1}, Positions{0.4, 0.2, 0.3}})
+    CHECK_FALSE(are_valid(p));
 }
 
 TEST_CASE("Object options outside their range are named", "[probability]") {
