@@ -14,6 +14,11 @@ TEST_CASE("Random gives SplitMix64's published sequence", "[core]") {
   CHECK(random() == 9817491932198370423ULL);
 }
 
+TEST_CASE("Random says that every number of 64 bits may come", "[core]") {
+  CHECK((cfp::Random::min)() == 0);
+  CHECK((cfp::Random::max)() == 0xffffffffffffffffULL);
+}
+
 TEST_CASE("Random stays in range and has the stated moments", "[core]") {
   cfp::Random random(1, "moments");
   constexpr int n = 100000;

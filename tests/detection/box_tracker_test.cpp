@@ -276,6 +276,26 @@ TEST_CASE("The order of the detections changes nothing but their indices", "[det
   }
 }
 
+TEST_CASE("Equal detections start a track each, with ids of their own", "[detection]") {
+  const Detections equal(200, {{100, 100, 160, 280}, 0, 0.9});
+  cfp::BoxTracker<double> tracker;
+  for (int k = 0; k < 3; ++k) {
+    const Boxes boxes = copy(tracker.track(equal, 1.0 / 30));
+    REQUIRE(boxes.size() == equal.size());
+    std::vector<std::int64_t> ids;
+    std::vector<int> indices;
+    for (const auto& box : boxes) {
+      CHECK(box.box.x1 == Approx(100));
+      ids.push_back(box.id), indices.push_back(box.detection);
+    }
+    std::sort(ids.begin(), ids.end()), std::sort(indices.begin(), indices.end());
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      CHECK(ids[i] == static_cast<std::int64_t>(i) + 1);
+      CHECK(indices[i] == static_cast<int>(i));
+    }
+  }
+}
+
 TEST_CASE("Equal calls give equal bits, and warm frames allocate nothing", "[detection]") {
   cfp::BoxTracker<double> one(in_image()), two(in_image());
   cfp::Random noise(4, "repeat");

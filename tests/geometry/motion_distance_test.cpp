@@ -137,4 +137,10 @@ TEST_CASE("Pairs that have no distance get none, and float is near double", "[ge
   cfp::motion_distances(previous, depths, current, T.cast<float>(), camera.cast<float>(), 0.2F, options, out);
   for (std::size_t i = 0; i < out.size(); ++i)
     CHECK_THAT(double(out[i]), WithinAbs(expected[i], 1e-2 + 1e-4 * expected[i]));
+
+  const std::vector<float> none_known(out.size(), 0.0F);
+  std::vector<float> without(out.size());
+  cfp::motion_distances(previous, none_known, current, T.cast<float>(), camera.cast<float>(), 0.2F, options, out);
+  cfp::motion_distances(previous, {}, current, T.cast<float>(), camera.cast<float>(), 0.2F, options, without);
+  CHECK(without == out);
 }

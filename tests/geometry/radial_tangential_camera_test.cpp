@@ -65,6 +65,14 @@ TEST_CASE("nothing beyond the fold of the distortion is projected", "[geometry]"
   }
 }
 
+TEST_CASE("what lies on a fold of the tangential distortion is not projected", "[geometry]") {
+  // At (0, 1) the slope along x is 1 + 2 p1 y = 0.
+  const RadialTangentialCamera<double> camera{100, 100, 50, 50, 0, 0, -0.5, 0, 0};
+  Vector2<double> pixel = Vector2<double>::Zero();
+  CHECK_FALSE(camera.project({0, 1, 1}, pixel));
+  CHECK(camera.project({0, 0.25, 1}, pixel));
+}
+
 TEST_CASE("a polynomial that rises again is not trusted after its first fold", "[geometry]") {
   // 1 - 3 s + 1.6 s^2 ... radial derivative with zeros at s = 0.5 and s = 2: 1 - 2.5 s + s^2 = 1 + 3 k1 s + 5 k2 s^2.
   const RadialTangentialCamera<double> camera{500, 500, 0, 0, -2.5 / 3, 1.0 / 5};

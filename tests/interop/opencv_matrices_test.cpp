@@ -163,6 +163,8 @@ TEMPLATE_TEST_CASE("A camera from OpenCV's matrices projects as they say", "[int
   }
   CHECK(refused({}, {}));
   CHECK(refused(cv::Mat(3, 3, CV_8U), {}));
+  CHECK(refused(K.rowRange(0, 2), {}));
+  CHECK(refused(K.colRange(0, 2), {}));
   CHECK(refused(K, cv::Mat::zeros(1, 8, CV_64F)));
   CHECK(refused(K, cv::Mat::zeros(1, 5, CV_8U)));
   CHECK(refused(K, cv::Mat::ones(1, 5, CV_64F) * std::numeric_limits<double>::quiet_NaN()));

@@ -1,5 +1,6 @@
 #include "cfp/optimization/pose/pose_kernel_impl.hpp"
 
+#include <cmath>
 #include <type_traits>
 #include <vector>
 
@@ -134,4 +135,22 @@ TEST_CASE("Pose kernel: a point behind the camera keeps the error it last had in
   cfp::detail::add_pinhole<P, false>(columns, 0, lanes, camera, 0, front, cfp::Trivial<P>{}, third);
   CHECK(third.cost == Approx(25.0));
   CHECK(error[0] == Approx(25.0));
+}
+
+TEST_CASE("Pose kernel: a point is in view up to a hundred times as far aside as ahead", "[optimization]") {
+  using P = cfp::simd::Packet<double>;
+  const cfp::PinholeCamera<double> camera{500, 500, 320, 240};
+  std::vector<double> x(8), y(8), z(8, 1.0), u(8), v(8), information(8, 1.0), active(8, 1.0), error(8);
+  PoseColumns<double> columns;
+  columns.x = x.data(), columns.y = y.data(), columns.z = z.data(), columns.u = u.data(), columns.v = v.data();
+  columns.information = information.data(), columns.active = active.data(), columns.error = error.data();
+  const double beyond = std::nextafter(100.0, 200.0);
+  x = {0, 100, -100, beyond, -beyond, 0, 0, 0}, y = {0, 0, 0, 0, 0, 100, -100, beyond};
+  PoseSystem system;
+  cfp::detail::add_pinhole<P, false>(columns, 0, 8, camera, 0, {}, cfp::Trivial<P>{}, system);
+  for (std::size_t i = 0; i < 8; ++i) {
+    const bool in_view = std::abs(x[i]) <= 100 && std::abs(y[i]) <= 100;
+    CAPTURE(i, error[i]);
+    CHECK(in_view == (error[i] >= 0 && (error[i] > 0 || i == 0)));
+  }
 }

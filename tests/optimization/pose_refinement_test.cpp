@@ -74,6 +74,17 @@ TEMPLATE_TEST_CASE("Pose refinement: without noise the truth has no gradient and
   CHECK(centre_distance(kept.T_cam_world, scene.truth) < 1e-9);
 }
 
+TEST_CASE("Pose refinement: a round from the start that would repeat the one before is left out", "[optimization]") {
+  PoseSceneOptions options;
+  options.noise_px = 0.1, options.outlier_share = 0;
+  const auto clean = make_pose_scene<double>(2, options);
+  const auto result = refine(clean, {}, cfp::orb_slam2_pose_options());
+  CHECK(result.inliers == result.used);
+  CHECK(result.rounds == 2);  // one with each loss
+  options.outlier_share = 0.3;
+  CHECK(refine(make_pose_scene<double>(2, options), {}, cfp::orb_slam2_pose_options()).rounds > 2);
+}
+
 TEST_CASE("Pose refinement: a rigid motion of the world moves the pose along", "[optimization]") {
   const auto scene = make_pose_scene<double>(2, mixed());
   const cfp::SE3<double> motion{cfp::so3_exp<double>({0.3, -1.2, 2.0}), {40, -7, 1000}};

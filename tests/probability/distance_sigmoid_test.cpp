@@ -102,6 +102,7 @@ TEST_CASE("The calculation confidence is the printed formula over distances belo
   // Below 2: 0.5, 1.0, 1.5: 1 - 3 / (3 * 2).
   CHECK_THAT(cfp::calculation_confidence(d, 2.0), WithinAbs(0.5, 1e-15));
   CHECK(cfp::calculation_confidence(d, 0.5) == 0);
+  CHECK(cfp::calculation_confidence(std::vector<double>{0, 0.5, 0}, 1.0) == 1 - 0.5 / 3);  // 0 is below, too
   CHECK(cfp::calculation_confidence(d, std::numeric_limits<double>::infinity()) == 0);
   CHECK(cfp::calculation_confidence(d, std::numeric_limits<double>::quiet_NaN()) == 0);
   // Ideal 2-D noise gives about 0.44 (Rayleigh distances below their 0.8 quantile).

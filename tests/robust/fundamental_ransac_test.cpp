@@ -439,6 +439,36 @@ TEST_CASE("A person who moves before a camera at rest or turning gives no F", "[
   CHECK(named >= all - 5);
 }
 
+TEST_CASE("A person at the edge of the image, away from all other pairs, gives no F", "[robust]") {
+  FundamentalRansacWorkspace workspace;
+  cfp::Random random(49, "edge");
+  int found = 0, all = 0;
+  for (const double mirrored : {0.0, 640.0}) {
+    for (const double rotation_rad : {0.0, 0.035}) {
+      for (int trial = 0; trial < 15; ++trial) {
+        TwoViewOptions options = noisy(300, 0);
+        options.noise_px = 0.1;
+        options.translation_m = 0;
+        options.rotation_rad = rotation_rad;
+        auto scene = make_two_view_scene<double>(random, options);
+        std::vector<std::array<double, 2>> prev, cur;
+        for (std::size_t i = 0; i < 300; ++i) {
+          const double x = std::abs(scene.prev[i][0] - mirrored);
+          if (x > 300 && x < 560) continue;
+          prev.push_back(scene.prev[i]), cur.push_back(scene.cur[i]);
+          if (x >= 560) cur.back()[0] += 20, cur.back()[1] += 8;
+        }
+        const auto result =
+            fundamental_ransac(PointPairs{prev, cur}, scene.camera, FundamentalRansacOptions{}, workspace);
+        ++all;
+        found += result.found() ? 1 : 0;
+      }
+    }
+  }
+  CAPTURE(all);
+  CHECK(found == 0);
+}
+
 TEST_CASE("Pairs that tell no F give none", "[robust]") {
   FundamentalRansacWorkspace workspace;
   cfp::Random random(48, "undetermined");

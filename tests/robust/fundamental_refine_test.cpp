@@ -1,9 +1,12 @@
 #include "cfp/robust/fundamental_refine_impl.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include <Eigen/LU>
 
+#include "cfp/robust/fundamental_search_impl.hpp"
 #include "cfp/robust/homography_impl.hpp"
 #include "support/catch.hpp"
 #include "support/two_view_scene.hpp"
@@ -164,5 +167,46 @@ TEST_CASE("A pair far off a homography, or one it maps to infinity, does not mov
     CHECK_THAT(all.linearize(H, with), WithinAbs(cost + 0.9, 1e-9 * cost));
     CHECK(with.g == without.g);
     CHECK(with.H == without.H);
+  }
+}
+
+TEST_CASE("The measured noise is the truncated variance of all pairs, by their weights", "[robust]") {
+  cfp::Random random(46, "noise");
+  const auto scene = cfp_test::make_two_view_scene<double>(random, {});
+  const std::size_t n = scene.prev.size();
+  for (const std::size_t heavy : {std::size_t(0), n / 2, n - 1}) {
+    std::vector<double> weights(n, 0.01);
+    weights[heavy] = 1;
+    PairArrays pairs;
+    cfp::detail::load_pairs(cfp::PointPairs{scene.prev, scene.cur, weights}, 1e-6, pairs);
+    std::vector<std::uint32_t> list;
+    std::vector<double> distances_sq(pairs.capacity);
+    const double limit = 400 * pairs.factor * pairs.factor, sigma_sq = 0.02 * limit;
+    for (std::size_t i = 0; i < n; ++i) distances_sq[i] = sigma_sq * std::pow(random.normal(), 2);
+    distances_sq[heavy] = 2 * sigma_sq;
+    cfp::detail::FundamentalSearch<double> search{pairs, limit, list, distances_sq, cfp::Random(1)};
+    search.measure_noise();
+
+    double sum = 0, weight = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (distances_sq[i] > 6.25 * search.noise_variance) continue;
+      sum += search.weights()[i] * distances_sq[i], weight += search.weights()[i];
+    }
+    CAPTURE(heavy);
+    CHECK(search.noise_variance == Approx(sum / weight / 0.911).epsilon(0.01));
+  }
+}
+
+TEST_CASE("A pair that a homography maps to infinity costs as much as any mismatch", "[robust]") {
+  cfp::Random random(47, "infinity");
+  const Pairs pairs(random, cfp_test::SceneShape::plane);
+  const double limit = 100 * pairs.arrays.factor * pairs.arrays.factor;
+  for (const std::size_t lost : {std::size_t(0), std::size_t(50), std::size_t(100)}) {
+    Matrix3<double> H = Matrix3<double>::Identity();
+    H.row(2) << 1, 0, -pairs.arrays.row(0)[lost];
+    double expected = 0;
+    for (std::size_t i = 0; i < pairs.arrays.size; ++i)
+      expected += pairs.arrays.row(4)[i] * (std::min)(cfp::detail::transfer_sq(pairs.arrays, H, i) / limit, 1.0);
+    CHECK(cfp::detail::transfer_cost(cfp::detail::exact_columns(pairs.arrays), H, limit) == Approx(expected));
   }
 }

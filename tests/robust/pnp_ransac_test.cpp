@@ -244,6 +244,37 @@ TEST_CASE("Too few, collinear or unrelated matches leave the identity and say wh
   CHECK(run(anywhere, places) == RansacStatus::no_consensus);
 }
 
+TEST_CASE("The loss of the refinement grows with the distance, up to the weight", "[robust]") {
+  cfp::detail::ObservationArrays in;
+  const std::vector<std::array<double, 3>> world{{0, 0, 1}};
+  double last = -1;
+  for (double distance_px = 0; distance_px < 40; distance_px += 0.25) {
+    const std::vector<std::array<double, 2>> pixels{{camera<double>.cx + distance_px, camera<double>.cy}};
+    const std::vector<double> weights{0.5};
+    cfp::detail::load_observations<PinholeCamera<double>, double>(world, pixels, weights, camera<double>, in);
+    cfp::detail::NormalEquations<6> ignored;
+    cfp::SE3<double> pose;
+    pose.translation = {in.origin[0], in.origin[1], in.origin[2]};
+    const double cost = cfp::detail::ReprojectionModel<double>{in, 4}.linearize(pose, ignored);
+    const double x = distance_px * distance_px / 4, weight = in.weights()[0];
+    CAPTURE(distance_px);
+    CHECK(cost == Approx(weight * x / (1 + x)).epsilon(0.04));
+    CHECK(cost >= last);
+    CHECK(cost <= weight);
+    last = cost;
+  }
+}
+
+TEST_CASE("A camera whose pixels are beyond all numbers has no observations", "[robust]") {
+  cfp::Random random(60, "pnp");
+  const auto scene = make_absolute_pose_scene<double>(random, camera<double>, scene_options(60, 0));
+  PnpRansacWorkspace workspace;
+  const auto result = pnp_ransac(scene.world, scene.pixels, {}, PinholeCamera<double>{1e200, 1e200, 320, 240},
+                                 PnpRansacOptions{}, workspace);
+  CHECK(result.status == RansacStatus::not_enough_data);
+  CHECK(result.used == 0);
+}
+
 TEST_CASE("RANSAC options outside their range are named; a second call allocates nothing", "[robust]") {
   PnpRansacOptions options;
   CHECK(!invalid_field(options));
