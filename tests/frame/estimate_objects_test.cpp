@@ -1,6 +1,7 @@
 #include "cfp/frame/estimate_objects.hpp"
 
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "cfp/geometry/radial_tangential_camera.hpp"
@@ -44,6 +45,29 @@ TEST_CASE("The host's motion is taken as it is", "[frame]") {
   FrameRun<double> other(scene);
   other.coarse({}, frame, scene.camera);
   CHECK(other.state.objects[0].static_probability < objects[0].static_probability);
+}
+
+TEST_CASE("What is known of an object fades with the time between two frames, whatever the clock says", "[frame]") {
+  const cfp::FrameOptions options;
+  const double dt_s = 0.0625, threshold = options.object_threshold;
+  for (const double start_s : {0.0, 1341846434.0}) {
+    cfp::FrameState<double> state;
+    state.boxes.resize(1);
+    state.boxes[0].id = 7;
+    state.current.timestamp_s = start_s;
+    state.objects = {{0.97, 30, cfp::Status::ok}};
+    cfp::remember_objects(options, state);
+    const double before = cfp::object_evidence(state.objects[0].static_probability, threshold, 100);
+    REQUIRE(before > 0);
+
+    state.previous.known = true, state.previous.timestamp_s = start_s;
+    state.current.timestamp_s = start_s + dt_s;
+    state.objects = {{0.5, 0, cfp::Status::not_enough_data}};
+    cfp::remember_objects(options, state);
+    CHECK(state.objects[0].status == cfp::Status::ok);
+    CHECK(cfp::object_evidence(state.objects[0].static_probability, threshold, 100) ==
+          Approx(before * std::exp(-dt_s / options.coarse.memory.time_constant_s)));
+  }
 }
 
 TEST_CASE("Through a lens O is measured in the undistorted image", "[frame]") {

@@ -62,11 +62,3 @@ TEST_CASE("A variant switches its own parts off and nothing else", "[frame]") {
     CHECK(o.use_boxes == (variant != V::plain));
   }
 }
-
-TEST_CASE("A report of nothing counts nothing", "[frame]") {
-  const cfp::FrameReport report;
-  CHECK(report.outside + report.foreground + report.background + report.invalid == 0);
-  CHECK(report.frames_without_detections + report.frames_since_detector + report.unknown_objects == 0);
-  CHECK(report.undecided_foregrounds + report.matched_in_boxes + report.unmatched_foreground == 0);
-  CHECK(report.constrained + report.mismatched + report.deletable == 0);
-}

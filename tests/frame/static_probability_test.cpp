@@ -1,6 +1,5 @@
 #include "cfp/frame/static_probability.hpp"
 
-#include <cmath>
 #include <limits>
 #include <optional>
 #include <vector>
@@ -244,30 +243,6 @@ TEST_CASE("A missed detection is compensated, and with no-mdc it is not", "[fram
     const auto missed = host.both();
     CHECK(host.probability.state().boxes.size() == (variant == cfp::Variant::cfp ? 2U : 0U));
     CHECK(missed.report.frames_without_detections == 2);
-  }
-}
-
-TEST_CASE("What is known of an object fades with the time between two frames, whatever the clock says", "[frame]") {
-  const auto evidence = [](double o) {
-    const double threshold = cfp::FrameOptions().object_threshold;
-    return std::log(o / (1 - o)) - std::log(threshold / (1 - threshold));
-  };
-  for (const double start_s : {0.0, 1341846434.0}) {
-    Host host(make_dynamic_scene<double>({}, 34));
-    host.time = start_s;
-    host.both();
-    const auto before = host.probability.state().objects;
-    host.probability.coarse(host.previous());  // without flow
-    const auto after = host.probability.state().objects;
-    REQUIRE(before.size() == 2);
-    REQUIRE(after.size() == 2);
-    for (std::size_t b = 0; b < 2; ++b) {
-      CHECK(before[b].status == cfp::Status::ok);
-      CHECK(after[b].status == cfp::Status::ok);
-      const double share = std::exp(-1 / (30 * cfp::FrameOptions().coarse.memory.time_constant_s));
-      CHECK(evidence(after[b].static_probability) ==
-            Approx(share * evidence(before[b].static_probability)).epsilon(1e-5));
-    }
   }
 }
 
