@@ -11,12 +11,11 @@ namespace {
 
 /// A keyframe that sees the given points, keypoint by keypoint.
 int add_keyframe(Map& map, const std::vector<int>& points, const cfp::SE3<double>& T_cam_world = {}) {
-  const int index = static_cast<int>(map.keyframes.size());
   Frame frame;
   frame.keypoints.assign(points.size(), cv::KeyPoint(0, 0, 31, 0, 0, 0));
   frame.map_point = points;
   frame.T_cam_world = T_cam_world;
-  map.keyframes.push_back({frame, 0, {}, -1, {}});
+  const int index = map.add_keyframe(frame, map.newest_world());
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (map.is_alive(points[i])) map.point(points[i]).observations.push_back({index, static_cast<int>(i)});
   }
@@ -35,14 +34,62 @@ TEST_CASE("A keyframe that has gone is where it was, relative to one that moves"
   add_keyframe(map, {a, b}, at(3));
   map.erase_keyframe(2);
   map.erase_keyframe(1);  // its parent is the first now, and it is the parent of the third
-  CHECK(map.alive_keyframes() == 1);
+  CHECK(map.alive_keyframes.size() == 1);
   CHECK(map.point(a).observations.size() == 1);
   CHECK_FALSE(map.is_alive(b));
   map.keyframe(0).frame.T_cam_world = at(10);
   CHECK_THAT(map.pose(1).translation.x(), WithinAbs(11, 1e-12));
   CHECK_THAT(map.pose(2).translation.x(), WithinAbs(13, 1e-12));
-  map.erase_keyframe(0);  // nobody is left who could tell where it was
-  CHECK(map.alive_keyframes() == 1);
+  map.erase_keyframe(0);  // nobody is left who could tell where it was: it stays
+  CHECK(map.alive_keyframes.empty());
+  CHECK(map.alive_points() == 0);
+  CHECK_THAT(map.pose(0).translation.x(), WithinAbs(10, 1e-12));
+  CHECK_THAT(map.pose(2).translation.x(), WithinAbs(13, 1e-12));
+}
+
+TEST_CASE("A map that is full forgets the smallest of the other worlds, then its own oldest keyframes", "[slam]") {
+  Map map;
+  const int a = map.add({}), b = map.add({}), c = map.add({});
+  for (int k = 0; k < 4; ++k) add_keyframe(map, {a}, at(k));
+  map.begin_world();
+  for (int k = 0; k < 2; ++k) add_keyframe(map, {b}, at(10 + k));
+  const int here = map.begin_world();
+  for (int k = 0; k < 3; ++k) add_keyframe(map, {c}, at(20 + k));
+  map.forget(9, here);
+  CHECK(map.alive_keyframes.size() == 9);
+  map.forget(8, here);
+  CHECK(map.alive_keyframes == std::vector<int>{0, 1, 2, 3, 6, 7, 8});
+  CHECK_FALSE(map.is_alive(b));
+  map.forget(3, here);
+  CHECK(map.alive_keyframes == std::vector<int>{6, 7, 8});
+  map.forget(2, here);
+  CHECK(map.alive_keyframes == std::vector<int>{7, 8});
+  CHECK(map.point(c).observations.size() == 2);
+  for (int k = 0; k < 3; ++k) {  // what was tracked from them is where it was
+    CHECK_THAT(map.pose(k).translation.x(), WithinAbs(k, 1e-12));
+    CHECK_THAT(map.pose(6 + k).translation.x(), WithinAbs(20 + k, 1e-12));
+  }
+  CHECK(map.keyframe(4).world != map.keyframe(6).world);
+}
+
+TEST_CASE("A world that is joined to another moves with all that it holds and held; the others stay", "[slam]") {
+  Map map;
+  const int a = map.add({}), b = map.add({});
+  add_keyframe(map, {a}, at(1));
+  const int first = map.newest_world(), second = map.begin_world();
+  add_keyframe(map, {b}, at(2));
+  add_keyframe(map, {b}, at(3));
+  map.point(b).created_by = 1;
+  map.erase_keyframe(1);
+  map.begin_world();
+  add_keyframe(map, {map.add({})}, at(4));
+  map.join(second, first, at(5).inverse());
+  CHECK_THAT(map.pose(0).translation.x(), WithinAbs(1, 1e-12));
+  CHECK_THAT(map.pose(1).translation.x(), WithinAbs(7, 1e-12));
+  CHECK_THAT(map.pose(2).translation.x(), WithinAbs(8, 1e-12));
+  CHECK_THAT(map.pose(3).translation.x(), WithinAbs(4, 1e-12));
+  CHECK((map.keyframe(1).world == first && map.keyframe(2).world == first && map.keyframe(3).world != first));
+  CHECK_THAT(map.point(b).position.x(), WithinAbs(-5, 1e-12));
 }
 
 TEST_CASE("The place of a point that has gone is another's only when nobody knows it any more", "[slam]") {
@@ -85,7 +132,7 @@ TEST_CASE("Keyframes whose points three others see go, and with them nothing tha
   }
   Options options;
   Mapping(options).cull(map);
-  CHECK(map.alive_keyframes() == 4);
+  CHECK(map.alive_keyframes.size() == 4);
   CHECK(map.keyframe(0).parent < 0);  // the world's origin
   CHECK(map.keyframe(7).parent < 0);
   CHECK(map.alive_points() == 50);

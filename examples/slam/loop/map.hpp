@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bitset>
 #include <cstddef>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -39,14 +40,15 @@ struct Keyframe {
   Frame frame;
   int world = 0;                 // after a loss a new one begins; what is in two of them has no common frame
   std::vector<int> neighbours;   // keyframes that share points when this one was made, most first
-  int parent = -1;               // of one that has gone: where it was is told by another keyframe,
+  int parent = -1;               // of one that has gone: where it was is told by another keyframe, if there was one,
   cfp::SE3<double> T_of_parent;  // from whose camera to its own this goes
 };
 
 class Map {
  public:
   std::vector<MapPoint> points;
-  std::vector<Keyframe> keyframes;
+  std::vector<Keyframe> keyframes;   // all that ever were; of those that have gone, where they were
+  std::vector<int> alive_keyframes;  // the others, the oldest first
 
   [[nodiscard]] bool is_alive(int point) const {
     return point != no_point && points[static_cast<std::size_t>(point)].alive;
@@ -54,6 +56,12 @@ class Map {
   // Whether keyframes agree about it, as soon as there are some in its world.
   [[nodiscard]] bool is_proven(int index) const {
     return keyframes.size() < first_of_world_.back() + 3 || point(index).observations.size() >= 2;
+  }
+  // Returns its index. Its points do not know of it yet.
+  int add_keyframe(const Frame& frame, int world) {
+    keyframes.push_back({frame, world, {}, -1, {}});
+    alive_keyframes.push_back(static_cast<int>(keyframes.size()) - 1);
+    return alive_keyframes.back();
   }
   // The keyframes to come are in a world of their own.
   int begin_world() {
@@ -71,18 +79,36 @@ class Map {
       }
     }
     keyframes.erase(keyframes.begin() + static_cast<std::ptrdiff_t>(first), keyframes.end());
+    while (!alive_keyframes.empty() && alive_keyframes.back() >= static_cast<int>(first)) alive_keyframes.pop_back();
   }
-  // Moves the newest world onto another, of which it is a part from now on.
-  void join(int other, const cfp::SE3<double>& T_other_newest) {
+  // Moves a world onto another, of which it is a part from now on.
+  void join(int world, int other, const cfp::SE3<double>& T_other_world) {
     for (MapPoint& p : points) {
-      if (!p.alive || keyframe(p.created_by).world != newest_world()) continue;
-      p.position = T_other_newest * p.position;
-      p.normal = T_other_newest.rotation * p.normal;
+      if (!p.alive || keyframe(p.created_by).world != world) continue;
+      p.position = T_other_world * p.position;
+      p.normal = T_other_world.rotation * p.normal;
     }
     for (Keyframe& k : keyframes) {
-      if (k.world != newest_world()) continue;
-      k.frame.T_cam_world = k.frame.T_cam_world * T_other_newest.inverse();
+      if (k.world != world) continue;
+      k.frame.T_cam_world = k.frame.T_cam_world * T_other_world.inverse();
       k.world = other;
+    }
+  }
+  // Forgets until at most so many keyframes are left: the smallest of the worlds but this one, then its own oldest.
+  void forget(std::size_t most, int world) {
+    while (alive_keyframes.size() > most) {
+      std::map<int, int> others;
+      for (const int k : alive_keyframes) ++others[keyframe(k).world];
+      others.erase(world);
+      if (others.empty()) {
+        erase_keyframe(alive_keyframes.front());
+        continue;
+      }
+      const auto smallest = std::min_element(others.begin(), others.end(),
+                                             [](const auto& a, const auto& b) { return a.second < b.second; });
+      for (const int k : std::vector<int>(alive_keyframes)) {
+        if (keyframe(k).world == smallest->first) erase_keyframe(k);
+      }
     }
   }
   [[nodiscard]] MapPoint& point(int index) { return points[static_cast<std::size_t>(index)]; }
@@ -90,10 +116,6 @@ class Map {
   [[nodiscard]] Keyframe& keyframe(int index) { return keyframes[static_cast<std::size_t>(index)]; }
   [[nodiscard]] const Keyframe& keyframe(int index) const { return keyframes[static_cast<std::size_t>(index)]; }
   [[nodiscard]] std::size_t alive_points() const { return points.size() - free_.size() - dead_.size(); }
-  [[nodiscard]] std::size_t alive_keyframes() const {
-    return static_cast<std::size_t>(
-        std::count_if(keyframes.begin(), keyframes.end(), [](const Keyframe& k) { return k.parent < 0; }));
-  }
   // Of a keyframe that may have gone.
   [[nodiscard]] cfp::SE3<double> pose(int index) const {
     cfp::SE3<double> T_cam_ancestor;
@@ -141,7 +163,8 @@ class Map {
     if (p.observations.empty()) erase_point(index);
   }
 
-  // What it saw must be seen by others; where it was is told by the one of them that shares most with it.
+  // What nobody else sees goes with it. Where it was is told by the one of its world that shares most with it, so that
+  // it moves along, or stays as it is.
   void erase_keyframe(int index) {
     Keyframe& gone = keyframe(index);
     for (const int other : covisible(gone.frame.map_point, 1)) {
@@ -150,14 +173,18 @@ class Map {
       gone.T_of_parent = gone.frame.T_cam_world * keyframe(other).frame.T_cam_world.inverse();
       break;
     }
-    if (gone.parent < 0) return;
     for (const int p : std::vector<int>(gone.frame.map_point)) {
       if (is_alive(p)) erase_observation(p, index);
     }
-    gone.frame = {};
+    Frame pose_only;
+    pose_only.T_cam_world = gone.frame.T_cam_world;
+    gone.frame = std::move(pose_only);
     gone.neighbours = {};
-    for (Keyframe& k : keyframes)
-      k.neighbours.erase(std::remove(k.neighbours.begin(), k.neighbours.end(), index), k.neighbours.end());
+    const auto erase_from = [index](std::vector<int>& list) {
+      list.erase(std::remove(list.begin(), list.end(), index), list.end());
+    };
+    erase_from(alive_keyframes);
+    for (const int k : alive_keyframes) erase_from(keyframe(k).neighbours);
   }
 
   // Keyframes that share at least `min_shared` of the given points, most first (ties: the newer first).

@@ -70,9 +70,8 @@ class Mapping {
   // Adds the frame as a keyframe; keypoints with depth that see no point yet and may be static make new ones, M = K.
   // Returns its index.
   int insert(Map& map, const Frame& frame, int world, const View& view) {
-    const int index = static_cast<int>(map.keyframes.size());
-    map.keyframes.push_back({frame, world, {}, -1, {}});
-    Frame& kept = map.keyframes.back().frame;
+    const int index = map.add_keyframe(frame, world);
+    Frame& kept = map.keyframe(index).frame;
     const cfp::SE3<double> T_world_cam = kept.T_cam_world.inverse();
     for (std::size_t i = 0; i < kept.size(); ++i) {
       if (map.is_alive(kept.map_point[i])) {
@@ -84,12 +83,12 @@ class Mapping {
     }
     std::vector<int> neighbours = map.covisible(kept.map_point, 15);
     neighbours.erase(std::remove(neighbours.begin(), neighbours.end(), index), neighbours.end());
-    map.keyframes.back().neighbours = std::move(neighbours);
+    map.keyframe(index).neighbours = std::move(neighbours);
     return index;
   }
 
   // Of the points made by the last few keyframes, those that did not prove themselves go; then of the keyframes around
-  // the newest those that others make superfluous.
+  // the newest those that others make superfluous, and what is too much.
   void cull(Map& map) {
     const int newest = static_cast<int>(map.keyframes.size()) - 1;
     const auto is_settled = [&](int p) {
@@ -105,6 +104,7 @@ class Mapping {
     for (const int k : std::vector<int>(map.keyframe(newest).neighbours)) {
       if (k > 0 && newest - k >= 3 && is_superfluous(map, k)) map.erase_keyframe(k);
     }
+    map.forget(options_.max_keyframes, map.keyframe(newest).world);
   }
 
  private:

@@ -32,10 +32,10 @@ class Relocalization {
                       const cfp::StaticProbability<Camera>& probability, const cfp::PinholeCamera<float>& camera) {
     // The newest first, a few in each lost frame, so that a lost frame costs no more than a bounded time.
     int tries = 0;
-    for (std::size_t looked = 0; looked < map.keyframes.size() && tries < most; ++looked) {
-      const std::size_t back = next_++ % map.keyframes.size();
-      const Keyframe& keyframe = map.keyframes[map.keyframes.size() - 1 - back];
-      if (keyframe.world == not_of || keyframe.parent >= 0) continue;
+    const std::vector<int>& keyframes = map.alive_keyframes;
+    for (std::size_t looked = 0; looked < keyframes.size() && tries < most; ++looked) {
+      const Keyframe& keyframe = map.keyframe(keyframes[keyframes.size() - 1 - next_++ % keyframes.size()]);
+      if (keyframe.world == not_of) continue;
       ++tries;
       if (try_points(frame, map, keyframe.frame.map_point, probability, camera)) {
         next_ = not_of < 0 ? 0 : next_ - 1;

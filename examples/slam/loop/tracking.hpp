@@ -92,7 +92,7 @@ class Tracking {
       result.trajectory.push_back({p.time_s, (p.T_cam_reference * map_.pose(p.reference)).inverse()});
       result.world.push_back(map_.keyframe(p.reference).world);
     }
-    result.keyframes = map_.alive_keyframes();
+    result.keyframes = map_.alive_keyframes.size();
     result.map_points = map_.alive_points();
     return result;
   }
@@ -308,7 +308,7 @@ class Tracking {
     std::fill(frame.map_point.begin(), frame.map_point.end(), no_point);
     world_ = map_.begin_world();
     frames_since_join_ = 0;
-    T_old_new_.reset();
+    T_other_world_.reset();
     trial_ = Trial{2 * frame.time_s - seen_s_, poses_.size()};
     initialize(frame, record);
     record.outcome = Outcome::relocalised;
@@ -316,44 +316,46 @@ class Tracking {
     return true;
   }
 
-  // Looks for the older maps now and then. Two finds in a row that agree join the newest map to the one found, or do
-  // without it, if it is on trial.
+  // Looks for the other maps now and then. Two finds in a row that agree join the younger of the two maps to the older
+  // one, or do without it, if it is on trial.
   void join_worlds(Frame& frame, FrameRecord& record) {
-    constexpr int interval = 5;             // frames
-    const int world = map_.newest_world();  // the one that can be joined
-    if (world_ != world || world == 0 || map_.keyframes.front().world == world || probation_ > 0 ||
-        ++frames_since_join_ % interval != 0)
+    constexpr int interval = 5;  // frames
+    const auto is_other = [&](int k) { return map_.keyframe(k).world != world_; };
+    if (probation_ > 0 || ++frames_since_join_ % interval != 0 ||
+        std::none_of(map_.alive_keyframes.begin(), map_.alive_keyframes.end(), is_other))
       return;
     Frame probe = frame;
     from_last_.match.swap(no_match_);
     from_last_.match.assign(frame.size(), cfp::no_match);
-    std::optional<cfp::SE3<double>> T_old_new;
-    if (relocalize_.from_keyframes(probe, map_, 3, world, probability_, view_.camera)) {
+    std::optional<cfp::SE3<double>> T_other_world;
+    if (relocalize_.from_keyframes(probe, map_, 3, world_, probability_, view_.camera)) {
       LocalMap around(options_.features);
       relocalised_ = true;  // the step to this pose is none of the camera's
       (void)from_local_map(probe, around, frame.static_probability, true);
       const RefinedPose pose = from_local_map(probe, around, frame.static_probability, false);
       relocalised_ = false;
-      if (pose.health.ok()) T_old_new = probe.T_cam_world.inverse() * frame.T_cam_world;
-      if (T_old_new && T_old_new_ && agree(*T_old_new, *T_old_new_, frame)) {
-        take_bundle(true);
-        last_.T_cam_world = last_.T_cam_world * T_old_new->inverse();
+      if (pose.health.ok()) T_other_world = probe.T_cam_world.inverse() * frame.T_cam_world;
+      const bool sure = T_other_world && T_other_world_ && agree(*T_other_world, *T_other_world_, frame);
+      const int other = map_.keyframe(around.reference()).world;
+      if (sure) take_bundle(true);
+      if (sure && other < world_) {
+        last_.T_cam_world = last_.T_cam_world * T_other_world->inverse();
         frame = probe;
         pose_ = pose;
         local_map_.set_reference(around.reference());
-        world_ = map_.keyframe(around.reference()).world;
-        if (trial_) {
-          end_trial(record);
-          relocalised_ = true;
-          probation_ = options_.probation;
-          first_on_probation_ = poses_.size();
-        } else {
-          map_.join(world_, *T_old_new);
-          note(record, "joined to the old map");
-        }
       }
+      if (sure && trial_) {
+        end_trial(record);
+        relocalised_ = true;
+        probation_ = options_.probation;
+        first_on_probation_ = poses_.size();
+      } else if (sure) {
+        other < world_ ? map_.join(world_, other, *T_other_world) : map_.join(other, world_, T_other_world->inverse());
+        note(record, "joined to the old map");
+      }
+      if (sure) world_ = std::min(world_, other);
     }
-    T_old_new_ = T_old_new;
+    T_other_world_ = T_other_world;
     from_last_.match.swap(no_match_);
   }
   // Where the camera of a frame is by two transformations.
@@ -421,10 +423,10 @@ class Tracking {
   cfp::DetectorHealth<float> detector_;
   bool detector_ok_ = true;
   cfp_examples::Detections detections_;
-  std::optional<BelievedPose> believed_;       // the last of all frames
-  int world_ = 0;                              // of the keyframes to come
-  double seen_s_ = 0;                          // when that was
-  std::optional<cfp::SE3<double>> T_old_new_;  // of the last look for older maps
+  std::optional<BelievedPose> believed_;           // the last of all frames
+  int world_ = 0;                                  // of the keyframes to come
+  double seen_s_ = 0;                              // when that was
+  std::optional<cfp::SE3<double>> T_other_world_;  // of the last look for other maps
   int frames_since_join_ = 0;
   std::optional<Trial> trial_;
   std::vector<std::int32_t> no_match_;
