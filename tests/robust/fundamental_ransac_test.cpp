@@ -506,6 +506,36 @@ TEST_CASE("Pairs that tell no F give none", "[robust]") {
   CHECK(chance <= 1);
 }
 
+TEST_CASE("Two long lines of points give no F, however far the camera has moved", "[robust]") {
+  FundamentalRansacWorkspace workspace;
+  cfp::Random random(50, "lines");
+  const cfp::Vector3<double> at[2] = {{-0.3, 0.2, 2.5}, {0.4, -0.3, 3}},
+                             along[2] = {{0.9, 0.3, 0.4}, {-0.4, 0.7, -0.5}};
+  int found = 0;
+  for (const std::size_t n : {60U, 300U}) {
+    for (int trial = 0; trial < 20; ++trial) {
+      TwoViewOptions options = noisy(8, 0);
+      options.translation_m = 0.3;
+      const auto scene = make_two_view_scene<double>(random, options);
+      std::vector<std::array<double, 2>> prev, cur;
+      while (prev.size() < n) {
+        const std::size_t line = prev.size() % 2;
+        const cfp::Vector3<double> point = at[line] + random.uniform(-2, 2) * along[line];
+        cfp::Vector2<double> u(0, 0), v(0, 0);
+        REQUIRE((scene.camera.project(point, u) && scene.camera.project(scene.T_cur_prev * point, v)));
+        const auto measured = [&](const cfp::Vector2<double>& pixel) {
+          return std::array<double, 2>{pixel.x() + 0.1 * random.normal(), pixel.y() + 0.1 * random.normal()};
+        };
+        prev.push_back(measured(u)), cur.push_back(measured(v));
+      }
+      const auto result =
+          fundamental_ransac(PointPairs{prev, cur}, scene.camera, FundamentalRansacOptions{}, workspace);
+      found += result.found() ? 1 : 0;
+    }
+  }
+  CHECK(found == 0);
+}
+
 TEST_CASE("Mismatches that all end in one place are no support", "[robust]") {
   FundamentalRansacWorkspace workspace;
   cfp::Random random(49, "one place");
