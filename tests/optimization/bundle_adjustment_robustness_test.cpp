@@ -1,6 +1,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,18 @@ struct BackwardExecutor {
   void operator()(int count, const Task& task) const {
     for (int i = count - 1; i >= 0; --i) task(i);
   }
+};
+
+/// Whose thread pool ends at some call.
+struct EndingExecutor {
+  template <typename Task>
+  void operator()(int count, const Task& task) {
+    for (int i = 0; i < count; ++i) {
+      if (i == 1 && calls_left-- == 0) throw std::runtime_error("no thread");
+      task(i);
+    }
+  }
+  int calls_left;
 };
 
 bool same_bits(const cfp_test::BaScene& a, const cfp_test::BaScene& b) {
@@ -56,6 +69,34 @@ TEST_CASE("One thread, two threads and any order of the tasks give the same bits
     CHECK(same_bits(one, two));
     CHECK(same_bits(one, backward));
     CHECK(same_bits(one, again));
+  }
+}
+
+TEST_CASE("An executor that throws leaves poses and points as they were, and the workspace as good as new",
+          "[optimization][bundle_adjustment]") {
+  cfp_test::BaSceneOptions options;
+  options.poses = 30;
+  options.points = 900;
+  const cfp_test::BaScene start = cfp_test::make_ba_scene(options, 3);
+  cfp_test::BaScene expected = start;
+  REQUIRE(adjust(expected).accepted > 1);
+  REQUIRE(expected.problem().observations.pose.size() >= 4000);
+  cfp::BundleWorkspace workspace;
+  bool done = false;
+  for (int calls = 0; !done; ++calls) {
+    cfp_test::BaScene scene = start;
+    try {
+      (void)adjust_bundle(scene.problem(), cfp::BundleOptions{}, workspace, EndingExecutor{calls});
+      done = true;
+      CHECK(calls > 4);
+      CHECK(same_bits(scene, expected));
+    } catch (const std::runtime_error&) {
+      CHECK(same_bits(scene, start));
+    }
+    if (calls % 3 != 0) continue;
+    scene = start;
+    (void)adjust_bundle(scene.problem(), cfp::BundleOptions{}, workspace);
+    CHECK(same_bits(scene, expected));
   }
 }
 

@@ -45,6 +45,7 @@ struct SingleThread {
 /// - A fixed pose, a free pose or a point without a used observation keeps its bits. When no step was accepted,
 ///   everything does.
 /// - The same input gives the same bits with any executor. Parts of less than 4000 observations stay on this thread.
+/// - What the executor or an allocation throws passes through; poses and points are then as they were.
 /// - Allocates only in the workspace, before the first iteration; not at all when it has seen a problem of this size.
 /// - squared_errors, when not empty: one per observation, |r|^2 / sigma^2 at the solution, for the caller's outlier
 ///   test (against 5.991 mono, 7.815 RGB-D; the weight has no part in it); -1 when the camera does not see the point or
