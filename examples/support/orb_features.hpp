@@ -1,6 +1,6 @@
 // ORB keypoints spread over the image. OpenCV's detector keeps the strongest corners of the whole image, which crowd on
 // a few textured things (often the people's clothes); here every cell of the image gives its best corners in turn,
-// and where few are found the threshold falls.
+// most of them go to what is outside of all boxes, and where few are found the threshold falls.
 #pragma once
 
 #include <algorithm>
@@ -12,6 +12,8 @@
 #include <vector>
 
 #include <opencv2/features2d.hpp>
+
+#include "cfp/geometry/box.hpp"
 
 namespace cfp_examples {
 
@@ -25,6 +27,7 @@ struct FeatureOptions {
   int fast_threshold = 12;    // grey levels, and
   int lowest_threshold = 3;   // where that finds too little
   int cell = 40;              // pixels, at the level's own scale
+  double room_share = 0.6;    // of the keypoints, outside of the boxes, if there are so many
 };
 
 class FeatureExtractor {
@@ -35,14 +38,16 @@ class FeatureExtractor {
                              31, options.fast_threshold)),
         levels_(static_cast<std::size_t>(options.levels)) {}
 
-  void operator()(const cv::Mat& gray, std::vector<cv::KeyPoint>& keypoints, std::vector<OrbDescriptor>& descriptors) {
+  // boxes: where people may be.
+  void operator()(const cv::Mat& gray, const std::vector<cfp::Box<float>>& boxes, std::vector<cv::KeyPoint>& keypoints,
+                  std::vector<OrbDescriptor>& descriptors) {
     int threshold = options_.fast_threshold;
     do {
       orb_->setFastThreshold(threshold);
       orb_->detect(gray, candidates_);
       threshold /= 2;
     } while (candidates_.size() < static_cast<std::size_t>(options_.count) && threshold >= options_.lowest_threshold);
-    select(gray.cols, gray.rows, keypoints);
+    select(gray.cols, gray.rows, boxes, keypoints);
     cv::Mat rows;
     orb_->compute(gray, keypoints, rows);
     descriptors.resize(keypoints.size());
@@ -51,14 +56,32 @@ class FeatureExtractor {
   }
 
  private:
+  using Candidates = std::vector<cv::KeyPoint>::const_iterator;
+
+  // Where people would take more than is left by the room's share, the room takes that first.
+  void select(int width, int height, const std::vector<cfp::Box<float>>& boxes, std::vector<cv::KeyPoint>& keypoints) {
+    const auto is_room = [&](const cv::KeyPoint& k) {
+      return std::none_of(boxes.begin(), boxes.end(), [&](const auto& b) { return cfp::contains(b, k.pt.x, k.pt.y); });
+    };
+    const auto room_end = std::stable_partition(candidates_.begin(), candidates_.end(), is_room);
+    const double wanted = std::min(double(candidates_.size()), double(options_.count));
+    const double of_room = std::min(double(room_end - candidates_.begin()), options_.room_share * wanted);
+    keypoints.clear();
+    select(candidates_.begin(), candidates_.end(), wanted, width, height, keypoints);
+    if (double(std::count_if(keypoints.begin(), keypoints.end(), is_room)) >= of_room) return;
+    keypoints.clear();
+    select(candidates_.begin(), room_end, of_room, width, height, keypoints);
+    select(room_end, candidates_.end(), wanted - of_room, width, height, keypoints);
+  }
+
   // The same share of every level's corners; within a level the best of each cell, then the second best of each, and so
   // on.
-  void select(int width, int height, std::vector<cv::KeyPoint>& keypoints) {
+  void select(Candidates first, Candidates last, double wanted, int width, int height,
+              std::vector<cv::KeyPoint>& keypoints) {
     for (auto& level : levels_) level.clear();
-    for (const cv::KeyPoint& k : candidates_)
-      levels_[static_cast<std::size_t>(std::clamp(k.octave, 0, options_.levels - 1))].push_back(k);
-    keypoints.clear();
-    const double share = std::min(1.0, double(options_.count) / double(std::max<std::size_t>(candidates_.size(), 1)));
+    for (auto k = first; k != last; ++k)
+      levels_[static_cast<std::size_t>(std::clamp(k->octave, 0, options_.levels - 1))].push_back(*k);
+    const double share = wanted / std::max(double(last - first), 1.0);
     float cell = static_cast<float>(options_.cell);
     for (auto& level : levels_) {
       spread(level, cell, width, height, static_cast<std::size_t>(std::lround(share * double(level.size()))),

@@ -20,13 +20,17 @@ cv::Mat image() {
   return gray;
 }
 
-std::size_t find(const cv::Mat& gray, const FeatureOptions& options = {}) {
+std::vector<cv::KeyPoint> keypoints_of(const cv::Mat& gray, const std::vector<cfp::Box<float>>& boxes,
+                                       const FeatureOptions& options = {}) {
   FeatureExtractor extract(options);
   std::vector<cv::KeyPoint> keypoints;
   std::vector<OrbDescriptor> descriptors;
-  extract(gray, keypoints, descriptors);
+  extract(gray, boxes, keypoints, descriptors);
   CHECK(descriptors.size() == keypoints.size());
-  return keypoints.size();
+  return keypoints;
+}
+std::size_t find(const cv::Mat& gray, const FeatureOptions& options = {}) {
+  return keypoints_of(gray, {}, options).size();
 }
 
 }  // namespace
@@ -38,4 +42,24 @@ TEST_CASE("Where a threshold finds too little it falls", "[features]") {
   fixed.lowest_threshold = 100;
   CHECK(find(dark) > 2 * find(dark, fixed));
   CHECK(find(cv::Mat(480, 640, CV_8U, cv::Scalar(9))) == 0);
+}
+
+TEST_CASE("People with more corners than the room around them leave it its share", "[features]") {
+  const cfp::Box<float> box{120, 0, 520, 480};
+  cv::Mat gray = image();
+  const cv::Rect sides[] = {{0, 0, 120, 480}, {520, 0, 120, 480}};
+  for (const cv::Rect& side : sides) gray(side) = 60 + 0.5 * gray(side);
+  const auto outside = [&](const std::vector<cv::KeyPoint>& keypoints) {
+    return std::count_if(keypoints.begin(), keypoints.end(),
+                         [&](const auto& k) { return !cfp::contains(box, k.pt.x, k.pt.y); });
+  };
+  FeatureOptions options;
+  options.candidates = 10000;
+  const auto taken = keypoints_of(gray, {}, options), shared = keypoints_of(gray, {box}, options);
+  CAPTURE(taken.size(), shared.size(), outside(taken), outside(shared));
+  CHECK(double(outside(taken)) < 0.4 * double(taken.size()));
+  CHECK(double(outside(shared)) >= 0.59 * double(shared.size()));
+  CHECK(double(outside(shared)) <= 0.61 * double(shared.size()));
+  CHECK(std::abs(int(shared.size()) - options.count) < 10);
+  CHECK(keypoints_of(gray, {{0, 0, 640, 480}}, options).size() == taken.size());  // nobody else wants them
 }

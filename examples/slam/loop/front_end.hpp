@@ -71,7 +71,8 @@ class FrontEnd {
     return result;
   }
 
-  // The boxes of the frame just made, as the tracker has them: the next call's flow starts in them.
+  // The boxes of the frame just made, as the tracker has them: the next call's flow starts in them, and its keypoints
+  // are taken outside of them as far as possible.
   void set_boxes(const std::vector<BoxRecord>& boxes) {
     last_boxes_.clear();
     for (const BoxRecord& box : boxes) last_boxes_.push_back(box.box);
@@ -79,7 +80,7 @@ class FrontEnd {
 
  private:
   void extract(const cv::Mat& gray, const cv::Mat& depth, Frame& frame) {
-    extract_(gray, frame.keypoints, frame.descriptors);
+    extract_(gray, last_boxes_, frame.keypoints, frame.descriptors);
     const auto pixels = cfp::undistorted(camera_, cfp::view(frame.keypoints), frame.pixels);
     frame.depths_m.resize(frame.size());
     cfp::sample_depth(depth, cfp::view(frame.keypoints), metres_per_unit_, frame.depths_m);
