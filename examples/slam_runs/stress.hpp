@@ -123,12 +123,14 @@ inline std::vector<Stress> stresses(std::size_t frames, double rate_hz, const cf
       cv::circle(f.depth, {at(f.depth.cols), at(f.depth.rows)}, f.depth.cols / 12, cv::Scalar::all(0), cv::FILLED);
     }
   });
-  for (const auto& [name, share] : {std::pair<const char*, double>{"board over 40 %", 0.4}, {"board over 70 %", 0.7}}) {
-    add(name, 60, &Stress::image,
-        [first, share = share, units = camera.depth_units_per_metre](std::size_t k, SequenceFrame& f) {
-          detail::carry_board(static_cast<double>(k - first) / 60, share, 1.1, units, f);
-        });
-  }
+  const auto carry = [&](const char* name, double share, double length) {
+    add(name, length, &Stress::image, [=, units = camera.depth_units_per_metre](std::size_t k, SequenceFrame& f) {
+      detail::carry_board(static_cast<double>(k - first) / length, share, 1.1, units, f);
+    });
+  };
+  carry("board over 40 %", 0.4, 60);
+  carry("board over 70 %", 0.7, 60);
+  carry("board over all, slowly", 1, 120);
 
   const auto detections = [&](const char* name, double length, auto change) {
     add(name, length, &Stress::detections, change);

@@ -40,7 +40,7 @@ constexpr const char* to_string(Module module) {
 
 enum class Outcome : std::uint8_t {
   tracked,
-  relocalised,  // a pose from the map alone, after a loss or a gap, or on probation after one
+  relocalised,  // a pose from the map alone, after a loss or a gap, on probation after one, or in a map of its own
   lost,         // no pose; none is invented
   skipped       // the images could not be used; `note` says why
 };

@@ -366,7 +366,8 @@ class Tracking {
 
   void extend_map(Frame& frame, FrameRecord& record) {
     const bool on_probation = relocalised_ || probation_ > 0;
-    record.outcome = on_probation || trial_ ? Outcome::relocalised : Outcome::tracked;
+    const bool apart = world_ != map_.keyframe(map_.alive_keyframes.front()).world;
+    record.outcome = on_probation || apart ? Outcome::relocalised : Outcome::tracked;
     update_points(map_, frame, probability_, !on_probation, detector_ok_);
     ++frames_since_keyframe_;
     if (!on_probation &&
