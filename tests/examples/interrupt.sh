@@ -5,7 +5,7 @@ set -euo pipefail
 synthetic=$1 slam=$2 report=$3 folder=$4
 fail() { echo "interrupt.sh: $*" >&2; exit 1; }
 rm -rf "$folder"
-mkdir -p "$folder"
+mkdir -p "$folder/out"
 cd "$folder"
 "$synthetic" recording --width 192 --frames 20 --threads 2 >/dev/null
 run() { timeout --foreground -s INT "$1" "$slam" run recording --detector none --variant plain,cfp --seeds 3 --threads 1 --out out --resume >log 2>&1; }
