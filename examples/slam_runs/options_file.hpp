@@ -24,6 +24,7 @@ void for_each_option(Options& o, const Visit& visit) {
   visit("baseline_fx", o.baseline_fx);
   visit("unproven_share", o.unproven_share);
   visit("min_known_share", o.min_known_share);
+  visit("features.room_share", o.features.room_share);
   visit("probability.object_threshold", p.object_threshold);
   visit("probability.min_creation_probability", p.min_creation_probability);
   visit("probability.min_inlier_weight", p.min_inlier_weight);
