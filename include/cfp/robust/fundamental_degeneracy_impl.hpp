@@ -24,7 +24,7 @@ struct DegeneracyCheck {
   std::vector<T>& scratch;  // of twice the arrays' capacity
   const PairArrays& pairs = search.pairs;
   Matrix3<T> H = scaled_homography(Matrix3<T>::Identity());
-  bool refined = false, sound = false, dominant = false;  // H explains something; more than chance; half of the pairs
+  bool sound = false, dominant = false;  // H explains more than chance does; half of the pairs
 
   // Transfer distances have two degrees of freedom and the noise of both images: 95 % of chi-squared is there at 3
   // times the squared threshold that holds 95 % of the Sampson distances.
@@ -35,22 +35,27 @@ struct DegeneracyCheck {
     return search.list[search.random.index(static_cast<std::uint32_t>(search.list.size()))];
   }
 
+  // Makes H the one of itself and those of `samples` times four pairs that explains most of the columns.
+  template <typename Draw>
+  void sample_homographies(const PairColumns<float>& columns, int samples, const Draw& draw) noexcept {
+    double best = transfer_cost(columns, H, transfer_limit());
+    for (int k = 0; k < samples; ++k) {
+      Matrix3<T> candidate;
+      if (!homography_of_four(pairs, {draw(), draw(), draw(), draw()}, candidate)) continue;
+      const double cost = transfer_cost(columns, candidate, transfer_limit());
+      if (cost < best) best = cost, H = candidate;
+    }
+  }
+
   // The homography that explains most of `list`, refined on all pairs: the identity or one of four pairs.
   void find_homography(int samples) noexcept {
     if (search.list.size() < 4) return;
-    double best = transfer_cost(thinned_columns(pairs), H, transfer_limit());
-    for (int k = 0; k < samples; ++k) {
-      Matrix3<T> candidate;
-      if (!homography_of_four(pairs, {drawn(), drawn(), drawn(), drawn()}, candidate)) continue;
-      const double cost = transfer_cost(thinned_columns(pairs), candidate, transfer_limit());
-      if (cost < best) best = cost, H = candidate;
-    }
+    sample_homographies(thinned_columns(pairs), samples, [this] { return drawn(); });
     double weight = 0, explained = 0;
     for (const std::uint32_t i : search.list) weight += search.weights()[i];
     // A few noisy points carry a homography only so far: a sixth of the support is enough to go on and refine.
-    best = transfer_cost(fast_columns(pairs), H, transfer_limit());
-    refined = search.total_weight() - best > weight / 6;
-    if (!refined) return;
+    const double cost = transfer_cost(fast_columns(pairs), H, transfer_limit());
+    if (!(search.total_weight() - cost > weight / 6)) return;
     refine_homography(thinned_columns(pairs), 4 * transfer_limit(), 5, H);
     refine_homography(exact_columns(pairs), transfer_limit(), 3, H);
     for (const std::uint32_t i : search.list)
@@ -97,12 +102,9 @@ struct DegeneracyCheck {
   // no motion and against H. least: distinct pairs it has to explain.
   [[nodiscard]] bool has_parallax(double least) noexcept {
     FundamentalEvidence<T> evidence{search, scratch};
-    bool person_possible = true;
     evidence.stride = (std::max)(pairs.size / PairArrays::enough, std::size_t(1));
-    if (refined) {
-      evidence.compare(H);
-      person_possible = refine_beside(evidence.judge().window);
-    }
+    evidence.compare(H);
+    const bool person_possible = find_homography_beside(evidence.judge().window);
     const auto suffices = [&](T factor) {
       const T n = static_cast<T>(pairs.size);
       const auto stands = [&](const Matrix3<T>& other) {
@@ -124,31 +126,37 @@ struct DegeneracyCheck {
     return suffices(1);
   }
 
-  // Refines H on the pairs outside the window of a person, who bends H towards F. Whether H then explains most of what
-  // F explains there, as it does if a person is all that moves, or F explains too little to tell; else H stays as it
-  // was.
-  [[nodiscard]] bool refine_beside(std::size_t window) noexcept {
-    Matrix3<T> candidate = H;
+  // Looks for the homography of the pairs outside the window of a person, who bends H towards F. H becomes that one,
+  // and the answer is true, where it explains most of what F explains there, as it does if a person is all that moves,
+  // or F explains too little to tell.
+  [[nodiscard]] bool find_homography_beside(std::size_t window) noexcept {
+    if (search.list.size() < 4) return true;
+    const Matrix3<T> before = H;
+    const auto inside = [&](std::size_t i) { return FundamentalEvidence<T>::in_window(pairs, i, window); };
     PairColumns<float> columns = thinned_columns(pairs);
     std::array<float, PairArrays::enough> weights = {};
-    const auto index = [&](std::size_t k) { return pairs.size > columns.size ? k * pairs.size / columns.size : k; };
     for (std::size_t k = 0; k < columns.size; ++k)
-      weights[k] = FundamentalEvidence<T>::in_window(pairs, index(k), window) ? 0.0F : columns.row[4][k];
+      weights[k] = inside(pairs.size > columns.size ? k * pairs.size / columns.size : k) ? 0.0F : columns.row[4][k];
     columns.row[4] = weights.data();
-    refine_homography(columns, 4 * transfer_limit(), 3, candidate);
-    refine_homography(columns, transfer_noise_limit(), 3, candidate);
+    const auto drawn_outside = [&] {
+      std::uint32_t i = drawn();
+      for (int attempt = 0; attempt < 10 && inside(i); ++attempt) i = drawn();
+      return i;
+    };
+    sample_homographies(columns, 50, drawn_outside);
+    refine_homography(columns, 4 * transfer_limit(), 3, H);
+    refine_homography(columns, transfer_noise_limit(), 3, H);
     T both = 0, outside = 0, explained = 0;
     for (std::size_t i = 0; i < pairs.size; ++i) {
-      if (!(search.distances_sq[i] <= search.noise_limit())) continue;
-      const T w = search.weights()[i];
+      const T w = search.distances_sq[i] <= search.noise_limit() ? search.weights()[i] : T(0);
       explained += w;
-      if (FundamentalEvidence<T>::in_window(pairs, i, window)) continue;
+      if (inside(i)) continue;
       outside += w;
-      both += transfer_sq(pairs, candidate, i) <= transfer_noise_limit() ? w : T(0);
+      both += transfer_sq(pairs, H, i) <= transfer_noise_limit() ? w : T(0);
     }
-    if (!(both >= T(0.8) * outside) && explained > search.total_weight() / 4) return false;
-    H = candidate;
-    return true;
+    if (both >= T(0.8) * outside || explained <= T(0.4) * search.total_weight()) return true;
+    H = before;
+    return false;
   }
 
   // Share of the pairs explained by H that `other` explains, too.
