@@ -22,8 +22,7 @@ struct MappingOptions {
   double min_found_share = 0.25;                // points seen in a smaller share of the frames that should see them go
   std::size_t min_observations = 2;  // as do points in fewer keyframes than this, three keyframes after their own
   double superfluous_share = 0.9;    // keyframes of whose points three others see this share go
-  std::size_t max_keyframes =
-      500;  // over all worlds (some 0.15 MB each): the smallest other world goes, then the oldest
+  std::size_t max_keyframes = 500;   // over all worlds: beyond, the smallest other world goes, then the oldest
 };
 
 struct LocalBundleOptions {

@@ -335,28 +335,34 @@ class Tracking {
       const RefinedPose pose = from_local_map(probe, around, frame.static_probability, false);
       relocalised_ = false;
       if (pose.health.ok()) T_other_world = probe.T_cam_world.inverse() * frame.T_cam_world;
-      const bool sure = T_other_world && T_other_world_ && agree(*T_other_world, *T_other_world_, frame);
-      const int other = map_.keyframe(around.reference()).world;
-      if (sure) take_bundle(true);
-      if (sure && other < world_) {
-        last_.T_cam_world = last_.T_cam_world * T_other_world->inverse();
-        frame = probe;
-        pose_ = pose;
-        local_map_.set_reference(around.reference());
-      }
-      if (sure && trial_) {
-        end_trial(record);
-        relocalised_ = true;
-        probation_ = options_.probation;
-        first_on_probation_ = poses_.size();
-      } else if (sure) {
-        other < world_ ? map_.join(world_, other, *T_other_world) : map_.join(other, world_, T_other_world->inverse());
-        note(record, "joined to the old map");
-      }
-      if (sure) world_ = std::min(world_, other);
+      if (T_other_world && T_other_world_ && agree(*T_other_world, *T_other_world_, frame))
+        join_world(map_.keyframe(around.reference()).world, *T_other_world, probe, pose, around.reference(), frame,
+                   record);
     }
     T_other_world_ = T_other_world;
     from_last_.match.swap(no_match_);
+  }
+  // `probe` is the frame as the other world sees it, by its keyframe `reference`.
+  void join_world(int other, const cfp::SE3<double>& T_other_world, const Frame& probe, const RefinedPose& pose,
+                  int reference, Frame& frame, FrameRecord& record) {
+    take_bundle(true);
+    const bool is_older = other < world_;
+    if (is_older) {
+      last_.T_cam_world = last_.T_cam_world * T_other_world.inverse();
+      frame = probe;
+      pose_ = pose;
+      local_map_.set_reference(reference);
+    }
+    if (trial_) {
+      end_trial(record);
+      relocalised_ = true;
+      probation_ = options_.probation;
+      first_on_probation_ = poses_.size();
+    } else {
+      is_older ? map_.join(world_, other, T_other_world) : map_.join(other, world_, T_other_world.inverse());
+      note(record, "joined to the old map");
+    }
+    world_ = std::min(world_, other);
   }
   // Where the camera of a frame is by two transformations.
   static bool agree(const cfp::SE3<double>& a, const cfp::SE3<double>& b, const Frame& frame) {
