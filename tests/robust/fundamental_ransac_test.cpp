@@ -410,27 +410,22 @@ TEST_CASE("A walker with more pairs than the room is no parallax", "[robust]") {
   cfp::Random random(48, "walker and mismatches");
   int found = 0;
   for (int trial = 0; trial < 30; ++trial) {
-    TwoViewOptions options = noisy(300, 0);
+    TwoViewOptions options = noisy(300, 0.9);
     options.noise_px = 0;
     options.translation_m = 0;
     options.rotation_rad = 0.035;
     auto scene = make_two_view_scene<double>(random, options);
     const double left = random.uniform(0, 500);
-    for (std::size_t i = 0; i < 300; ++i) {
-      if (i < 90) {
-        scene.prev[i] = {left + random.uniform(0, 130), random.uniform(60, 440)};
-        cfp::Vector3<double> ray;
-        REQUIRE(scene.camera.unproject({scene.prev[i][0], scene.prev[i][1]}, ray));
-        cfp::Vector2<double> now(0, 0);
-        REQUIRE(scene.camera.project(scene.T_cur_prev.rotation * ray, now));
-        scene.cur[i] = {now.x() + 5, now.y() + 3};
-      } else if (random.uniform() < 0.9) {
-        const double angle = random.uniform(0, 2 * cfp::pi<double>), radius = random.uniform(3, 40);
-        scene.cur[i][0] += radius * std::cos(angle), scene.cur[i][1] += radius * std::sin(angle);
-      }
+    for (std::size_t i = 0; i < 90; ++i) {
+      scene.prev[i] = {left + random.uniform(0, 130), random.uniform(60, 440)};
+      cfp::Vector3<double> ray;
+      REQUIRE(scene.camera.unproject({scene.prev[i][0], scene.prev[i][1]}, ray));
+      cfp::Vector2<double> now(0, 0);
+      REQUIRE(scene.camera.project(scene.T_cur_prev.rotation * ray, now));
+      scene.cur[i] = {now.x() + 5, now.y() + 3};
     }
-    found +=
-        fundamental_ransac(PointPairs{scene.prev, scene.cur}, FundamentalRansacOptions{}, workspace).found() ? 1 : 0;
+    const auto result = fundamental_ransac(PointPairs{scene.prev, scene.cur}, FundamentalRansacOptions{}, workspace);
+    found += result.found() ? 1 : 0;
   }
   CHECK(found <= 5);
 }
