@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
+#include "cfp/core/random.hpp"
 #include "support/catch.hpp"
-#include "support/generators.hpp"
 
 using Catch::Matchers::WithinAbs;
 using cfp::no_match;
