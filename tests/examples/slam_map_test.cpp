@@ -1,5 +1,6 @@
 #include "../../examples/slam/loop/map.hpp"
 
+#include "../../examples/slam/loop/local_bundle.hpp"
 #include "../../examples/slam/loop/mapping.hpp"
 #include "../../examples/slam/loop/matching.hpp"
 #include "cfp/core/random.hpp"
@@ -72,6 +73,18 @@ TEST_CASE("A map that is full forgets the smallest of the other worlds, then its
   CHECK(map.keyframe(4).world != map.keyframe(6).world);
 }
 
+TEST_CASE("A map that is full does not give up a large world for a small one that has begun", "[slam]") {
+  Map map;
+  const int a = map.add({}), b = map.add({});
+  for (int k = 0; k < 8; ++k) add_keyframe(map, {a}, at(k));
+  const int here = map.begin_world();
+  for (int k = 0; k < 2; ++k) add_keyframe(map, {b}, at(10 + k));
+  map.forget(9, here);
+  CHECK(map.alive_keyframes == std::vector<int>{1, 2, 3, 4, 5, 6, 7, 8, 9});
+  map.forget(5, here);
+  CHECK(map.alive_keyframes == std::vector<int>{5, 6, 7, 8, 9});
+}
+
 TEST_CASE("A world that is joined to another moves with all that it holds and held; the others stay", "[slam]") {
   Map map;
   const int a = map.add({}), b = map.add({});
@@ -137,6 +150,41 @@ TEST_CASE("Keyframes whose points three others see go, and with them nothing tha
   CHECK(map.keyframe(7).parent < 0);
   CHECK(map.alive_points() == 50);
   for (const int p : points) CHECK(map.point(p).observations.size() == 4);
+}
+
+TEST_CASE("A bundle adjustment corrects the newest keyframe, but does not contradict the pose that was believed",
+          "[slam]") {
+  const cfp::PinholeCamera<float> camera{525, 525, 320, 240};
+  const View view{camera, camera.cast<double>(), 640, 480, {1}, 1, 40};
+  for (const double error_m : {0.05, 0.2}) {
+    cfp::Random random(1, "bundle");
+    Map map;
+    Frame frames[2];
+    for (int i = 0; i < 60; ++i) {
+      MapPoint point;
+      point.position = {random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(2, 4)};
+      for (int k = 0; k < 2; ++k) {
+        const cfp::Vector3<double> in_camera = at(0.1 * k) * point.position;
+        cfp::Vector2<double> pixel;
+        REQUIRE(view.exact.project(in_camera, pixel));
+        frames[k].keypoints.emplace_back();
+        frames[k].keypoints.back().octave = 0;
+        frames[k].pixels.push_back({float(pixel.x()), float(pixel.y())});
+        frames[k].depths_m.push_back(float(in_camera.z()));
+        frames[k].static_probability.push_back(1);
+        frames[k].map_point.push_back(i);
+        point.observations.push_back({k, i});
+      }
+      map.add(std::move(point));
+    }
+    frames[1].T_cam_world = at(0.1 + error_m);
+    for (const Frame& frame : frames) map.add_keyframe(frame, 0);
+    LocalBundle bundle(map, 1, view, {});
+    bundle.solve();
+    bundle.apply(map);
+    CHECK_THAT(map.pose(1).translation.x(), WithinAbs(error_m < 0.1 ? 0.1 : 0.1 + error_m, 1e-3));
+    CHECK(map.pose(0).translation.norm() == 0);
+  }
 }
 
 TEST_CASE("Depths tell the matches that one motion explains from the nine in ten that none does", "[slam]") {

@@ -50,8 +50,10 @@ class LocalBundle {
   }
 
   // Writes poses and points back and forgets the observations that do not fit. What has gone from the map meanwhile
-  // stays away.
+  // stays away. Where few points tie the newest keyframe to the others, the result may be far off: then it is left.
   void apply(Map& map) const {
+    const cfp::SE3<double>& before = map.keyframe(keyframes_.front()).frame.T_cam_world;
+    if (!((poses_.front().inverse().translation - before.inverse().translation).norm() <= options_.max_shift_m)) return;
     for (std::size_t k = 0; k < keyframes_.size(); ++k) {
       if (fixed_[k] == 0) map.keyframe(keyframes_[k]).frame.T_cam_world = poses_[k];
     }

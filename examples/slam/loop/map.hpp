@@ -5,6 +5,7 @@
 #include <bitset>
 #include <cstddef>
 #include <map>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -94,18 +95,20 @@ class Map {
       k.world = other;
     }
   }
-  // Forgets until at most so many keyframes are left: the smallest of the worlds but this one, then its own oldest.
+  // Forgets until at most so many keyframes are left: the smallest of the worlds that are no larger than this one, then
+  // the oldest of all.
   void forget(std::size_t most, int world) {
     while (alive_keyframes.size() > most) {
       std::map<int, int> others;
       for (const int k : alive_keyframes) ++others[keyframe(k).world];
+      const int here = others[world];
       others.erase(world);
-      if (others.empty()) {
+      const auto smallest = std::min_element(others.begin(), others.end(),
+                                             [](const auto& a, const auto& b) { return a.second < b.second; });
+      if (smallest == others.end() || smallest->second > here) {
         erase_keyframe(alive_keyframes.front());
         continue;
       }
-      const auto smallest = std::min_element(others.begin(), others.end(),
-                                             [](const auto& a, const auto& b) { return a.second < b.second; });
       for (const int k : std::vector<int>(alive_keyframes)) {
         if (keyframe(k).world == smallest->first) erase_keyframe(k);
       }
@@ -189,18 +192,17 @@ class Map {
 
   // Keyframes that share at least `min_shared` of the given points, most first (ties: the newer first).
   [[nodiscard]] std::vector<int> covisible(const std::vector<int>& map_points, int min_shared) const {
-    std::vector<int> count(keyframes.size());
+    std::unordered_map<int, int> count;  // costs nothing for all that have gone
     for (const int index : map_points) {
       if (!is_alive(index)) continue;
-      for (const Observation& o : point(index).observations) ++count[static_cast<std::size_t>(o.keyframe)];
+      for (const Observation& o : point(index).observations) ++count[o.keyframe];
     }
     std::vector<int> result;
-    for (std::size_t k = count.size(); k-- > 0;) {
-      if (count[k] >= std::max(min_shared, 1)) result.push_back(static_cast<int>(k));
+    for (const auto& [keyframe, shared] : count) {
+      if (shared >= min_shared) result.push_back(keyframe);
     }
-    std::stable_sort(result.begin(), result.end(), [&](int a, int b) {
-      return count[static_cast<std::size_t>(a)] > count[static_cast<std::size_t>(b)];
-    });
+    std::sort(result.begin(), result.end(),
+              [&](int a, int b) { return std::pair(count.at(a), a) > std::pair(count.at(b), b); });
     return result;
   }
 

@@ -22,13 +22,15 @@ struct MappingOptions {
   double min_found_share = 0.25;                // points seen in a smaller share of the frames that should see them go
   std::size_t min_observations = 2;  // as do points in fewer keyframes than this, three keyframes after their own
   double superfluous_share = 0.9;    // keyframes of whose points three others see this share go
-  std::size_t max_keyframes = 500;   // over all worlds: beyond, the smallest other world goes, then the oldest
+  std::size_t max_keyframes = 500;   // over all worlds: beyond, the smallest other world goes, unless it is
+                                     // larger than the camera's, then the oldest of all
 };
 
 struct LocalBundleOptions {
   std::size_t free_keyframes = 10;   // adjusted, the newest among them
   std::size_t fixed_keyframes = 10;  // see the same points and hold the gauge
   int max_iterations = 10;
+  double max_shift_m = 0.075;  // of the newest keyframe: farther, and it contradicts the pose that was believed
 };
 
 struct Options {
