@@ -7,9 +7,7 @@
 #include "tracking.hpp"
 
 namespace cfp_slam {
-namespace {
 
-// Those of a variant for this image size and this detector's people.
 Options fitted(Options options, const FrameSource& source, const cfp_examples::Detector& detector) {
   cfp::FrameOptions& probability = options.probability;
   probability = cfp::variant_options(options.variant, probability);
@@ -24,22 +22,23 @@ Options fitted(Options options, const FrameSource& source, const cfp_examples::D
   return options;
 }
 
-}  // namespace
+View view_of(const FrameSource& source, const Options& options) {
+  const cfp::PinholeCamera<float> camera = source.camera.cast<float>().pinhole();
+  return {camera,
+          camera.cast<double>(),
+          source.calibration.width,
+          source.calibration.height,
+          cfp_examples::level_sigmas(options.features),
+          static_cast<float>(options.keypoint_sigma_px),
+          options.baseline_fx};
+}
 
 RunResult run_slam(const FrameSource& source, cfp_examples::Detector& detector, const Options& chosen,
                    Observer& observer) {
   const Options options = fitted(chosen, source, detector);
-  const cfp_examples::TumCamera& calibration = source.calibration;
   const Camera camera = source.camera.cast<float>();
-  const View view{camera.pinhole(),
-                  camera.pinhole().cast<double>(),
-                  calibration.width,
-                  calibration.height,
-                  cfp_examples::level_sigmas(options.features),
-                  static_cast<float>(options.keypoint_sigma_px),
-                  options.baseline_fx};
-  FrontEnd front_end(camera, calibration.depth_units_per_metre, options, observer);
-  Tracking tracking(camera, view, options, observer);
+  FrontEnd front_end(camera, source.calibration.depth_units_per_metre, options, observer);
+  Tracking tracking(camera, view_of(source, options), options, observer);
   const auto load = [&](std::size_t k) {
     const Part part(observer, Module::reading);
     return source.load(k);

@@ -28,6 +28,10 @@ struct FrameSource {
   std::function<cfp_examples::SequenceFrame(std::size_t)> load;
 };
 
+// The options of the variant, for these images and this detector's people.
+Options fitted(Options options, const FrameSource& source, const cfp_examples::Detector& detector);
+View view_of(const FrameSource& source, const Options& options);
+
 struct RunResult {
   std::vector<cfp::StampedPose<double>> trajectory;  // camera to world, of the tracked and relocalised frames
   std::vector<int> world;  // of each pose: poses of different worlds have nothing to do with each other

@@ -46,6 +46,11 @@ class Tracking {
     Frame& frame = input.frame;
     relocalised_ = false;
     pose_ = {};
+    const double step_s = frame.time_s - last_.time_s;
+    if (step_s > 0 && cfp::is_finite(step_s)) {  // a clock that was set back says nothing
+      lost_s_ += step_s;
+      if (trial_) trial_->left_s -= step_s;
+    }
     if (interval_.is_gap(frame.time_s)) {  // the last frame says nothing of where its points are now
       note(record, "gap before this frame: " + std::to_string(frame.time_s - last_.time_s) + " s");
       input.flow_from.clear();
@@ -67,7 +72,7 @@ class Tracking {
         world_ = map_.keyframe(local_map_.reference()).world;
         join_worlds(frame, record);
         extend_map(frame, record);
-      } else if (frame.time_s - seen_s_ < options_.new_map_after_s || !begin_world(frame, record)) {
+      } else if (lost_s_ < options_.new_map_after_s || !begin_world(frame, record)) {
         record.outcome = Outcome::lost;
         note(record, std::string("lost, ") + cfp::to_string(pose_.health.status));
       }
@@ -77,7 +82,7 @@ class Tracking {
     if (frame.has_pose) {
       poses_.push_back({frame.time_s, local_map_.reference(), frame.T_cam_world * reference_pose().inverse()});
       believed_ = BelievedPose{frame.time_s, frame.T_cam_world};
-      seen_s_ = frame.time_s;
+      lost_s_ = 0;
     }
     motion_.learn(last_, frame);
     last_ = std::move(frame);
@@ -104,7 +109,7 @@ class Tracking {
     cfp::SE3<double> T_cam_reference;
   };
   struct Trial {  // of the newest map
-    double end_s = 0;
+    double left_s = 0;
     std::size_t first_pose = 0;  // of poses_
   };
 
@@ -233,8 +238,8 @@ class Tracking {
     if (!in_it) {
       end_trial(record);
       local_map_.set_reference(frame.has_pose ? reference : 0);
-      seen_s_ = frame.time_s;
-    } else if (frame.time_s >= trial_->end_s) {
+      lost_s_ = 0;
+    } else if (trial_->left_s <= 0) {
       trial_.reset();
     }
   }
@@ -309,7 +314,7 @@ class Tracking {
     world_ = map_.begin_world();
     frames_since_join_ = 0;
     T_other_world_.reset();
-    trial_ = Trial{2 * frame.time_s - seen_s_, poses_.size()};
+    trial_ = Trial{lost_s_, poses_.size()};
     initialize(frame, record);
     record.outcome = Outcome::relocalised;
     note(record, "new map");
@@ -432,7 +437,7 @@ class Tracking {
   cfp_examples::Detections detections_;
   std::optional<BelievedPose> believed_;           // the last of all frames
   int world_ = 0;                                  // of the keyframes to come
-  double seen_s_ = 0;                              // when that was
+  double lost_s_ = 0;                              // since then
   std::optional<cfp::SE3<double>> T_other_world_;  // of the last look for other maps
   int frames_since_join_ = 0;
   std::optional<Trial> trial_;
