@@ -30,6 +30,7 @@
 #include "cfp/frame/constrain_keypoints.hpp"
 #include "cfp/frame/descriptor_matching.hpp"
 #include "cfp/frame/detector_health.hpp"
+#include "cfp/frame/detector_lag.hpp"
 #include "cfp/frame/estimate_objects.hpp"
 #include "cfp/frame/explain.hpp"
 #include "cfp/frame/flow_model.hpp"

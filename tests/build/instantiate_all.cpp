@@ -197,6 +197,8 @@ template struct cfp::FrameState<float>;
 template struct cfp::FrameState<double>;
 template class cfp::DetectorHealth<float>;
 template class cfp::DetectorHealth<double>;
+template class cfp::DetectorLag<float>;
+template class cfp::DetectorLag<double>;
 template struct cfp::FlowModel<float>;
 template struct cfp::FlowModel<double>;
 template class cfp::StaticProbability<cfp::PinholeCamera<float>>;

@@ -170,6 +170,9 @@
   CFP_LAYOUT(cfp::DetectorHealthOptions, image_height) \
   CFP_LAYOUT_OPAQUE(cfp::DetectorHealth<float>) \
   CFP_LAYOUT_OPAQUE(cfp::DetectorHealth<double>) \
+  CFP_LAYOUT(cfp::DetectorLagOptions, image_width) \
+  CFP_LAYOUT_OPAQUE(cfp::DetectorLag<float>) \
+  CFP_LAYOUT_OPAQUE(cfp::DetectorLag<double>) \
   CFP_LAYOUT(cfp::PoseHealthOptions, image_height) \
   CFP_LAYOUT(cfp::PoseAssessment, rotation_sigma_rad) \
   CFP_LAYOUT(cfp::PoseStep<float>, dt_s) \

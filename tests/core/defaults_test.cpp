@@ -67,6 +67,8 @@ TEST_CASE("The defaults of what judges poses and detectors", "[core]") {
   const cfp::DetectorHealthOptions d;
   CHECK((d.silent_after == 3 && d.believed_after == 90 && d.stuck_after == 3 && d.confirmed_after == 10));
   CHECK((d.border_share == 0.03 && d.leaving_share == 0.15 && d.max_box_share == 0.9));
+  const cfp::DetectorLagOptions l;
+  CHECK((l.max_lag_s == 0.6 && l.memory_s == 3 && l.min_boxes == 30 && l.min_rate == 0.3 && l.min_gain == 0.05));
 }
 
 TEST_CASE("The defaults of the estimators", "[core]") {

@@ -6,6 +6,7 @@
 #include "cfp/core/options.hpp"
 #include "cfp/evaluation/trajectory_error.hpp"
 #include "cfp/frame/detector_health.hpp"
+#include "cfp/frame/detector_lag.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/pose_health.hpp"
 #include "cfp/optimization/least_squares.hpp"
@@ -214,6 +215,15 @@ TEST_CASE("The ends of the ranges of the other options", "[core]") {
       CFP_FIELD(D, image_height, not_negative),
   });
   check_least<D>({CFP_COUNT(D, silent_after, 1), CFP_COUNT(D, stuck_after, 1), CFP_COUNT(D, confirmed_after, 1)});
+  using G = cfp::DetectorLagOptions;
+  check_ends<G>({
+      CFP_FIELD(G, max_lag_s, positive),
+      CFP_FIELD(G, memory_s, positive),
+      CFP_FIELD(G, min_boxes, positive),
+      CFP_FIELD(G, min_rate, not_negative),
+      CFP_FIELD(G, min_gain, not_negative),
+      CFP_FIELD(G, image_width, not_negative),
+  });
   using L = cfp::LevenbergMarquardtOptions;
   check_ends<L>({
       CFP_FIELD(L, initial_damping, not_negative),

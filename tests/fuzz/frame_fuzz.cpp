@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 
+#include "cfp/frame/detector_lag.hpp"
 #include "cfp/frame/static_probability.hpp"
 #include "cfp/geometry/radial_tangential_camera.hpp"
 #include "fuzz_input.hpp"
@@ -84,6 +85,9 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
                        &options.health.min_effective_points});
   }
   cfp::StaticProbability probability(camera, options);
+  cfp::DetectorLagOptions lag_options;
+  lag_options.min_boxes = lag_options.min_rate = 0.1;
+  cfp::DetectorLag<float> lag(lag_options);
   std::vector<float> all;
   std::size_t previous = 0;
   while (!in.empty()) {
@@ -141,6 +145,9 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
         CFP_PROMISE(cfp_fuzz::is_probability(object.static_probability));
     };
     check(probability.coarse(frame));
+    const double late_s = lag.update(frame, probability.state());
+    CFP_PROMISE(late_s >= 0 && late_s <= lag_options.max_lag_s);
+    all.push_back(static_cast<float>(late_s));
     if (in.flag()) {
       for (std::size_t i = 0; i < n && in.flag(); ++i)
         a.match.push_back(static_cast<std::int32_t>(in.count(previous)) - 1);

@@ -6,6 +6,7 @@
 
 #include "../../support/orb_features.hpp"
 #include "cfp/frame/detector_health.hpp"
+#include "cfp/frame/detector_lag.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/pose_health.hpp"
 #include "cfp/interop/opencv_flow.hpp"
@@ -50,6 +51,7 @@ struct Options {
   cfp::PoseHealthOptions health;                              // what a tracked frame's pose must have
   cfp::PoseHealthOptions relocalised_health = relocalised_pose_health();  // what one from the map alone must have
   cfp::DetectorHealthOptions detector_health;
+  cfp::DetectorLagOptions detector_lag;
   int max_idle = 30;                   // frames over which boxes are carried on while the detector is not believed
   double new_map_after_s = 1;          // of being lost
   cfp::FrameIntervalOptions interval;  // the motion model is not asked over a gap

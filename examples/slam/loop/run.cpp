@@ -19,6 +19,7 @@ Options fitted(Options options, const FrameSource& source, const cfp_examples::D
     ((health.image_width = source.calibration.width, health.image_height = source.calibration.height), ...);
   };
   size(options.first_health, options.health, options.relocalised_health, options.detector_health, probability.tracker);
+  options.detector_lag.image_width = source.calibration.width;
   return options;
 }
 

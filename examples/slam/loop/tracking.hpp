@@ -12,6 +12,7 @@
 
 #include "cfp/evaluation/trajectory.hpp"
 #include "cfp/frame/detector_health.hpp"
+#include "cfp/frame/detector_lag.hpp"
 #include "cfp/frame/static_probability.hpp"
 #include "cfp/interop/opencv.hpp"
 #include "front_end.hpp"
@@ -38,7 +39,8 @@ class Tracking {
         local_map_(options.features),
         mapping_(options),
         interval_(options.interval),
-        detector_(options.detector_health) {}
+        detector_(options.detector_health),
+        lag_(options.detector_lag) {}
 
   // `record` comes with time and image; the rest is filled in.
   void track(FrontEndResult&& input, FrameRecord& record) {
@@ -158,7 +160,10 @@ class Tracking {
     frame.map_point_probability = input.frame.map_point_probability;
     frame.image_motion = predicted_.image_motion;
     const Part part(observer_, Module::coarse);
-    return probability_.coarse(frame);
+    const auto stage = probability_.coarse(frame);
+    const double lag_s = lag_.update(frame, probability_.state());
+    if (lag_s > 0) note(record, "detector late by " + cfp_examples::fixed(lag_s, 1) + " s");
+    return stage;
   }
 
   // Nothing, as if it had not run, of a detector that is silent or stuck: its boxes are carried on. Where they have
@@ -433,6 +438,7 @@ class Tracking {
   RefinedPose pose_;          // of this frame
   cfp::FrameInterval interval_;
   cfp::DetectorHealth<float> detector_;
+  cfp::DetectorLag<float> lag_;
   bool detector_ok_ = true;
   cfp_examples::Detections detections_;
   std::optional<BelievedPose> believed_;           // the last of all frames

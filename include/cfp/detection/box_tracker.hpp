@@ -167,6 +167,8 @@ class BoxTracker {
       const bool shown = !track.compensated() || confirmed;
       if (shown) {
         track.associated = track.shown;
+        track.rate_x = track.filter.u.rate;
+        track.rate_y = track.filter.v.rate;
         output_.push_back(track);
         result.compensated += track.compensated() ? 1U : 0U;
       }

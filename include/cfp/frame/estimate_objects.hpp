@@ -76,7 +76,7 @@ void collect_object_distances(const Frame<Scalar>& frame, const TrackedBox<Scala
   for (std::size_t i = 0; i < flow.current.size(); ++i) {
     const Scalar x = flow.current(i, 0), y = flow.current(i, 1);
     if (!lies_on(box, frame.labels, x, y)) continue;
-    scratch.samples.push_back(scratch.epipolar[i]);
+    scratch.samples.push_back(state.flow_distances[i]);
     scratch.points.push_back({x, y});
     scratch.depths.push_back(has_depths ? flow.previous_depths[i] : Scalar(0));
   }
@@ -121,11 +121,11 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   report.flow_sigma_px = static_cast<double>(model.sigma_px);
   if (model.kind == FlowModelKind::none) return;
 
-  scratch.epipolar.resize(n);
+  state.flow_distances.resize(n);
   scratch.scratch.resize(n);
   scratch.samples.reserve(n);
   scratch.depths.reserve(n);
-  flow_distances(model, flow, pinhole, coarse.flow, span<Scalar>(scratch.epipolar));
+  flow_distances(model, flow, pinhole, coarse.flow, span<Scalar>(state.flow_distances));
   const ObjectProbabilityOptions scored = scaled_to_noise(coarse.object, static_cast<double>(model.sigma_px),
                                                           model.kind == FlowModelKind::fundamental ? 1 : 2);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {

@@ -103,6 +103,7 @@ struct FrameState {
   std::vector<std::int32_t> box;                                ///< per keypoint: the box that decides its K, or no_box
   std::vector<std::int32_t> match;                    ///< per keypoint: index in the frame before, or no_match
   std::vector<SecondStageKeypoint<Scalar>> evidence;  ///< per keypoint in a box: what the fine stage knew of it
+  std::vector<Scalar> flow_distances;      ///< per flow pair, px, as the flow's model has them; empty: there is none
   std::vector<Scalar> flow_probability;    ///< per keypoint in a box: score of the flow at its place, negative: none
   std::vector<Scalar> static_probability;  ///< per keypoint: K
   std::vector<Scalar> weight;              ///< per keypoint: what the pose is to use
@@ -138,6 +139,7 @@ void begin_frame(const Frame<Scalar>& frame, FrameState<Scalar>& state) {
   state.box.assign(n, no_box);
   state.match.assign(n, no_match);
   state.flow_probability.assign(n, Scalar(-1));
+  state.flow_distances.clear();
   for (std::size_t i = 0; i < n; ++i) {
     const Scalar x = frame.keypoints(i, 0), y = frame.keypoints(i, 1);
     const bool valid = is_finite(x) && is_finite(y);

@@ -62,10 +62,10 @@ void score_flow_at_keypoints(const Frame<Scalar>& frame, const FrameOptions& opt
     scratch.samples.clear();
     for (std::size_t p = 0; p < frame.flow.current.size(); ++p) {
       const Scalar x = frame.flow.current(p, 0), y = frame.flow.current(p, 1);
-      if (!has_distance(scratch.epipolar[p]) || !is_valid_depth(frame.flow.previous_depths[p])) continue;
+      if (!has_distance(state.flow_distances[p]) || !is_valid_depth(frame.flow.previous_depths[p])) continue;
       if (!contains(state.boxes[b].box, x, y)) continue;
       scratch.points.push_back({x, y});
-      scratch.samples.push_back(scratch.epipolar[p]);
+      scratch.samples.push_back(state.flow_distances[p]);
     }
     for (std::size_t i = 0; i < state.size(); ++i) {
       if (state.box[i] != static_cast<std::int32_t>(b)) continue;
