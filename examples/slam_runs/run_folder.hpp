@@ -94,7 +94,6 @@ inline Options options_of(const RunSettings& settings, bool threads) {
   options.threads = threads;
   options.max_frames = settings.frames;
   options.features.count = settings.features;
-  options.features.candidates = 3 * settings.features;
   return options;
 }
 

@@ -1,5 +1,7 @@
 #include "../../examples/support/orb_features.hpp"
 
+#include <cstring>
+
 #include <opencv2/imgproc.hpp>
 
 #include "cfp/core/random.hpp"
@@ -53,13 +55,61 @@ TEST_CASE("People with more corners than the room around them leave it its share
     return std::count_if(keypoints.begin(), keypoints.end(),
                          [&](const auto& k) { return !cfp::contains(box, k.pt.x, k.pt.y); });
   };
-  FeatureOptions options;
-  options.candidates = 10000;
-  const auto taken = keypoints_of(gray, {}, options), shared = keypoints_of(gray, {box}, options);
+  const auto taken = keypoints_of(gray, {}), shared = keypoints_of(gray, {box});
   CAPTURE(taken.size(), shared.size(), outside(taken), outside(shared));
   CHECK(double(outside(taken)) < 0.4 * double(taken.size()));
   CHECK(double(outside(shared)) >= 0.59 * double(shared.size()));
   CHECK(double(outside(shared)) <= 0.61 * double(shared.size()));
-  CHECK(std::abs(int(shared.size()) - options.count) < 10);
-  CHECK(keypoints_of(gray, {{0, 0, 640, 480}}, options).size() == taken.size());  // nobody else wants them
+  CHECK(shared.size() == 1000);
+  CHECK(keypoints_of(gray, {{0, 0, 640, 480}}).size() == taken.size());  // nobody else wants them
+}
+
+TEST_CASE("A half of low contrast gets keypoints though the other half could fill the count", "[features]") {
+  cv::Mat gray = image(), half = gray(cv::Rect(0, 0, 320, 480));
+  half = 110 + 0.1 * half;
+  const auto in_half = [&](const FeatureOptions& options) {
+    const auto keypoints = keypoints_of(gray, {}, options);
+    CHECK(keypoints.size() == 500);
+    return std::count_if(keypoints.begin(), keypoints.end(), [](const auto& k) { return k.pt.x < 310; });
+  };
+  FeatureOptions falls;
+  falls.count = 500;
+  FeatureOptions fixed = falls;
+  fixed.lowest_threshold = fixed.fast_threshold;
+  CHECK(in_half(fixed) == 0);
+  CHECK(in_half(falls) > 100);
+}
+
+TEST_CASE("Keypoints have the angles and descriptors of OpenCV's ORB", "[features]") {
+  const cv::Mat gray = image();
+  FeatureExtractor extract;
+  std::vector<cv::KeyPoint> keypoints, theirs;
+  std::vector<OrbDescriptor> descriptors;
+  extract(gray, {}, keypoints, descriptors);
+  cv::Mat rows;
+  cv::ORB::create(10000, 1.2F, 8, 19, 0, 2, cv::ORB::FAST_SCORE, 31, 12)->detectAndCompute(gray, {}, theirs, rows);
+  int same = 0;
+  for (std::size_t i = 0; i < keypoints.size(); ++i) {
+    const auto at = std::find_if(theirs.begin(), theirs.end(), [&](const auto& k) {
+      return k.octave == keypoints[i].octave && cv::norm(k.pt - keypoints[i].pt) < 0.01;
+    });
+    if (at == theirs.end()) continue;
+    ++same;
+    CHECK(std::abs(std::remainder(at->angle - keypoints[i].angle, 360.0F)) < 0.01F);
+    CHECK(std::abs(at->size - keypoints[i].size) < 0.001F);
+    CHECK(std::memcmp(descriptors[i].data(), rows.ptr(int(at - theirs.begin())), sizeof(OrbDescriptor)) == 0);
+  }
+  CHECK(same > 900);
+}
+
+TEST_CASE("Nothing of one image is left in the keypoints of the next", "[features]") {
+  FeatureExtractor extract;
+  std::vector<cv::KeyPoint> first, again;
+  std::vector<OrbDescriptor> first_descriptors, descriptors;
+  extract(image(), {{100, 100, 300, 400}}, first, first_descriptors);
+  extract(image()(cv::Rect(0, 0, 200, 100)), {}, again, descriptors);
+  extract(image(), {{100, 100, 300, 400}}, again, descriptors);
+  CHECK(descriptors == first_descriptors);
+  CHECK(std::equal(first.begin(), first.end(), again.begin(), again.end(),
+                   [](const auto& a, const auto& b) { return a.pt == b.pt && a.octave == b.octave; }));
 }
