@@ -349,7 +349,8 @@ class Watcher : public Observer {
 
 /// Compares what is called tracked with where the camera is. A pose from the map alone says where the room is by the
 /// keyframe that it sees; a hundred tracked frames later the room may be elsewhere by a little, but not suddenly: the
-/// loop closes no loops, and its maps drift.
+/// loop closes no loops, and its maps drift. So does a pose from a part of the map that is older than that: where the
+/// camera comes back to it, the two parts may lie apart by what has been drifted in between.
 class Judge final : public Watcher {
  public:
   std::size_t tracked = 0, wrong = 0, wrong_in_a_row = 0, longest_wrong = 0;
@@ -374,12 +375,15 @@ class Judge final : public Watcher {
     if (record.keyframe) {
       T_room_keyframe_.resize(map_->keyframes.size());
       T_room_keyframe_.back() = room_.T_cam_room().inverse();
+      made_in_.resize(map_->keyframes.size());
+      made_in_.back() = frames;
     }
     if (record.outcome != Outcome::tracked) wrong_in_a_row = 0;
     if (record.outcome > Outcome::relocalised || reference_ < 0) return;
-    if (record.outcome == Outcome::relocalised) T_room_map_ = T_room_map_by_keyframe_;
-    const cfp::SE3<double> T_cam_of_map = room_.T_cam_room() * T_room_map_ * T_cam_map_.inverse();
-    const bool is_wrong = T_cam_of_map.translation.norm() > 0.1;
+    const bool from_old_part =
+        made_in_[std::size_t(reference_)] + drifts_in < frames && error_m(T_room_map_by_keyframe_) < 0.03;
+    if (record.outcome == Outcome::relocalised || from_old_part) T_room_map_ = T_room_map_by_keyframe_;
+    const bool is_wrong = error_m(T_room_map_) > 0.1;
     if (!is_wrong) {
       const cfp::SE3<double> T_room_map_now = room_.T_cam_room().inverse() * T_cam_map_;
       T_room_map_ = T_room_map_ * cfp::se3_exp<double>(0.01 * cfp::se3_log(T_room_map_.inverse() * T_room_map_now));
@@ -392,11 +396,18 @@ class Judge final : public Watcher {
   }
 
  private:
+  static constexpr std::size_t drifts_in = 300;  // frames
+
+  [[nodiscard]] double error_m(const cfp::SE3<double>& T_room_map) const {
+    return (room_.T_cam_room() * T_room_map * T_cam_map_.inverse()).translation.norm();
+  }
+
   const Room& room_;
   const Map* map_ = nullptr;
   int reference_ = -1, world_ = -1;  // of this frame
   cfp::SE3<double> T_cam_map_, T_room_map_, T_room_map_by_keyframe_;
   std::vector<cfp::SE3<double>> T_room_keyframe_;
+  std::vector<std::size_t> made_in_;  // the frame of each keyframe
 };
 
 double resident_mib() {
