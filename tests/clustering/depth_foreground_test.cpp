@@ -95,6 +95,79 @@ TEST_CASE("The window ends at the widest gap behind the front, or at a fixed dep
   CHECK_THAT(out.result.far_m, WithinAbs(2.7, 0.011));
 }
 
+TEST_CASE("Every end of the window belongs to it, what lies a little beyond does not", "[clustering]") {
+  constexpr double little = 1e-9;
+  std::vector<double> depths;
+  add_layer(depths, 65, 2.0, 1.0 / 32);  // to 4 m, without a gap
+  cfp::ForegroundWorkspace<double> workspace;
+  std::vector<char> mask;
+  const auto range = [&](const cfp::ForegroundOptions& options, double previous_m = 0) {
+    mask.resize(depths.size());
+    const auto result = cfp::depth_foreground({depths, {}, {}, previous_m}, options, workspace, mask);
+    return std::array<double, 2>{result.near_m, result.far_m};
+  };
+  cfp::ForegroundOptions options;
+  options.near_share = 0, options.behind_m = 0.5;  // the front is the nearest depth
+  CHECK(range(options)[1] == 2.5);
+  options.behind_m = 0.5 - little;
+  CHECK(range(options)[1] == 2.5 - 1.0 / 32);
+
+  options.half_body_m = 0.25, options.before_m = 0.5;
+  CHECK(range(options, 3.25)[0] == 2.5);
+  options.before_m = 0.5 - little;
+  CHECK(range(options, 3.25)[0] == 2.5 + 1.0 / 32);
+
+  add_layer(depths, 20, 5.0, 1.0 / 32);  // a gap of 1 m behind 4 m
+  options.last_gap_m = 3, options.first_gap_m = 2;
+  CHECK(range(options)[1] == 4);
+  options.last_gap_m = 2;
+  CHECK(range(options)[1] == 4);
+  options.last_gap_m = 2 - little, options.first_gap_m = 0;
+  CHECK(range(options)[1] < 2.5);
+  options.first_gap_m = options.last_gap_m = 3;
+  CHECK(range(options)[1] == 4);
+  options.first_gap_m = options.last_gap_m = 3 + little;
+  CHECK(range(options)[1] < 2.5);
+  options.first_gap_m = 0, options.min_gap_m = 1;
+  CHECK(range(options)[1] < 2.5);
+  options.min_gap_m = 1 - little;
+  CHECK(range(options)[1] == 4);
+}
+
+TEST_CASE("Something stands before the person only where the upper half begins farther by more than obstacle_m",
+          "[clustering]") {
+  std::vector<double> depths(20, 2.0);
+  depths.resize(40, 2.25);
+  std::vector<std::array<double, 2>> pixels(20, {101, 190});  // a corner at the bottom, where people seldom are
+  pixels.resize(40, {120, 100});
+  cfp::ForegroundWorkspace<double> workspace;
+  std::vector<char> mask(depths.size());
+  cfp::ForegroundOptions options;
+  options.before_m = 0.125, options.min_gap_m = 0.5;
+  const auto nearest = [&](double obstacle_m) {
+    options.obstacle_m = obstacle_m;
+    return cfp::depth_foreground({depths, pixels, {100, 50, 140, 200}, 0}, options, workspace, mask).near_m;
+  };
+  CHECK(nearest(0.25) == 2);
+  CHECK(nearest(0.25 - 1e-9) == 2.25);
+}
+
+TEST_CASE("The short end of the window is taken where what lies behind it is seldom a person's", "[clustering]") {
+  std::vector<double> depths;
+  add_layer(depths, 64, 2.0, 1.0 / 64);
+  cfp::ForegroundWorkspace<double> workspace;
+  std::vector<char> mask(depths.size());
+  cfp::ForegroundOptions options;
+  options.near_share = 0, options.behind_m = 0.5, options.short_m = 0.25;
+  const auto farthest = [&](double side_from_m) {
+    std::vector<std::array<double, 2>> pixels;
+    for (const double depth : depths) pixels.push_back({depth > side_from_m ? 101.0 : 120.0, 150.0});
+    return cfp::depth_foreground({depths, pixels, {100, 50, 140, 200}, 0}, options, workspace, mask).far_m;
+  };
+  CHECK(farthest(9) == 2.5);
+  CHECK(farthest(2.25) == 2.25);
+}
+
 TEMPLATE_TEST_CASE("A desk before a person is background when the pixels are known", "[clustering]", float, double) {
   std::vector<double> depths;
   std::vector<std::array<TestType, 2>> pixels;

@@ -118,3 +118,81 @@ TEST_CASE("A result that nothing was computed for says so", "[core]") {
   CHECK((t.matched == 0 && t.expected == 0 && t.unusable == 0 && t.pose_fraction == 0 && t.time_fraction == 0));
   CHECK((t.largest_gap_s == 0 && t.largest_stamp_difference_s == 0));
 }
+
+TEST_CASE("The defaults of what a caller hands over and leaves out", "[core]") {
+  const cfp::Detection<double> d;
+  CHECK((d.class_id == 0 && d.score == 1));
+  const cfp::Frame<double> frame;
+  CHECK((frame.timestamp_s == 0 && frame.keypoints.empty() && !frame.detections && !frame.T_cur_prev));
+  CHECK((!frame.fundamental && !frame.image_motion));
+  CHECK(cfp::PoseEstimate().inliers == 0);
+  const cfp::ObjectClass c;
+  CHECK((c.class_id == 0 && c.non_rigid));
+  const cfp::SecondStageKeypoint<double> k;
+  CHECK((k.foreground && !k.matched && k.box_associated));
+  CHECK(cfp::PoseStep<double>().dt_s == 0);
+  CHECK(cfp::PoseObservations<double>().baseline_fx == 0);
+  CHECK(cfp::BundleProblem<>().baseline_fx == 0);
+  CHECK(cfp::StampedPose<double>().time_s == 0);
+  const cfp::UnknownDepth unknown;
+  CHECK((unknown.inverse_mean == 0.5 && unknown.inverse_sigma == 0.5));
+}
+
+TEST_CASE("A report that nothing was counted for counts nothing", "[core]") {
+  const cfp::TrackedBox<double> b;
+  CHECK((b.class_id == 0 && b.id == 0 && b.detection == -1 && b.age == 0 && b.missed == 0 && !b.associated));
+  CHECK((b.rate_x == 0 && b.rate_y == 0 && b.score == 0 && b.compensated()));
+  const cfp::BoxTrackerResult<double> tracked;
+  CHECK((tracked.status == cfp::Status::ok && tracked.boxes.empty() && tracked.skipped == 0));
+  CHECK((tracked.ignored == 0 && tracked.compensated == 0 && tracked.unwarped == 0));
+  const cfp::AssignmentResult assigned;
+  CHECK((assigned.status == cfp::Status::ok && assigned.pairs == 0 && assigned.cost == 0));
+  const cfp::DbscanResult clusters;
+  CHECK((clusters.status == cfp::Status::ok && clusters.clusters == 0 && clusters.core_points == 0));
+  CHECK((clusters.noise == 0 && clusters.invalid == 0));
+  const cfp::ObjectProbability o;
+  CHECK((o.static_probability == 0 && o.pairs == 0 && o.status == cfp::Status::not_enough_data));
+  const cfp::ObjectMemory memory;
+  CHECK((memory.evidence == 0 && !memory.known));
+  const cfp::ConstraintReport constraint;
+  CHECK((constraint.status == cfp::Status::not_enough_data && constraint.threshold_px == 0));
+  CHECK(constraint.confidence == 0);
+  const cfp::FrameReport report;
+  CHECK((report.stage == cfp::Stage::coarse && report.time == cfp::Status::ok && report.flow_sigma_px == 0));
+  CHECK((report.flow_model == cfp::FlowModelKind::none && report.flow_support == cfp::FlowSupport::none));
+  CHECK(report.flow_status == cfp::RansacStatus::not_enough_data);
+  const cfp::FrameHealth health;
+  CHECK((health.observations == 0 && health.weight == 0 && health.effective_points == 0 && health.box_share == 0));
+  CHECK(health.fallback == cfp::WeightFallback::none);
+  const cfp::PoseAssessment pose;
+  CHECK((pose.status == cfp::PoseHealth::not_solved && pose.inliers == 0 && pose.inlier_share == 0));
+  CHECK((pose.spread == 0 && !cfp::is_finite(pose.position_sigma_m) && !cfp::is_finite(pose.rotation_sigma_rad)));
+  const cfp::CameraMotion<double> motion;
+  CHECK((!motion.known && motion.sigma_px == 1));
+  const cfp::FundamentalResult<double> F;
+  CHECK((F.status == cfp::RansacStatus::not_enough_data && F.used == 0 && F.inliers == 0 && F.iterations == 0));
+  CHECK((F.inlier_share == 0 && F.F.isZero(0) && F.homography.isZero(0)));
+  const cfp::P3PSolutions<double> p3p;
+  CHECK((p3p.count == 0 && p3p.status == cfp::Status::degenerate));
+}
+
+TEST_CASE("An evaluation of nothing says so", "[core]") {
+  const cfp::ErrorStatistics e;
+  CHECK((e.rmse == 0 && e.mean == 0 && e.median == 0 && e.standard_deviation == 0 && e.minimum == 0));
+  CHECK((e.maximum == 0 && e.count == 0));
+  const cfp::AlignmentResult aligned;
+  CHECK((aligned.used == 0 && aligned.skipped == 0 && aligned.status == cfp::Status::not_enough_data));
+  CHECK((aligned.S_to_from.scale == 1 && aligned.S_to_from.rotation.isIdentity(0)));
+  const cfp::AbsoluteErrorResult absolute;
+  CHECK((absolute.alignment == cfp::AlignmentMode::rigid && absolute.status == cfp::Status::not_enough_data));
+  const cfp::RelativeErrorResult relative;
+  CHECK((relative.delta == 1 && relative.unit == cfp::DeltaUnit::seconds));
+  CHECK(relative.status == cfp::Status::not_enough_data);
+  const cfp::AucResult auc;
+  CHECK((auc.auc == 0.5 && auc.static_weight == 0 && auc.moving_weight == 0 && auc.skipped == 0));
+  CHECK(auc.status == cfp::Status::not_enough_data);
+  const cfp::CalibrationResult<10> c;
+  CHECK((c.auc == 0.5 && c.brier == 0 && c.log_loss == 0 && c.static_fraction == 0 && c.used == 0 && c.skipped == 0));
+  CHECK((c.expected_calibration_error == 0 && c.largest_calibration_error == 0));
+  CHECK(c.status == cfp::Status::not_enough_data);
+}

@@ -22,6 +22,13 @@ TEMPLATE_TEST_CASE("is_finite, clamp_probability and is_valid_depth on every kin
   CHECK(cfp::clamp_probability(std::numeric_limits<TestType>::infinity()) == 1);
 }
 
+TEST_CASE("The tolerances are those documented", "[core]") {
+  using InDouble = cfp::Tolerance<double>;
+  using InFloat = cfp::Tolerance<float>;
+  CHECK((InDouble::small_angle == 1e-5 && InDouble::min_depth == 1e-6 && InDouble::degenerate == 1e-12));
+  CHECK((InFloat::small_angle == 1e-2F && InFloat::min_depth == 1e-6F && InFloat::degenerate == 1e-6F));
+}
+
 TEST_CASE("every status has its own name", "[core]") {
   using cfp::Status;
   CHECK(std::string(cfp::to_string(Status::ok)) == "ok");

@@ -5,6 +5,8 @@
 #include <string>
 #include <type_traits>
 
+#include <Eigen/Geometry>
+
 #include "cfp/core/random.hpp"
 #include "cfp/math/so3.hpp"
 #include "support/catch.hpp"
@@ -151,6 +153,42 @@ TEST_CASE("An image motion moves the box as the homography moves its points", "[
     cfp::BoxFilter<double> kept = filter;
     CHECK_FALSE(cfp::warp_box(kept, cfp::Matrix3<double>(cfp::Matrix3<double>::Constant(bad))));
     CHECK(kept.u.value == filter.u.value);
+  }
+}
+
+TEST_CASE("A homography moves centre, velocity, sizes and covariance of a box as its Jacobian says", "[detection]") {
+  cfp::Random random(3, "warp");
+  const cfp::BoxMotionOptions options;
+  for (int repetition = 0; repetition < 200; ++repetition) {
+    cfp::BoxFilter<double> filter = cfp::make_box_filter(random_box(random), options);
+    for (cfp::RateFilter<double>* f : {&filter.u, &filter.v})
+      f->rate = random.uniform(-100, 100), f->var_value = random.uniform(1, 9), f->covariance = random.uniform(-2, 2),
+      f->var_rate = random.uniform(4, 90);
+    cfp::Matrix3<double> H = cfp::Matrix3<double>::Identity();
+    for (int i = 0; i < 8; ++i) H(i / 3, i % 3) += (i < 6 ? (i % 3 < 2 ? 0.4 : 30) : 2e-4) * random.uniform(-1, 1);
+    const auto map = [&](double u, double v) {
+      return cfp::Vector2<double>((H * cfp::Vector3<double>(u, v, 1)).hnormalized());
+    };
+    const double u = filter.u.value, v = filter.v.value, w = filter.box().width(), h = filter.box().height();
+    cfp::Matrix2<double> J;
+    J.col(0) = (map(u + 1e-3, v) - map(u - 1e-3, v)) / 2e-3;
+    J.col(1) = (map(u, v + 1e-3) - map(u, v - 1e-3)) / 2e-3;
+    cfp::BoxFilter<double> moved = filter;
+    REQUIRE(cfp::warp_box(moved, H));
+
+    const cfp::RateFilter<double>* const out[2] = {&moved.u, &moved.v};
+    const double sizes[2] = {moved.box().width(), moved.box().height()};
+    for (int i = 0; i < 2; ++i) {
+      const double a = J(i, 0), b = J(i, 1);
+      CHECK_THAT(out[i]->value, WithinAbs(map(u, v)[i], 1e-9));
+      CHECK_THAT(out[i]->rate, WithinAbs(a * filter.u.rate + b * filter.v.rate, 1e-4));
+      CHECK_THAT(out[i]->var_value, WithinAbs(a * a * filter.u.var_value + b * b * filter.v.var_value, 1e-5));
+      CHECK_THAT(out[i]->covariance, WithinAbs(a * a * filter.u.covariance + b * b * filter.v.covariance, 1e-5));
+      CHECK_THAT(out[i]->var_rate, WithinAbs(a * a * filter.u.var_rate + b * b * filter.v.var_rate, 1e-4));
+      CHECK_THAT(sizes[i], WithinAbs(std::hypot(a * w, b * h), 1e-4));
+    }
+    CHECK(moved.log_width.rate == filter.log_width.rate);
+    CHECK(moved.log_height.var_value == filter.log_height.var_value);
   }
 }
 

@@ -138,3 +138,16 @@ TEST_CASE("The robust scale is that of normal distances and ignores what is no d
   std::vector<double> none = {-1, std::numeric_limits<double>::quiet_NaN()};
   CHECK(cfp::robust_sigma(cfp::span(none), 2) == 0);
 }
+
+TEST_CASE("The robust scale of few distances is by their median", "[frame][camera_motion]") {
+  const double per_line = 0.674489750196082, per_point = 1.177410022515475;
+  std::vector<double> distances;
+  for (const double next : {3.0, 1.0, 2.0, 9.0, 0.5}) {
+    distances.push_back(next);
+    std::vector<double> sorted = distances, line = distances, point = distances;
+    std::sort(sorted.begin(), sorted.end());
+    const double median = sorted[(sorted.size() - 1) / 2];  // of an even number the lower one
+    CHECK_THAT(cfp::robust_sigma(cfp::span(line), 1), WithinAbs(median / per_line, 1e-12));
+    CHECK_THAT(cfp::robust_sigma(cfp::span(point), 2), WithinAbs(median / per_point, 1e-12));
+  }
+}

@@ -60,6 +60,29 @@ TEST_CASE("Somebody half in the view is missed", "[health]") {
   for (int k = 1; k < 10; ++k) CHECK((detector.gives({}) == DetectorStatus::silent) == (k >= 3));
 }
 
+TEST_CASE("The unit of the pixels does not matter", "[health]") {
+  for (const double unit : {1.0, 1 / 1024.0, 1024.0}) {
+    cfp::DetectorHealthOptions options;
+    options.image_width = 640 * unit, options.image_height = 480 * unit;
+    cfp::DetectorHealth<double> health(options);
+    const auto status_after = [&](double x1, double x2) {  // a box, and then none
+      health.reset();
+      DetectorStatus status{};
+      for (int k = 0; k < 30; ++k) {
+        const cfp::Detection<double> box{{x1 * unit, (100 + k) * unit, x2 * unit, 400 * unit}, 0, 0.9};
+        status = health.update(cfp::span<const cfp::Detection<double>>(&box, k < 20 ? 1U : 0U));
+      }
+      return status;
+    };
+    CAPTURE(unit);
+    CHECK(status_after(300, 350) == DetectorStatus::silent);
+    CHECK(status_after(590, 640) == DetectorStatus::ok);  // has left
+    CHECK(status_after(0, 50) == DetectorStatus::ok);
+    CHECK(status_after(0, 200) == DetectorStatus::silent);
+    CHECK(cfp::is_absurd(cfp::Detection<double>{{0, 0, 640 * unit, 480 * unit}, 0, 0.9}, options));
+  }
+}
+
 TEST_CASE("A detector that did not run is idle, and misses nothing", "[health]") {
   Detector detector;
   detector.walks();

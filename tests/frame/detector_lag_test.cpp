@@ -17,7 +17,8 @@ struct Street {
   std::vector<float> depths;
   float speed = 150;  // px/s
   int late = 0, k = 0;
-  bool turns = false;  // the motion is the image's, not the box's own
+  bool turns = false;         // the motion is the image's, not the box's own
+  float zoom = 1, scale = 1;  // of that motion; of its matrix, which means nothing
 
   explicit Street(const cfp::DetectorLagOptions& options = {}) : lag(options) {
     for (int y = 5; y < 480; y += 20) {
@@ -35,6 +36,11 @@ struct Street {
     const int period = 120, phase = (i + 1200) % period;
     return 150 + speed * float(phase < 60 ? phase : period - phase) / 30;
   }
+  /// Takes a pixel to the right by so much; all others move as `zoom` says.
+  [[nodiscard]] cfp::Matrix3<float> motion_that_moves(const cfp::Vector2<float>& pixel, float by) const {
+    const cfp::Vector2<float> shift = pixel * (1 - zoom) + cfp::Vector2<float>(by, 0);
+    return scale * cfp::Matrix3<float>{{zoom, 0, shift.x()}, {0, zoom, shift.y()}, {0, 0, 1}};
+  }
   double next() {
     ++k;
     state.previous.timestamp_s = k / 30.0;
@@ -47,7 +53,7 @@ struct Street {
     box.box = {seen, 100, seen + 100, 400};
     const float step = left_at(k - late + 1) - seen;
     box.rate_x = turns ? 0 : step * 30;
-    if (turns) frame.image_motion = cfp::Matrix3<float>{{1, 0, step}, {0, 1, 0}, {0, 0, 1}};
+    if (turns) frame.image_motion = motion_that_moves({seen + 50, 250}, step);
     box.detection = 0;
     box.age = k;
     state.boxes = {box};
@@ -111,10 +117,13 @@ TEST_CASE("What rests, is cut by the border, compensated or new says nothing of 
 }
 
 TEST_CASE("A box that rests while the image turns lags with the image", "[health]") {
-  Street street;
-  street.late = 8;
-  street.turns = true;
-  CHECK_THAT(street.after(60), WithinAbs(8 / 30.0, 0.07));
+  for (const auto& [zoom, scale] : {std::array<float, 2>{1, 1}, {1, -3}, {1.3F, 1}, {0.8F, 0.5F}}) {
+    Street street;
+    street.late = 8;
+    street.turns = true;
+    street.zoom = zoom, street.scale = scale;
+    CHECK_THAT(street.after(60), WithinAbs(8 / 30.0, 0.07));
+  }
 }
 
 TEST_CASE("Frames without depths, without a motion or with hostile numbers count for nothing", "[health]") {

@@ -110,6 +110,25 @@ TEST_CASE("The uncertainty of a pose is that of its errors", "[health]") {
   CHECK_THAT(squares / expected, WithinAbs(1, 0.4));
 }
 
+TEST_CASE("A pixel at the image's edge or beyond counts in the cell of the edge", "[health]") {
+  Scene scene = Scene().add(3, 500, 350).refine();
+  const auto cells = [&](const std::vector<std::array<double, 2>>& pixels) {
+    scene.pixels = pixels;
+    scene.weights.assign(pixels.size(), 1.0);
+    scene.inliers.assign(pixels.size(), char(1));
+    return scene.assess().spread * 48;
+  };
+  const double cell = 80, far = 1e30;
+  for (double x : {0.0, -1.0, -far}) CHECK_THAT(cells({{x, 9}, {cell - 1, 9}}), WithinAbs(1, 1e-12));
+  for (double y : {0.0, -1.0, -far}) CHECK_THAT(cells({{9, y}, {9, cell - 1}}), WithinAbs(1, 1e-12));
+  for (double x : {640.0, 641.0, far}) CHECK_THAT(cells({{x, 9}, {640 - cell, 9}}), WithinAbs(1, 1e-12));
+  for (double y : {480.0, 481.0, far}) CHECK_THAT(cells({{9, y}, {9, 480 - cell}}), WithinAbs(1, 1e-12));
+  CHECK_THAT(cells({{640, 9}, {640 - cell - 1, 9}, {9, 480}, {9, 480 - cell - 1}}), WithinAbs(4, 1e-12));
+  std::vector<std::array<double, 2>> every;
+  for (int i = 0; i < 48; ++i) every.push_back({cell * (i % 8), cell * double(i / 8)});
+  CHECK_THAT(cells(every), WithinAbs(48, 1e-12));
+}
+
 TEST_CASE("Hostile input is judged, never believed", "[health]") {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   Scene scene = Scene().add(200, 500, 350).refine();

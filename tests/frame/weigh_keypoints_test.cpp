@@ -225,6 +225,40 @@ TEST_CASE("A map point confirmed over many frames survives one box, a new one on
   CHECK((frames > 1 && frames < 10));
 }
 
+TEST_CASE("A map point of probability 0 is one, below 0 there is none", "[frame]") {
+  for (const cfp::WeightRule rule : {cfp::WeightRule::product, cfp::WeightRule::minimum, cfp::WeightRule::posterior}) {
+    cfp::FrameOptions options;
+    options.map_point.weight = rule;
+    FrameRun<double> run(make_dynamic_scene<double>({}, 80));
+    run.coarse(options);
+    const auto outside = static_cast<std::size_t>(
+        std::find(run.state.label.begin(), run.state.label.end(), cfp::KeypointLabel::outside) -
+        run.state.label.begin());
+    const double below = -std::numeric_limits<double>::denorm_min();
+    const auto check = [&] {
+      CAPTURE(static_cast<int>(rule), static_cast<int>(run.state.report.stage));
+      CHECK(run.k(outside) > 0);
+      CHECK(cfp::model_weight(outside, 0.0, options, run.state) == 0);
+      CHECK(cfp::model_weight(outside, below, options, run.state) > 0);
+    };
+    check();
+    run.m.assign(run.m.size(), below);
+    run.m[outside] = 0;
+    cfp::update_map_points(options, run.state, run.m);
+    CHECK(run.state.report.deletable == 1);
+    run.fine(options);
+    check();
+    CHECK(cfp::updated_map_point(outside, 0.0, options, run.state) > 0);
+    CHECK(cfp::updated_map_point(outside, below, options, run.state) == below);
+    CHECK(cfp::is_mismatched(outside, 0.0, options, run.state) == (rule != cfp::WeightRule::posterior));
+    CHECK_FALSE(cfp::is_mismatched(outside, below, options, run.state));
+    run.state.report.health.fallback = cfp::WeightFallback::all;
+    CHECK(cfp::keypoint_weight(outside, 0.0, options, run.state) == 1);
+    CHECK(cfp::keypoint_weight(outside, below, options, run.state) ==
+          cfp::model_weight(outside, below, options, run.state));
+  }
+}
+
 TEST_CASE("What came from nowhere has no weight once the constraints were asked", "[frame]") {
   const cfp::FrameOptions options;
   FrameRun<double> run(make_dynamic_scene<double>({}, 78));

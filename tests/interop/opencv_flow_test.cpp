@@ -63,6 +63,20 @@ TEST_CASE("Pairs follow the image, over several frames and with either check", "
   }
 }
 
+TEST_CASE("Pairs that return to where they came from are kept at any bound", "[flow]") {
+  const cv::Mat image = texture();
+  cfp::OpticalFlowOptions options;
+  options.backward = true;
+  options.max_backward_px = 0;
+  cfp::OpticalFlowTracker tracker(options);
+  tracker.track(image, {}, {});
+  tracker.track(image, {}, {});
+  CHECK(tracker.current().size() > 100);
+  CHECK(tracker.current() == tracker.previous());
+  tracker.track(moved(image, 3.25, -1.5), {}, {});
+  CHECK(tracker.current().size() < 10);
+}
+
 TEST_CASE("The defaults of the flow", "[flow]") {
   const cfp::OpticalFlowOptions o;
   CHECK((o.corners == 500 && o.corner_distance == 6 && o.corner_quality == 0.01 && o.keypoints_per_box == 100));

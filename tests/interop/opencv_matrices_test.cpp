@@ -138,11 +138,12 @@ TEMPLATE_TEST_CASE("A camera from OpenCV's matrices projects as they say", "[int
                                     cv::Mat((cv::Mat_<float>(5, 1) << 0.1F, -0.2F, 0.001F, 0.002F, 0.05F))}) {
     REQUIRE(cfp::to_camera(K_float, distortion, camera) == cfp::Status::ok);
     REQUIRE(cfp::to_camera(K, distortion, camera) == cfp::Status::ok);
-    CHECK(camera.fx == Scalar(535.4));
-    CHECK(camera.cy == Scalar(247.6));
-    CHECK_THAT(static_cast<double>(camera.k1), WithinAbs(distortion.empty() ? 0 : 0.1, 1e-8));
-    CHECK_THAT(static_cast<double>(camera.p2), WithinAbs(distortion.empty() ? 0 : 0.002, 1e-8));
-    CHECK_THAT(static_cast<double>(camera.k3), WithinAbs(distortion.total() == 5 ? 0.05 : 0, 1e-8));
+    CHECK((camera.fx == Scalar(535.4) && camera.fy == Scalar(539.2)));
+    CHECK((camera.cx == Scalar(320.1) && camera.cy == Scalar(247.6)));
+    const Scalar read[] = {camera.k1, camera.k2, camera.p1, camera.p2, camera.k3};
+    const double given[] = {0.1, -0.2, 0.001, 0.002, 0.05};
+    for (std::size_t i = 0; i < 5; ++i)
+      CHECK_THAT(static_cast<double>(read[i]), WithinAbs(i < distortion.total() ? given[i] : 0, 1e-8));
   }
   const cfp::RadialTangentialCamera<Scalar> before = camera;
   const auto refused = [&](const cv::Mat& matrix, const cv::Mat& distortion) {

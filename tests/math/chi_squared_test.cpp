@@ -58,6 +58,21 @@ TEST_CASE("the general formulas meet the closed forms at k = 1 and 2, and one br
   }
 }
 
+TEMPLATE_TEST_CASE("one and two degrees of freedom are by the closed forms, but for the last bit", "[math]", float,
+                   double) {
+  const double bit = static_cast<double>(std::numeric_limits<TestType>::epsilon());
+  for (int i = 1; i <= 1000; ++i) {
+    const TestType x = TestType(0.05) * TestType(i);
+    CAPTURE(x);
+    const TestType half = std::exp(TestType(-0.5) * x);
+    const auto near = [&](TestType a, TestType b) { return relative_difference<double>(a, b) <= bit; };
+    CHECK(near(chi_squared_survival(x, 1), std::erfc(std::sqrt(TestType(0.5) * x))));
+    CHECK(near(chi_squared_survival(x, 2), half));
+    CHECK(near(chi_squared_density(x, 1), half / (std::sqrt(x) * TestType(2.50662827463100050242))));
+    CHECK(near(chi_squared_density(x, 2), TestType(0.5) * half));
+  }
+}
+
 TEST_CASE("the density has its mode at k - 2", "[math]") {
   for (const double k : {2.5, 3.0, 10.0, 32.0, 500.0}) {
     for (int i = 0; i < 400; ++i)
