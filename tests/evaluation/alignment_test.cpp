@@ -80,6 +80,27 @@ TEST_CASE("No small change of the aligned motion lowers the cost, noise and refl
   }
 }
 
+TEST_CASE("Points far from the origin are aligned as well as their coordinates tell", "[evaluation]") {
+  cfp::Random random(23, "far");
+  const cfp::Matrix3<double> R = cfp::so3_exp<double>(cfp_test::random_vector(random, 2));
+  for (const double far : {1e3, 1e6, 1e8}) {
+    const cfp::Vector3<double> from_offset = far * cfp::Vector3<double>(1, 2, -1), to_offset(2 * far, far, -far);
+    Points<double> from, to;
+    for (int i = 0; i < 500; ++i) {
+      const cfp::Vector3<double> p = cfp_test::random_vector(random, 1);
+      from.push_back(p + from_offset), to.push_back(R * p + to_offset);
+    }
+    for (const bool with_scale : {false, true}) {
+      const auto result = align(from, to, with_scale);
+      CAPTURE(far, with_scale);
+      CHECK(result.status == cfp::Status::ok);
+      CHECK((result.S_to_from.rotation - R).norm() < 1e-15 * far + 1e-13);
+      CHECK_THAT(result.S_to_from.scale, WithinAbs(1, 1e-15 * far + 1e-13));
+      CHECK((result.S_to_from * from_offset - to_offset).norm() < 1e-13 * far + 1);
+    }
+  }
+}
+
 TEST_CASE("Points that do not fix the rotation give a proper minimiser and the status degenerate", "[evaluation]") {
   const Points<double> one{{1, 2, 3}}, two{{0, 0, 0}, {1, 0, 0}}, line{{0, 0, 0}, {1, 1, 1}, {3, 3, 3}},
       same{{1, 1, 1}, {1, 1, 1}, {1, 1, 1}};

@@ -169,6 +169,61 @@ TEST_CASE("Poses in any order, and one that sees everything: the reduced system 
   CHECK(c.final_cost < c.initial_cost);
 }
 
+TEST_CASE("Up to 64 free poses the caller's order is kept, beyond they are ordered by their common points",
+          "[optimization][bundle_adjustment]") {
+  for (const std::size_t free_poses : {64U, 65U}) {
+    cfp_test::BaScene chain;  // pose k shares points with pose k + half alone
+    const std::size_t half = free_poses / 2;
+    cfp::Random random(5, "chain");
+    chain.poses.resize(free_poses);
+    chain.fixed.assign(free_poses, 0);
+    for (std::size_t k = 0; k < free_poses; ++k) {
+      for (int j = 0; j < 3; ++j) {
+        for (const std::size_t pose : {k, (k + half) % free_poses}) {
+          chain.pose.push_back(static_cast<int>(pose)), chain.point.push_back(static_cast<int>(chain.points.size()));
+          chain.pixels.emplace_back(320, 240), chain.u_right.push_back(-1);
+          chain.sigma.push_back(1), chain.weights.push_back(1);
+        }
+        chain.points.emplace_back(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(2, 4));
+      }
+    }
+    const cfp::BundleResult result = adjust(chain);
+    CAPTURE(free_poses, result.factor_blocks);
+    CHECK(result.free_poses == free_poses);
+    CHECK((result.factor_blocks > 10 * free_poses) == (free_poses == 64));
+  }
+}
+
+TEST_CASE("Without damping a point that one camera sees makes the system degenerate, and nothing moves",
+          "[optimization][bundle_adjustment]") {
+  cfp::BundleOptions undamped;
+  undamped.levenberg_marquardt.initial_damping = undamped.levenberg_marquardt.min_damping = 0;
+  for (const bool first : {true, false}) {
+    for (const bool all_fixed : {true, false}) {
+      cfp_test::BaSceneOptions options;
+      options.points = 20;
+      cfp_test::BaScene scene = cfp_test::make_ba_scene(options, 6);
+      if (all_fixed) std::fill(scene.fixed.begin(), scene.fixed.end(), 1);
+      if (first) {
+        for (int& point : scene.point) ++point;
+      }
+      scene.pose.push_back(static_cast<int>(scene.poses.size()));
+      scene.poses.emplace_back(), scene.fixed.push_back(1);
+      scene.point.push_back(first ? 0 : 20);
+      scene.points.insert(first ? scene.points.begin() : scene.points.end(), {0, 0, 2});  // on its axis: no parallax
+      scene.pixels.emplace_back(scene.camera.cx, scene.camera.cy), scene.u_right.push_back(-1);
+      scene.sigma.push_back(1), scene.weights.push_back(1);
+      const cfp_test::BaScene start = scene;
+      const cfp::BundleResult result = adjust(scene, undamped);
+      CAPTURE(first, all_fixed);
+      CHECK(result.status == cfp::SolverStatus::degenerate);
+      CHECK(result.accepted == 0);
+      CHECK(same_bits(scene, start));
+      CHECK(adjust(scene).accepted > 0);  // with damping it stays, and the rest is adjusted
+    }
+  }
+}
+
 TEST_CASE("Nothing to do is reported and changes nothing", "[optimization][bundle_adjustment]") {
   cfp::BundleWorkspace workspace;
   CHECK(adjust_bundle(cfp::BundleProblem<>{}, cfp::BundleOptions{}, workspace).status ==

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -213,5 +214,23 @@ TEMPLATE_TEST_CASE("From a disturbed start without noise it returns to the truth
   for (const int j : scene.point) ++views[static_cast<std::size_t>(j)];
   for (std::size_t j = 0; j < scene.points.size(); ++j) {
     if (views[j] >= 4) CHECK((scene.points[j] - scene.true_points[j]).norm() < 1e-3);
+  }
+}
+
+TEST_CASE("Work is cut into parts of about equal size, and no group is lost", "[optimization][bundle_adjustment]") {
+  cfp::Random random(9, "parts");
+  for (int repetition = 0; repetition < 300; ++repetition) {
+    const std::size_t count = random.index(12), stride = 1 + random.index(2);
+    std::vector<std::size_t> begin{0};
+    std::size_t largest = 0;
+    for (std::size_t g = 0; g < count * stride; ++g) begin.push_back(begin.back() + random.index(9));
+    for (std::size_t g = 0; g < count; ++g) largest = (std::max)(largest, begin[stride * (g + 1)] - begin[stride * g]);
+    const auto part = cfp::detail::cut_into_parts(begin, count, stride);
+    REQUIRE(part.size() == 3);
+    CHECK(part[0] == 0);
+    CHECK(part[2] == count);
+    const std::size_t first = begin[stride * part[1]], second = begin[stride * count] - first;
+    CHECK(first >= second);
+    CHECK(first - second <= 2 * largest);
   }
 }

@@ -135,6 +135,31 @@ TEST_CASE("Weight 0 is the same as absent, to the bit", "[optimization][bundle_a
   CHECK(largest_difference(scene, kept) == 0);
 }
 
+TEST_CASE("Arrays left out are arrays of their defaults, to the bit", "[optimization][bundle_adjustment]") {
+  cfp_test::BaSceneOptions options = mixed_scene();
+  options.random_weights = options.octaves = false;  // sigma and weight 1
+  options.stereo_share = 0, options.fixed = 0;
+  const cfp_test::BaScene start = cfp_test::make_ba_scene(options, 10);
+  cfp_test::BaScene given = start;
+  std::vector<double> errors(start.pose.size()), errors_without(start.pose.size());
+  cfp::BundleWorkspace workspace;
+  const auto a = adjust_bundle(given.problem(), cfp::BundleOptions{}, workspace, errors);
+  for (int left_out = 0; left_out < 4; ++left_out) {
+    cfp_test::BaScene scene = start;
+    cfp::BundleProblem<> problem = scene.problem();
+    if (left_out == 0) problem.observations.u_right = {};
+    if (left_out == 1) problem.observations.sigmas = {};
+    if (left_out == 2) problem.observations.weights = {};
+    if (left_out == 3) problem.fixed_poses = {};
+    const auto b = adjust_bundle(problem, cfp::BundleOptions{}, workspace, errors_without);
+    CAPTURE(left_out);
+    CHECK(a.initial_cost == b.initial_cost);
+    CHECK(a.final_cost == b.final_cost);
+    CHECK(largest_difference(given, scene) == 0);
+    CHECK(errors == errors_without);
+  }
+}
+
 TEST_CASE("Duplicating all observations is doubling all weights", "[optimization][bundle_adjustment]") {
   cfp_test::BaScene doubled = cfp_test::make_ba_scene(mixed_scene(), 5), duplicated = doubled;
   const std::size_t n = doubled.pose.size();

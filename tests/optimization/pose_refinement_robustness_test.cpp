@@ -244,8 +244,10 @@ TEMPLATE_TEST_CASE("Pose refinement: random garbage never gives NaN, and the pos
                                      cfp::LossType::geman_mcclure, cfp::LossType::truncated}) {
       cfp::PoseOptions options = trial % 2 == 0 ? cfp::PoseOptions() : cfp::orb_slam2_pose_options();
       options.rounds[0].loss = loss;
+      std::vector<char> mask(weights.size(), 1);
       const auto result = cfp::refine_pose(scene.observations(cfp::span<const TestType>(weights)), scene.camera,
-                                           scene.start, options, workspace);
+                                           scene.start, options, workspace, cfp::span<char>(mask));
+      REQUIRE(std::count(mask.begin(), mask.end(), 1) == result.inliers);
       REQUIRE(is_finite(result));
       REQUIRE((result.T_cam_world.rotation.transpose() * result.T_cam_world.rotation - cfp::Matrix3<double>::Identity())
                   .norm() < 1e-9);

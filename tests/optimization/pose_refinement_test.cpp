@@ -85,6 +85,19 @@ TEST_CASE("Pose refinement: a round from the start that would repeat the one bef
   CHECK(refine(make_pose_scene<double>(2, options), {}, cfp::orb_slam2_pose_options()).rounds > 2);
 }
 
+TEST_CASE("Pose refinement: only a round from whose pose the next goes on ends by handover_decrease",
+          "[optimization]") {
+  const auto scene = make_pose_scene<double>(2, mixed());
+  const auto evaluations = [&](bool from_start, double handover, std::size_t rounds) {
+    cfp::PoseOptions options = tight();
+    options.from_start = from_start, options.handover_decrease = handover, options.round_count = rounds;
+    return refine(scene, {}, options).evaluations;
+  };
+  CHECK(evaluations(false, 1e9, 2) < evaluations(false, 0, 2));
+  CHECK(evaluations(false, 1e9, 1) == evaluations(false, 0, 1));  // the last round
+  CHECK(evaluations(true, 1e9, 2) == evaluations(true, 0, 2));
+}
+
 TEST_CASE("Pose refinement: a rigid motion of the world moves the pose along", "[optimization]") {
   const auto scene = make_pose_scene<double>(2, mixed());
   const cfp::SE3<double> motion{cfp::so3_exp<double>({0.3, -1.2, 2.0}), {40, -7, 1000}};

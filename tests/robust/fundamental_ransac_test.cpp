@@ -1,5 +1,6 @@
 #include "cfp/robust/fundamental_ransac.hpp"
 
+#include <algorithm>
 #include <fstream>
 #include <limits>
 #include <numeric>
@@ -222,7 +223,7 @@ TEST_CASE("Little parallax beside a plane is found below mismatches, at the nois
   CHECK(wrong == 0);
 }
 
-TEST_CASE("Same input and seed give the same bits, in a fresh or a used workspace", "[robust]") {
+TEST_CASE("Same input and seed give the same bits, in a fresh or a used workspace and mask", "[robust]") {
   cfp::Random random(35, "bits");
   FundamentalRansacWorkspace used;
   for (const cfp::Sampling sampling : {cfp::Sampling::uniform, cfp::Sampling::weighted}) {
@@ -233,7 +234,7 @@ TEST_CASE("Same input and seed give the same bits, in a fresh or a used workspac
     options.sampling = sampling;
     options.seed = 77;
     FundamentalRansacWorkspace fresh;
-    std::vector<char> mask_a(400), mask_b(400);
+    std::vector<char> mask_a(400), mask_b(400, 1);
     const auto a = fundamental_ransac(PointPairs{scene.prev, scene.cur, weights}, options, used, mask_a);
     const auto b = fundamental_ransac(PointPairs{scene.prev, scene.cur, weights}, options, fresh, mask_b);
     CHECK(a.F == b.F);
@@ -281,10 +282,13 @@ TEST_CASE("Absent pairs change nothing, weights guide the search", "[robust]") {
 TEST_CASE("Too little, coincident or unstructured input is reported and never crashes", "[robust]") {
   FundamentalRansacWorkspace workspace;
   const auto run = [&](const std::vector<std::array<double, 2>>& prev, const std::vector<std::array<double, 2>>& cur) {
+    std::vector<char> mask(prev.size(), 9);
     const FundamentalResult<double> result =
-        fundamental_ransac(PointPairs{prev, cur}, FundamentalRansacOptions{}, workspace);
+        fundamental_ransac(PointPairs{prev, cur}, FundamentalRansacOptions{}, workspace, mask);
     CHECK(result.F.allFinite());
     CHECK(result.homography.allFinite());
+    const auto count = [&](char label) { return std::size_t(std::count(mask.begin(), mask.end(), label)); };
+    CHECK((count(1) == result.inliers && count(0) == prev.size() - result.inliers));
     CHECK((result.inlier_share >= 0 && result.inlier_share <= 1));
     return result.status;
   };

@@ -1,5 +1,7 @@
 #include "cfp/robust/pnp_ransac.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -206,8 +208,10 @@ TEST_CASE("Same matches and seed give the same bits", "[robust]") {
     PnpRansacOptions options;
     options.sampling = sampling;
     options.seed = 9;
-    const auto a = pnp_ransac(scene.world, scene.pixels, scene.weights, camera<double>, options, used);
-    const auto b = pnp_ransac(scene.world, scene.pixels, scene.weights, camera<double>, options, fresh);
+    std::vector<char> mask_a(250), mask_b(250, 1);
+    const auto a = pnp_ransac(scene.world, scene.pixels, scene.weights, camera<double>, options, used, mask_a);
+    const auto b = pnp_ransac(scene.world, scene.pixels, scene.weights, camera<double>, options, fresh, mask_b);
+    CHECK(mask_a == mask_b);
     CHECK(a.T_cam_world.rotation == b.T_cam_world.rotation);
     CHECK(a.T_cam_world.translation == b.T_cam_world.translation);
     CHECK(a.iterations == b.iterations);
@@ -218,7 +222,7 @@ TEST_CASE("Too few, collinear or unrelated matches leave the identity and say wh
   PnpRansacWorkspace workspace;
   const auto run = [&](const std::vector<std::array<double, 3>>& world,
                        const std::vector<std::array<double, 2>>& pixels) {
-    std::vector<char> mask(world.size());
+    std::vector<char> mask(world.size(), 1);
     const auto result = pnp_ransac(world, pixels, {}, camera<double>, PnpRansacOptions{}, workspace, mask);
     CHECK_FALSE(result.found());
     CHECK(result.T_cam_world.rotation.isIdentity());
@@ -263,6 +267,41 @@ TEST_CASE("The loss of the refinement grows with the distance, up to the weight"
     CHECK(cost <= weight);
     last = cost;
   }
+}
+
+TEST_CASE("The gradient of the refinement is that of central differences, and far mismatches have none", "[robust]") {
+  cfp::Random random(61, "pnp");
+  cfp::detail::ObservationArrays in;
+  int near = 0, far = 0;
+  for (int trial = 0; trial < 400; ++trial) {
+    const double x = random.uniform(-1, 1), y = random.uniform(-1, 1), z = random.uniform(1, 4);
+    cfp::Vector2<double> pixel(0, 0);
+    REQUIRE(camera<double>.project({x, y, z}, pixel));
+    const double error_px = random.uniform(0, 16), angle = random.uniform(0, 6);
+    const std::vector<std::array<double, 3>> world{{x, y, trial % 8 == 0 ? -z : z}};  // some behind the camera
+    const std::vector<std::array<double, 2>> pixels{
+        {pixel.x() + error_px * std::cos(angle), pixel.y() + error_px * std::sin(angle)}};
+    cfp::detail::load_observations<PinholeCamera<double>, double>(world, pixels, {}, camera<double>, in);
+    const cfp::detail::ReprojectionModel<double> model{in, 4};
+    cfp::SE3<double> pose;
+    pose.translation = {in.origin[0], in.origin[1], in.origin[2]};
+    cfp::detail::NormalEquations<6> equations, ignored;
+    const double e = error_px * error_px / 4, cost = model.linearize(pose, equations);
+    if (std::abs(e - 25) < 0.1) continue;
+    cfp::Vector6<double> gradient;
+    for (int k = 0; k < 6; ++k) {
+      cfp::Vector6<double> step = cfp::Vector6<double>::Zero();
+      step[k] = 1e-6;
+      const double plus = model.linearize(model.moved(pose, step), ignored);
+      gradient[k] = (plus - model.linearize(model.moved(pose, -step), ignored)) / 2e-6;
+    }
+    CAPTURE(e, cost, world[0][2]);
+    CHECK((2 * equations.g - gradient).norm() <= 1e-4 * (1 + gradient.norm()));
+    const bool counts = world[0][2] > 0 && e < 25;
+    CHECK(equations.H.isZero(0) == !counts);
+    ++(counts ? near : far);
+  }
+  CHECK((near > 100 && far > 100));
 }
 
 TEST_CASE("A camera whose pixels are beyond all numbers has no observations", "[robust]") {

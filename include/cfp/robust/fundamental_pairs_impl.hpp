@@ -107,7 +107,7 @@ void load_pairs(const PointPairs<Scalar>& input, double cell_px, PairArrays& pai
   pairs.begin(input.previous.size());
   pairs.size = pairs.scaling.used;
   pairs.thinned.resize(5 * PairArrays::enough);
-  if (pairs.size == 0 || !pairs.scaling.valid()) return;
+  if (!pairs.scaling.valid()) return;
   pairs.size = 0;
   pairs.factor = std::sqrt(pairs.scaling.previous.factor * pairs.scaling.current.factor);
   pairs.scaling.previous.factor = pairs.scaling.current.factor = pairs.factor;

@@ -25,7 +25,6 @@ void group_by(const std::vector<int>& order, std::size_t groups, const Key& key,
   for (std::size_t g = 2; g < begin.size(); ++g) begin[g] += begin[g - 1];
   sorted.resize(order.size());
   for (const int i : order) sorted[begin[to_index(key(i)) + 1]++] = i;
-  begin.pop_back();
 }
 
 inline void count_up(std::size_t n, std::vector<int>& order) {
