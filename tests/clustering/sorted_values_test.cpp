@@ -8,6 +8,7 @@
 #include "cfp/core/random.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
+#include "support/counted.hpp"
 
 TEMPLATE_TEST_CASE("Values are sorted as std::stable_sort sorts their indices", "[clustering]", float, double) {
   using Limits = std::numeric_limits<TestType>;
@@ -40,4 +41,21 @@ TEMPLATE_TEST_CASE("Values are sorted as std::stable_sort sorts their indices", 
   const std::vector<TestType> large(2000, TestType(3));
   cfp::sort_values(large, keep, workspace);
   CHECK(cfp_test::allocations_in([&] { cfp::sort_values(large, keep, workspace); }) == 0);
+}
+
+TEST_CASE("Values that are spread are sorted by a few comparisons each", "[clustering]") {
+  using cfp_test::Counted;
+  cfp::Random random(42, "counted");
+  cfp::SortWorkspace<Counted> workspace;
+  for (const std::size_t n : {100U, 1000U, 20000U}) {
+    std::vector<Counted> values(n);
+    for (Counted& value : values) value = Counted(random.uniform(-3, 8));
+    Counted::comparisons() = 0;
+    const cfp::SortedValues<Counted> sorted = cfp::sort_values(
+        values, [](Counted) { return true; }, workspace);
+    const double each = static_cast<double>(Counted::comparisons()) / static_cast<double>(n);
+    CAPTURE(n, each);
+    CHECK(each < 8);
+    CHECK(std::is_sorted(sorted.values.begin(), sorted.values.end()));
+  }
 }

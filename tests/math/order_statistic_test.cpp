@@ -10,6 +10,7 @@
 #include "cfp/core/random.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
+#include "support/counted.hpp"
 #include "support/numbers.hpp"
 
 using cfp::span;
@@ -132,5 +133,23 @@ TEMPLATE_TEST_CASE("order_statistic ends and stays in memory when values are NaN
     // What comes out is one of the values that went in.
     const TestType selected = cfp::order_statistic(span<TestType>(kept), rank);
     CHECK(((numbers < kept.size() && selected != selected) || (selected >= TestType(-10) && selected <= TestType(10))));
+  }
+}
+
+TEST_CASE("An order statistic takes a few comparisons of each value, whatever their order", "[math]") {
+  using cfp_test::Counted;
+  for (const std::size_t n : {1000UL, 20000UL}) {
+    const auto sets = value_sets<double>(n);
+    for (std::size_t set = 0; set < 9; ++set) {  // in the last the pivots are extremes
+      for (const std::size_t rank : {n / 10, n / 2, n - 1 - n / 5}) {
+        std::vector<Counted> values;
+        for (const double value : sets[set]) values.emplace_back(value);
+        Counted::comparisons() = 0;
+        (void)cfp::order_statistic(span<Counted>(values), rank);
+        const double each = static_cast<double>(Counted::comparisons()) / static_cast<double>(n);
+        CAPTURE(n, set, rank, each);
+        CHECK(each < 8);
+      }
+    }
   }
 }
