@@ -1,5 +1,6 @@
 #include "cfp/frame/pose_health.hpp"
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <string>
@@ -127,6 +128,21 @@ TEST_CASE("A pixel at the image's edge or beyond counts in the cell of the edge"
   std::vector<std::array<double, 2>> every;
   for (int i = 0; i < 48; ++i) every.push_back({cell * (i % 8), cell * double(i / 8)});
   CHECK_THAT(cells(every), WithinAbs(48, 1e-12));
+}
+
+TEST_CASE("Without weights each observation weighs 1, and weights outside [0, 1] are clamped", "[health]") {
+  const Scene scene = Scene().add(200, 500, 350).refine();
+  std::vector<double> beyond(200, 7.0);
+  for (const cfp::span<const double> weights : {cfp::span<const double>(), cfp::span<const double>(beyond)}) {
+    const auto a = cfp::assess_pose<double>(scene.pose, scene.pixels, weights, scene.inliers, {}, scene.options);
+    CHECK(a.inliers == scene.assess().inliers);
+    CHECK(a.inlier_share == scene.assess().inlier_share);
+    CHECK(a.spread == scene.assess().spread);
+  }
+  std::fill(beyond.begin(), beyond.begin() + 100, -3.0);
+  const auto half = cfp::assess_pose<double>(scene.pose, scene.pixels, beyond, scene.inliers, {}, scene.options);
+  CHECK(half.inliers <= 100);
+  CHECK(half.inlier_share <= 1);
 }
 
 TEST_CASE("Hostile input is judged, never believed", "[health]") {

@@ -259,6 +259,32 @@ TEST_CASE("Pose refinement: depth, u_right, sigma and its inverse square are two
   CHECK(centre_distance(a.T_cam_world, b.T_cam_world) < 1e-9);
 }
 
+TEST_CASE("Pose refinement: arrays left out are arrays of their defaults, to the bit", "[optimization]") {
+  const auto scene = make_pose_scene<double>(6);
+  const std::vector<double> ones(scene.points.size(), 1.0), none(scene.points.size(), -1.0);
+  cfp::PoseObservations<double> bare;
+  bare.points = scene.points, bare.pixels = scene.pixels;
+  cfp::PoseWorkspace<double> workspace;
+  const auto refined = [&](const cfp::PoseObservations<double>& observations) {
+    return cfp::refine_pose(observations, scene.camera, scene.start, tight(), workspace);
+  };
+  const auto expected = refined(bare);
+  CHECK(expected.used_stereo == 0);
+  for (int given = 0; given < 5; ++given) {
+    cfp::PoseObservations<double> observations = bare;
+    if (given == 0) observations.weights = ones;
+    if (given == 1) observations.sigmas = ones;
+    if (given == 2) observations.inverse_sigmas_sq = ones;
+    if (given == 3) observations.depths = none, observations.baseline_fx = 40;
+    if (given == 4) observations.depths = ones;  // without a baseline
+    const auto result = refined(observations);
+    CAPTURE(given);
+    CHECK(result.T_cam_world.translation == expected.T_cam_world.translation);
+    CHECK((result.cost == expected.cost && result.used_stereo == 0));
+    CHECK(result.information == expected.information);
+  }
+}
+
 TEST_CASE("Pose refinement: a depth that is infinite is no depth", "[optimization]") {
   auto scene = make_pose_scene<double>(13, mixed());
   auto none = scene;
