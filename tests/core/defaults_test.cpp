@@ -154,6 +154,15 @@ TEST_CASE("A report that nothing was counted for counts nothing", "[core]") {
   CHECK((o.static_probability == 0 && o.pairs == 0 && o.status == cfp::Status::not_enough_data));
   const cfp::ObjectMemory memory;
   CHECK((memory.evidence == 0 && !memory.known));
+  const cfp::ConstraintModel<double> model;
+  CHECK((model.threshold_px == 0 && model.minimum_px == 0 && model.slope_per_px == 0));
+  CHECK((model.calculation_confidence == 0 && model.samples == 0 && model.status == cfp::Status::not_enough_data));
+  const cfp::FlowModel<double> flow;
+  CHECK((flow.kind == cfp::FlowModelKind::none && flow.support == cfp::FlowSupport::none && flow.sigma_px == 0));
+  CHECK((flow.status == cfp::RansacStatus::not_enough_data && flow.matrix.isZero(0)));
+  const cfp::FrameMemory<double> before;
+  CHECK(
+      (!before.known && before.timestamp_s == 0 && before.descriptor_bytes == 0 && before.descriptor_view().size == 0));
   const cfp::ConstraintReport constraint;
   CHECK((constraint.status == cfp::Status::not_enough_data && constraint.threshold_px == 0));
   CHECK(constraint.confidence == 0);

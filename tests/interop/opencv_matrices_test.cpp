@@ -75,6 +75,10 @@ TEST_CASE("Hostile depth and pixels give -1", "[interop]") {
        {cv::Mat(), cv::Mat(2, 2, CV_8UC1, cv::Scalar(1)), cv::Mat(2, 2, CV_32FC3, cv::Scalar(1))}) {
     CHECK(cfp::sample_depth(wrong, cfp::view(pixels), 1.0, metres) == cfp::Status::invalid_input);
   }
+  float element = 3;
+  for (const cv::Mat& empty : {cv::Mat(0, 4, CV_32F, &element), cv::Mat(3, 0, CV_32F, &element)})
+    CHECK(cfp::sample_depth(empty, cfp::view(pixels), 1.0, metres) == cfp::Status::invalid_input);
+  CHECK(cfp::sample_depth(cv::Mat(1, 1, CV_32F, &element), cfp::view(pixels), 1.0, metres) == cfp::Status::ok);
   const std::vector<cv::Point2f> none;
   CHECK(cfp::sample_depth(depth, cfp::view(none), 1.0, {}) == cfp::Status::not_enough_data);
 }
