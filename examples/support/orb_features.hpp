@@ -143,13 +143,18 @@ class FeatureExtractor {
     const auto total = static_cast<std::size_t>(std::lround(std::min(wanted, double(corners.size()))));
     const auto room = double(std::count_if(corners.begin(), corners.end(), is_room));
     auto for_people = std::lround(double(total) - std::clamp(of_room, 0.0, std::min(room, double(total))));
+    std::ptrdiff_t chosen_of_room = 0;
     selected_.clear();
     for (const auto& round : rounds_) {
       for (const cv::KeyPoint& k : round) {
-        if (selected_.size() < total && (is_room(k) || for_people-- > 0)) selected_.push_back(k);
+        if (selected_.size() == total) return chosen_of_room;
+        const bool in_room = is_room(k);
+        if (!in_room && for_people-- <= 0) continue;
+        selected_.push_back(k);
+        chosen_of_room += in_room ? 1 : 0;
       }
     }
-    return std::count_if(selected_.begin(), selected_.end(), is_room);
+    return chosen_of_room;
   }
 
   void describe(const Level& level, std::vector<cv::KeyPoint>& keypoints, std::vector<OrbDescriptor>& descriptors) {
