@@ -366,22 +366,20 @@ class Judge final : public Watcher {
     }
     if (reference_ < 0) return;
     const Keyframe& keyframe = map.keyframe(reference_);
-    T_room_map_by_keyframe_ = T_room_keyframe_.at(std::size_t(reference_)) * keyframe.frame.T_cam_world;
+    T_room_map_by_keyframe_ = made_.at(std::size_t(reference_)).T_room_keyframe * keyframe.frame.T_cam_world;
     if (keyframe.world != world_) T_room_map_ = T_room_map_by_keyframe_;
     world_ = keyframe.world;
   }
   void finished(const FrameRecord& record) override {
     Watcher::finished(record);
     if (record.keyframe) {
-      T_room_keyframe_.resize(map_->keyframes.size());
-      T_room_keyframe_.back() = room_.T_cam_room().inverse();
-      made_in_.resize(map_->keyframes.size());
-      made_in_.back() = frames;
+      made_.resize(map_->keyframes.size());
+      made_.back() = {room_.T_cam_room().inverse(), frames};
     }
     if (record.outcome != Outcome::tracked) wrong_in_a_row = 0;
     if (record.outcome > Outcome::relocalised || reference_ < 0) return;
     const bool from_old_part =
-        made_in_[std::size_t(reference_)] + drifts_in < frames && error_m(T_room_map_by_keyframe_) < 0.03;
+        made_[std::size_t(reference_)].frame + drifts_in < frames && error_m(T_room_map_by_keyframe_) < 0.03;
     if (record.outcome == Outcome::relocalised || from_old_part) T_room_map_ = T_room_map_by_keyframe_;
     const bool is_wrong = error_m(T_room_map_) > 0.1;
     if (!is_wrong) {
@@ -398,6 +396,11 @@ class Judge final : public Watcher {
  private:
   static constexpr std::size_t drifts_in = 300;  // frames
 
+  struct Made {
+    cfp::SE3<double> T_room_keyframe;
+    std::size_t frame = 0;
+  };
+
   [[nodiscard]] double error_m(const cfp::SE3<double>& T_room_map) const {
     return (room_.T_cam_room() * T_room_map * T_cam_map_.inverse()).translation.norm();
   }
@@ -406,8 +409,7 @@ class Judge final : public Watcher {
   const Map* map_ = nullptr;
   int reference_ = -1, world_ = -1;  // of this frame
   cfp::SE3<double> T_cam_map_, T_room_map_, T_room_map_by_keyframe_;
-  std::vector<cfp::SE3<double>> T_room_keyframe_;
-  std::vector<std::size_t> made_in_;  // the frame of each keyframe
+  std::vector<Made> made_;  // of each keyframe
 };
 
 double resident_mib() {
