@@ -3,6 +3,7 @@
 #include "../../examples/slam/loop/local_bundle.hpp"
 #include "../../examples/slam/loop/mapping.hpp"
 #include "../../examples/slam/loop/matching.hpp"
+#include "../../examples/slam/loop/pose.hpp"
 #include "cfp/core/random.hpp"
 #include "support/catch.hpp"
 
@@ -186,6 +187,46 @@ TEST_CASE("A bundle adjustment corrects the newest keyframe, but does not contra
     CHECK_THAT(map.pose(1).translation.x(), WithinAbs(error_m < 0.1 ? 0.1 : 0.1 + error_m, 1e-3));
     CHECK(map.pose(0).translation.norm() == 0);
   }
+}
+
+TEST_CASE("What only the last frame knows holds the pose, but puts no keyframe off", "[slam]") {
+  const Options options;
+  const cfp::PinholeCamera<double> camera{525, 525, 319.5, 239.5};
+  const View view{camera.cast<float>(), camera, 640, 480, cfp_examples::level_sigmas(options.features), 1, 40};
+  const cfp::SE3<double> T_cam_world = at(0.02);
+  cfp::Random random(1);
+  Map map;
+  Frame frame;
+  LastFrameMatches last;
+  constexpr int known = 60, others = 60;  // the latter of the last frame alone
+  std::vector<int> of_keyframe;
+  for (int i = 0; i < known + others; ++i) {
+    const cfp::Vector3<double> X{random.uniform(-1, 1), random.uniform(-0.8, 0.8), random.uniform(2, 3)};
+    cfp::Vector2<double> pixel;
+    REQUIRE(camera.project(T_cam_world * X, pixel));
+    frame.keypoints.emplace_back(float(pixel.x()), float(pixel.y()), 31.0F, 0.0F, 0.0F, 0);
+    frame.pixels.push_back({float(pixel.x()), float(pixel.y())});
+    frame.depths_m.push_back(float((T_cam_world * X).z()));
+    frame.map_point.push_back(no_point);
+    last.match.push_back(i);
+    last.positions.push_back(X);
+    if (i >= known) continue;
+    MapPoint point;
+    point.position = X;
+    of_keyframe.push_back(frame.map_point.back() = map.add(std::move(point)));
+  }
+  for (int i = 0; i < 40; ++i) of_keyframe.push_back(map.add({}));  // not seen any more
+  add_keyframe(map, of_keyframe);
+  add_keyframe(map, of_keyframe);
+  frame.static_probability.assign(frame.size(), 1);
+  const std::vector<float> weight(frame.size(), 1);
+  const RefinedPose pose = PoseSolver(options)(frame, last, map, weight, view, 0, true, options.health, std::nullopt);
+  REQUIRE(pose.health.ok());
+  CHECK(pose.inliers == known + others);
+  CHECK(pose.in_map == known);
+  const Mapping mapping(options);
+  CHECK(mapping.wants_keyframe(map, frame, 0, pose.in_map, 10));
+  CHECK_FALSE(mapping.wants_keyframe(map, frame, 0, pose.inliers, 10));
 }
 
 TEST_CASE("Depths tell the matches that one motion explains from the nine in ten that none does", "[slam]") {

@@ -50,7 +50,8 @@ class Mapping {
     return frame.depths_m[i] > 0 && cfp::may_create_map_point(frame.static_probability[i], probability_);
   }
 
-  // The frame's map points must be its inliers. `reference` is the keyframe it shares most points with.
+  // The frame's map points must be its inliers, of which `inliers` count. `reference` is the keyframe it shares most
+  // points with.
   [[nodiscard]] bool wants_keyframe(const Map& map, const Frame& frame, int reference, std::size_t inliers,
                                     int frames_since) const {
     if (frames_since < options_.min_gap) return false;

@@ -23,6 +23,7 @@ struct BelievedPose {
 
 struct RefinedPose {
   std::size_t inliers = 0;  // that count
+  std::size_t in_map = 0;   // of them; the others are known from the last frame alone
   cfp::PoseAssessment health;
 };
 
@@ -54,7 +55,7 @@ class PoseSolver {
     if (believed)
       step =
           cfp::PoseStep<double>{result.T_cam_world * believed->T_cam_world.inverse(), frame.time_s - believed->time_s};
-    RefinedPose out{0, cfp::assess_pose(result, observations.pixels, weights_, inlier_, step, health)};
+    RefinedPose out{0, 0, cfp::assess_pose(result, observations.pixels, weights_, inlier_, step, health)};
     if (!cfp::is_solved(result.status)) return out;
     if (decided) {  // what agrees with that, proven or not, makes it more exact
       for (std::size_t o = 0; o < weights_.size(); ++o)
@@ -68,7 +69,9 @@ class PoseSolver {
     std::size_t proven = 0;
     for (std::size_t o = 0; o < keypoint_.size(); ++o) {
       if (inlier_[o] != 0) {
-        out.inliers += cfp::counts_as_inlier(weight[keypoint_[o]], options_.probability) ? 1U : 0U;
+        const bool counts = cfp::counts_as_inlier(weight[keypoint_[o]], options_.probability);
+        out.inliers += counts ? 1U : 0U;
+        out.in_map += counts && map.is_alive(frame.map_point[keypoint_[o]]) ? 1U : 0U;
         proven += proven_[o] != 0 ? 1U : 0U;
       } else if (prune) {
         frame.map_point[keypoint_[o]] = no_point;

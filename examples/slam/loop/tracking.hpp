@@ -306,6 +306,7 @@ class Tracking {
     }
     frame.T_cam_world = {};
     frame.has_pose = true;
+    pose_ = {};
     pose_.inliers = usable;
     record.outcome = Outcome::tracked;
     make_keyframe(frame, record);
@@ -387,7 +388,7 @@ class Tracking {
     update_points(map_, frame, probability_, !on_probation, detector_ok_);
     ++frames_since_keyframe_;
     if (!on_probation &&
-        mapping_.wants_keyframe(map_, frame, local_map_.reference(), pose_.inliers, frames_since_keyframe_))
+        mapping_.wants_keyframe(map_, frame, local_map_.reference(), pose_.in_map, frames_since_keyframe_))
       make_keyframe(frame, record);
   }
 
