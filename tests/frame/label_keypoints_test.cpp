@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <numeric>
 #include <vector>
@@ -253,4 +254,35 @@ TEMPLATE_TEST_CASE("After a first call the stage allocates nothing and repeats i
   const cfp::FrameOptions options;
   CHECK(cfp_test::allocations_in([&] { run.coarse(options); }) == 0);
   CHECK(run.state.static_probability == before);
+}
+
+TEST_CASE("The flow at a keypoint's place is the score of the next pair in its box that has a depth", "[frame]") {
+  FrameRun<double> run(make_dynamic_scene<double>(quiet(), 12));
+  const std::size_t pairs = run.scene.previous_depths.size();
+  for (std::size_t p = 0; p < pairs; p += 3)
+    run.scene.previous_depths[p] = p % 2 == 0 ? 0 : std::numeric_limits<double>::infinity();
+  cfp::Frame<double> frame = run.frame();
+  frame.flow.previous_depths = run.scene.previous_depths;
+  cfp::FrameOptions options;
+  for (const double radius_px : {3.0, 30.0}) {
+    options.coarse.flow_radius_px = radius_px;
+    run.coarse(options, frame, run.scene.camera);
+    REQUIRE(run.state.report.flow_model == cfp::FlowModelKind::motion);
+    const auto scored = cfp::scaled_to_noise(options.coarse.object, run.state.report.flow_sigma_px, 2);
+    int found = 0, none = 0;
+    for (std::size_t i = 0; i < run.m.size(); ++i) {
+      double nearest = radius_px, expected = -1;
+      for (std::size_t p = 0; run.state.box[i] != cfp::no_box && p < pairs; ++p) {
+        const double x = frame.flow.current(p, 0), y = frame.flow.current(p, 1);
+        const double apart = std::hypot(x - run.scene.keypoints[i][0], y - run.scene.keypoints[i][1]);
+        if (!cfp::contains(run.state.boxes[std::size_t(run.state.box[i])].box, x, y) || !(apart < nearest) ||
+            !cfp::is_valid_depth(run.scene.previous_depths[p]) || run.state.flow_distances[p] < 0)
+          continue;
+        nearest = apart, expected = cfp::object_score(run.state.flow_distances[p], scored);
+      }
+      CHECK_THAT(run.state.flow_probability[i], WithinAbs(expected, 1e-12));
+      ++(expected < 0 ? none : found);
+    }
+    CHECK((found > 50 && none > 50));
+  }
 }
