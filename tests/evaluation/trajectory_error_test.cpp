@@ -154,6 +154,24 @@ TEST_CASE("RPE in seconds and in frames equals the definition written with 4x4 m
   }
 }
 
+TEST_CASE("A pair counts where both of its poses have a truth within two intervals", "[evaluation]") {
+  cfp::Random random(45, "hole");
+  const auto whole = on_quarters(cfp_test::random_walk(random, 80, 0, 1));
+  auto truth = whole;
+  truth.erase(truth.begin() + 30, truth.begin() + 40);
+  cfp::TrajectoryErrorWorkspace workspace;
+  cfp::RelativeErrorOptions options;
+  options.delta = 1;  // four poses
+  const auto rpe = cfp::relative_pose_error(truth, whole, options, workspace);
+  const auto has_truth = [](std::size_t k) { return k < 32 || k > 37; };  // half a second from one that is left
+  std::vector<std::size_t> expected;
+  for (std::size_t k = 0; k + 4 + 1 < whole.size(); ++k) {
+    if (has_truth(k) && has_truth(k + 4)) expected.push_back(k);
+  }
+  REQUIRE(rpe.translation_m.count == expected.size());
+  CHECK(std::equal(expected.begin(), expected.end(), workspace.pose.begin()));
+}
+
 TEST_CASE("Shuffled trajectories with duplicates and broken poses give the clean ones' errors", "[evaluation]") {
   cfp::Random random(44, "shuffled");
   const auto truth = cfp_test::random_walk(random, 120, 50, 0.03);

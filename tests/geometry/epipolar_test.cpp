@@ -91,6 +91,8 @@ TEMPLATE_TEST_CASE("where there is no line there is no distance", "[geometry]", 
   Matrix3<TestType> broken = F;
   broken(2, 2) = std::numeric_limits<TestType>::quiet_NaN();
   CHECK(cfp::epipolar_distance(broken, anywhere, epipole) == no_distance<TestType>);
+  CHECK(cfp::detail::unit_scale(broken).isZero(0));
+  CHECK(cfp::detail::unit_scale(none).isZero(0));
 }
 
 TEMPLATE_TEST_CASE("epipolar distances of arrays equal the scalar function", "[geometry]", float, double) {
