@@ -46,7 +46,7 @@ struct Options {
   MappingOptions mapping;
   LocalBundleOptions bundle;
   double keypoint_sigma_px = 1;                               // of one coordinate, at level 0 of the pyramid
-  double baseline_fx = 80;                                    // twice ORB-SLAM2's: depth is better than it says
+  double baseline_fx = 80;                                    // of depth as a stereo camera's; ORB-SLAM2 has 40
   cfp::PoseHealthOptions first_health = first_pose_health();  // what a pose of the coarse weights must have
   cfp::PoseHealthOptions health;                              // what a tracked frame's pose must have
   cfp::PoseHealthOptions relocalised_health = relocalised_pose_health();  // what one from the map alone must have
