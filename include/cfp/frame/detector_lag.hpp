@@ -64,9 +64,10 @@ class DetectorLag {
         scores_[i] += score(box.box, rate * static_cast<Scalar>(lag_s(i)), frame, state);
       boxes_ += 1;
     }
-    const auto best = std::max_element(scores_.begin(), scores_.end());
-    const bool clear = *best > 0 && boxes_ >= options_.min_boxes && *best - scores_[0] > options_.min_gain * boxes_;
-    return clear ? lag_s(static_cast<std::size_t>(best - scores_.begin())) : 0;
+    const auto best = static_cast<std::size_t>(std::max_element(scores_.begin(), scores_.end()) - scores_.begin());
+    const double highest = scores_[best];
+    const bool clear = highest > 0 && boxes_ >= options_.min_boxes && highest - scores_[0] > options_.min_gain * boxes_;
+    return clear ? lag_s(best) : 0;
   }
 
   void reset() noexcept {
@@ -85,7 +86,7 @@ class DetectorLag {
   // Of the box's centre, px/s: its own and the image's.
   [[nodiscard]] static Vector2<Scalar> image_rate(const TrackedBox<Scalar>& box, const Frame<Scalar>& frame,
                                                   Scalar dt_s) noexcept {
-    const Vector2<Scalar> own(box.rate_x, box.rate_y);
+    Vector2<Scalar> own(box.rate_x, box.rate_y);
     if (!frame.image_motion || !(dt_s > Scalar(0))) return own;
     const Vector2<Scalar> centre(Scalar(0.5) * (box.box.x1 + box.box.x2), Scalar(0.5) * (box.box.y1 + box.box.y2));
     const Vector3<Scalar> moved = *frame.image_motion * Vector3<Scalar>(centre.x(), centre.y(), Scalar(1));
