@@ -26,6 +26,21 @@ int add_keyframe(Map& map, const std::vector<int>& points, const cfp::SE3<double
 
 cfp::SE3<double> at(double x) { return {cfp::Matrix3<double>::Identity(), {x, 0, 0}}; }
 
+constexpr cfp::PinholeCamera<double> camera{525, 525, 320, 240};
+const View view{camera.cast<float>(), camera, 640, 480, {1}, 1, 40};
+
+/// A keypoint of the frame at X, which is no point of the map yet.
+void see(Frame& frame, const cfp::SE3<double>& T_cam_world, const cfp::Vector3<double>& X) {
+  const cfp::Vector3<double> in_camera = T_cam_world * X;
+  cfp::Vector2<double> pixel;
+  REQUIRE(camera.project(in_camera, pixel));
+  frame.keypoints.emplace_back(float(pixel.x()), float(pixel.y()), 31.0F, 0.0F, 0.0F, 0);
+  frame.pixels.push_back({float(pixel.x()), float(pixel.y())});
+  frame.depths_m.push_back(float(in_camera.z()));
+  frame.static_probability.push_back(1);
+  frame.map_point.push_back(no_point);
+}
+
 }  // namespace
 
 TEST_CASE("A keyframe that has gone is where it was, relative to one that moves", "[slam]") {
@@ -156,8 +171,6 @@ TEST_CASE("Keyframes whose points three others see go, and with them nothing tha
 
 TEST_CASE("A bundle adjustment corrects the newest keyframe, but does not contradict the pose that was believed",
           "[slam]") {
-  const cfp::PinholeCamera<float> camera{525, 525, 320, 240};
-  const View view{camera, camera.cast<double>(), 640, 480, {1}, 1, 40};
   for (const double error_m : {0.05, 0.2}) {
     cfp::Random random(1, "bundle");
     Map map;
@@ -166,15 +179,8 @@ TEST_CASE("A bundle adjustment corrects the newest keyframe, but does not contra
       MapPoint point;
       point.position = {random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(2, 4)};
       for (int k = 0; k < 2; ++k) {
-        const cfp::Vector3<double> in_camera = at(0.1 * k) * point.position;
-        cfp::Vector2<double> pixel;
-        REQUIRE(view.exact.project(in_camera, pixel));
-        frames[k].keypoints.emplace_back();
-        frames[k].keypoints.back().octave = 0;
-        frames[k].pixels.push_back({float(pixel.x()), float(pixel.y())});
-        frames[k].depths_m.push_back(float(in_camera.z()));
-        frames[k].static_probability.push_back(1);
-        frames[k].map_point.push_back(i);
+        see(frames[k], at(0.1 * k), point.position);
+        frames[k].map_point.back() = i;
         point.observations.push_back({k, i});
       }
       map.add(std::move(point));
@@ -191,9 +197,6 @@ TEST_CASE("A bundle adjustment corrects the newest keyframe, but does not contra
 
 TEST_CASE("What only the last frame knows holds the pose, but puts no keyframe off", "[slam]") {
   const Options options;
-  const cfp::PinholeCamera<double> camera{525, 525, 319.5, 239.5};
-  const View view{camera.cast<float>(), camera, 640, 480, cfp_examples::level_sigmas(options.features), 1, 40};
-  const cfp::SE3<double> T_cam_world = at(0.02);
   cfp::Random random(1);
   Map map;
   Frame frame;
@@ -202,12 +205,7 @@ TEST_CASE("What only the last frame knows holds the pose, but puts no keyframe o
   std::vector<int> of_keyframe;
   for (int i = 0; i < known + others; ++i) {
     const cfp::Vector3<double> X{random.uniform(-1, 1), random.uniform(-0.8, 0.8), random.uniform(2, 3)};
-    cfp::Vector2<double> pixel;
-    REQUIRE(camera.project(T_cam_world * X, pixel));
-    frame.keypoints.emplace_back(float(pixel.x()), float(pixel.y()), 31.0F, 0.0F, 0.0F, 0);
-    frame.pixels.push_back({float(pixel.x()), float(pixel.y())});
-    frame.depths_m.push_back(float((T_cam_world * X).z()));
-    frame.map_point.push_back(no_point);
+    see(frame, at(0.02), X);
     last.match.push_back(i);
     last.positions.push_back(X);
     if (i >= known) continue;
@@ -218,7 +216,6 @@ TEST_CASE("What only the last frame knows holds the pose, but puts no keyframe o
   for (int i = 0; i < 40; ++i) of_keyframe.push_back(map.add({}));  // not seen any more
   add_keyframe(map, of_keyframe);
   add_keyframe(map, of_keyframe);
-  frame.static_probability.assign(frame.size(), 1);
   const std::vector<float> weight(frame.size(), 1);
   const RefinedPose pose = PoseSolver(options)(frame, last, map, weight, view, 0, true, options.health, std::nullopt);
   REQUIRE(pose.health.ok());
@@ -230,7 +227,6 @@ TEST_CASE("What only the last frame knows holds the pose, but puts no keyframe o
 }
 
 TEST_CASE("Depths tell the matches that one motion explains from the nine in ten that none does", "[slam]") {
-  const cfp::PinholeCamera<float> camera{525, 525, 320, 240};
   cfp::Random random(1, "rigid");
   const cfp::SE3<double> T_cam_world{cfp::so3_exp<double>({0.2, -0.4, 0.1}), {0.5, -0.2, 0.3}};
   Map map;
@@ -242,17 +238,17 @@ TEST_CASE("Depths tell the matches that one motion explains from the nine in ten
     frame.pixels.push_back({float(random.uniform(0, 640)), float(random.uniform(0, 480))});
     frame.depths_m.push_back(float(random.uniform(1, 4)));
     MapPoint point;
-    point.position = T_cam_world.inverse() * frame.back_project(i, camera);
+    point.position = T_cam_world.inverse() * frame.back_project(i, view.camera);
     if (i >= right) point.position += cfp::Vector3<double>(random.uniform(-2, 2), random.uniform(-2, 2), 1);
     matches.push_back({i, map.add(std::move(point)), 0, 0});
   }
   std::vector<Match> kept = matches;
-  keep_rigid(frame, map, camera, kept);
+  keep_rigid(frame, map, view.camera, kept);
   CHECK(std::count_if(kept.begin(), kept.end(), [](const Match& m) { return m.keypoint < right; }) == right);
   CHECK(kept.size() < 3 * right);
 
   frame.depths_m.assign(all, -1);
   kept = matches;
-  keep_rigid(frame, map, camera, kept);
+  keep_rigid(frame, map, view.camera, kept);
   CHECK(kept.size() == all);
 }

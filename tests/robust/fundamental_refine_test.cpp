@@ -9,6 +9,7 @@
 #include "cfp/robust/fundamental_search_impl.hpp"
 #include "cfp/robust/homography_impl.hpp"
 #include "support/catch.hpp"
+#include "support/numeric_gradient.hpp"
 #include "support/two_view_scene.hpp"
 
 using cfp::Matrix3;
@@ -53,19 +54,13 @@ TEST_CASE("The gradient of the robust Sampson cost is that of central difference
     const Pairs pairs(random, cfp_test::SceneShape::volume);
     const auto columns = cfp::detail::exact_columns(pairs.arrays);
     const FactoredF F = perturbed(pairs.truth, 0.01, random);
-    const double scale = 4 * pairs.arrays.factor * pairs.arrays.factor, h = 1e-6;
+    const double scale = 4 * pairs.arrays.factor * pairs.arrays.factor;
     SampsonSystem system;
     cfp::detail::sampson_system(columns, F.matrix(), scale, system);
     const Eigen::Matrix<double, 7, 1> gradient = 2 * F.tangents().transpose() * system.g;
-    for (int k = 0; k < 7; ++k) {
-      double cost[2];
-      for (int side = 0; side < 2; ++side) {
-        const FactoredF moved = F.moved((side == 0 ? -h : h) * Eigen::Matrix<double, 7, 1>::Unit(k));
-        SampsonSystem at;
-        cost[side] = cfp::detail::sampson_system(columns, moved.matrix(), scale, at);
-      }
-      CHECK_THAT((cost[1] - cost[0]) / (2 * h), WithinAbs(gradient[k], 1e-5 * gradient.norm()));
-    }
+    const cfp::detail::SampsonModel<double> model{columns, scale};
+    const Eigen::Matrix<double, 7, 1> slope = cfp_test::numeric_gradient<7>(model, F, 1e-6);
+    for (int k = 0; k < 7; ++k) CHECK_THAT(slope[k], WithinAbs(gradient[k], 1e-5 * gradient.norm()));
   }
 }
 
@@ -128,19 +123,13 @@ TEST_CASE("The homography's gradient is that of central differences, but for the
   cfp::detail::refine_homography(columns, 1.0, 20, H);
   cfp::detail::refine_homography(columns, scale, 20, H);
   cfp::detail::TransferModel<double> model{columns, scale};
-  cfp::detail::NormalEquations<8> system, other;
+  cfp::detail::NormalEquations<8> system;
   Eigen::Matrix<double, 8, 1> step;
   for (int k = 0; k < 8; ++k) step[k] = 0.001 * random.normal();
   H = model.moved(H, step);
   (void)model.linearize(H, system);
-  const double h = 1e-7;
-  for (int k = 0; k < 8; ++k) {
-    const Eigen::Matrix<double, 8, 1> unit = Eigen::Matrix<double, 8, 1>::Unit(k);
-    const double slope =
-        (model.linearize(model.moved(H, h * unit), other) - model.linearize(model.moved(H, -h * unit), other)) /
-        (2 * h);
-    CHECK_THAT(slope, WithinAbs(2 * system.g[k], 0.02 * system.g.norm()));
-  }
+  const Eigen::Matrix<double, 8, 1> slope = cfp_test::numeric_gradient<8>(model, H, 1e-7);
+  for (int k = 0; k < 8; ++k) CHECK_THAT(slope[k], WithinAbs(2 * system.g[k], 0.02 * system.g.norm()));
   CHECK(system.H.isApprox(system.H.transpose()));
 }
 

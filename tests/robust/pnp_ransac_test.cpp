@@ -10,6 +10,7 @@
 #include "support/absolute_pose_scene.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
+#include "support/numeric_gradient.hpp"
 
 using cfp::PinholeCamera;
 using cfp::pnp_ransac;
@@ -285,16 +286,10 @@ TEST_CASE("The gradient of the refinement is that of central differences, and fa
     const cfp::detail::ReprojectionModel<double> model{in, 4};
     cfp::SE3<double> pose;
     pose.translation = {in.origin[0], in.origin[1], in.origin[2]};
-    cfp::detail::NormalEquations<6> equations, ignored;
+    cfp::detail::NormalEquations<6> equations;
     const double e = error_px * error_px / 4, cost = model.linearize(pose, equations);
     if (std::abs(e - 25) < 0.1) continue;
-    cfp::Vector6<double> gradient;
-    for (int k = 0; k < 6; ++k) {
-      cfp::Vector6<double> step = cfp::Vector6<double>::Zero();
-      step[k] = 1e-6;
-      const double plus = model.linearize(model.moved(pose, step), ignored);
-      gradient[k] = (plus - model.linearize(model.moved(pose, -step), ignored)) / 2e-6;
-    }
+    const cfp::Vector6<double> gradient = cfp_test::numeric_gradient<6>(model, pose, 1e-6);
     CAPTURE(e, cost, world[0][2]);
     CHECK((2 * equations.g - gradient).norm() <= 1e-4 * (1 + gradient.norm()));
     const bool counts = world[0][2] > 0 && e < 25;
