@@ -48,7 +48,7 @@ void run(benchmark::State& state, const std::vector<std::vector<Scalar>>& inputs
 
 template <typename Scalar>
 void BM_chi_squared_survival_cfp(benchmark::State& state) {
-  const double k = static_cast<double>(state.range(0));
+  const int k = static_cast<int>(state.range(0));
   const auto inputs = residuals<Scalar>(1000);
   std::vector<Scalar> out(1000);
   run(state, inputs, [&](const std::vector<Scalar>& x) {
@@ -69,7 +69,7 @@ BENCHMARK(BM_chi_squared_survival_cfp<float>)->Arg(2);
 BENCHMARK(BM_chi_squared_survival_cfp<double>)->Arg(1)->Arg(2)->Arg(3)->Arg(10);
 
 void BM_chi_squared_density_cfp(benchmark::State& state) {
-  const double k = static_cast<double>(state.range(0));
+  const int k = static_cast<int>(state.range(0));
   std::vector<double> out(1000);
   run(state, residuals<double>(1000), [&](const std::vector<double>& x) {
     for (std::size_t i = 0; i < x.size(); ++i) out[i] = cfp::chi_squared_density(x[i], k);

@@ -76,7 +76,7 @@ TEST_CASE("Every option of a frame is refused by its full, unique name", "[core]
       {"coarse.flow.ransac.min_iterations", [](auto& o) { o.coarse.flow.ransac.min_iterations = 100000; }},
       {"coarse.flow.ransac.max_iterations", [](auto& o) { o.coarse.flow.ransac.max_iterations = 0; }},
       {"coarse.flow.ransac.min_inliers", [](auto& o) { o.coarse.flow.ransac.min_inliers = 0; }},
-      {"coarse.object.degrees_of_freedom", [&](auto& o) { o.coarse.object.degrees_of_freedom = nan; }},
+      {"coarse.object.degrees_of_freedom", [](auto& o) { o.coarse.object.degrees_of_freedom = 0; }},
       {"coarse.object.sigma_px", [&](auto& o) { o.coarse.object.sigma_px = nan; }},
       {"coarse.object.noise_factor", [&](auto& o) { o.coarse.object.noise_factor = nan; }},
       {"coarse.memory.time_constant_s", [&](auto& o) { o.coarse.memory.time_constant_s = nan; }},

@@ -61,7 +61,7 @@ void calibration(FuzzInput& in) {
 template <typename Scalar>
 void formulas(FuzzInput& in) {
   const auto number = [&](double low, double high) { return FuzzInput::to<Scalar>(in.number(low, high)); };
-  CFP_PROMISE(is_probability(cfp::chi_squared_survival(number(0, 20), in.number(0, 10))));
+  CFP_PROMISE(is_probability(cfp::chi_squared_survival(number(0, 20), in.byte())));
   std::vector<Scalar> samples = in.numbers<Scalar>(in.count(60), 0, 5), scratch(samples.size());
   cfp::ConstraintOptions constraint;
   cfp_fuzz::disturb(in, constraint, {&constraint.quantile, &constraint.steepness});
@@ -70,8 +70,8 @@ void formulas(FuzzInput& in) {
   CFP_PROMISE(is_probability(model.calculation_confidence));
   cfp::ObjectProbabilityOptions scored;
   cfp_fuzz::disturb(in, scored,
-                    {&scored.degrees_of_freedom, &scored.sigma_px, &scored.noise_factor, &scored.positions[0],
-                     &scored.positions[1], &scored.positions[2], &scored.unknown_object_probability});
+                    {&scored.sigma_px, &scored.noise_factor, &scored.positions[0], &scored.positions[1],
+                     &scored.positions[2], &scored.unknown_object_probability});
   const auto object = cfp::object_probability(samples, scored, scratch);
   CFP_PROMISE(is_probability(object.static_probability));
   cfp::MapPointOptions options;

@@ -62,7 +62,6 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
                        &flow.motion.distance.depth_noise.constant_m,
                        &flow.motion.distance.depth_noise.quadratic,
                        &flow.ransac.threshold_px,
-                       &object.degrees_of_freedom,
                        &object.sigma_px,
                        &object.noise_factor,
                        &object.unknown_object_probability,

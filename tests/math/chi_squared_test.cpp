@@ -31,7 +31,7 @@ TEST_CASE("chi-squared in float agrees with the reference table", "[math]") {
 }
 
 TEST_CASE("the density is minus the derivative of the survival function", "[math]") {
-  for (const double k : {0.3, 1.0, 1.7, 2.0, 3.0, 4.5, 30.0, 34.0, 200.0}) {
+  for (const int k : {1, 2, 3, 4, 30, 33, 100}) {
     for (const double factor : {0.2, 0.7, 1.0, 1.3}) {
       const double x = k * factor + 0.05;
       const double h = 1e-5 * x;
@@ -44,16 +44,13 @@ TEST_CASE("the density is minus the derivative of the survival function", "[math
   }
 }
 
-TEST_CASE("the general formulas meet the closed forms at k = 1 and 2, and one branch the next", "[math]") {
+TEST_CASE("two more degrees of freedom add twice their density to the tail", "[math]") {
   for (const double x : {1e-6, 0.3, 0.999, 1.0, 1.001, 1.999, 2.0, 2.001, 5.0, 80.0}) {
-    CAPTURE(x);
-    CHECK(relative_difference(cfp::detail::gamma_upper_tail(x / 2, 0.5), std::erfc(std::sqrt(x / 2))) < 1e-13);
-    CHECK(relative_difference(cfp::detail::gamma_upper_tail(x / 2, 1.0), std::exp(-x / 2)) < 1e-13);
-    // Q(x; k + 2) = Q(x; k) + 2 density(x; k + 2), across a = 1 and across the two forms of the density at k = 32.
-    for (const double k : {0.2, 1.9, 2.0, 31.0, 31.99, 200.0}) {
-      CAPTURE(k);
+    for (int k = 1; k <= 98; ++k) {
+      CAPTURE(x, k);
       const double expected = chi_squared_survival(x, k) + 2 * chi_squared_density(x, k + 2);
       CHECK(relative_difference(chi_squared_survival(x, k + 2), expected) < 1e-12);
+      CHECK(relative_difference(chi_squared_density(x, k + 2), chi_squared_density(x, k) * x / k) < 1e-13);
     }
   }
 }
@@ -74,15 +71,15 @@ TEMPLATE_TEST_CASE("one and two degrees of freedom are by the closed forms, but 
 }
 
 TEST_CASE("the density has its mode at k - 2", "[math]") {
-  for (const double k : {2.5, 3.0, 10.0, 32.0, 500.0}) {
+  for (const int k : {3, 4, 10, 33, 100}) {
     for (int i = 0; i < 400; ++i)
-      CHECK(chi_squared_density(i * k / 100, k) <= chi_squared_density(k - 2, k) * (1 + 1e-14));
+      CHECK(chi_squared_density(i * k / 100.0, k) <= chi_squared_density(k - 2.0, k) * (1 + 1e-14));
   }
 }
 
 TEMPLATE_TEST_CASE("chi-squared at the borders of its domain", "[math]", float, double) {
   using limits = std::numeric_limits<TestType>;
-  for (const double k : {0.4, 1.0, 2.0, 3.3, 40.0, 1e8}) {
+  for (const int k : {1, 2, 3, 4, 40, 100}) {
     CAPTURE(k);
     CHECK(chi_squared_survival(TestType(0), k) == 1);
     CHECK(chi_squared_survival(TestType(-3), k) == 1);
@@ -100,8 +97,7 @@ TEMPLATE_TEST_CASE("chi-squared at the borders of its domain", "[math]", float, 
       CHECK((density >= 0 && density <= (limits::max)()));
     }
   }
-  for (const double k :
-       {0.0, -1.0, 1.1e8, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+  for (const int k : {0, -1, 101, (std::numeric_limits<int>::max)(), (std::numeric_limits<int>::min)()}) {
     CHECK(chi_squared_survival(TestType(1), k) == 0);
     CHECK(chi_squared_density(TestType(1), k) == 0);
   }

@@ -20,7 +20,7 @@ void check_derivative(Function&& function, double x) {
 }  // namespace
 
 TEST_CASE("chi-squared and logistic differentiate", "[math]") {
-  for (const double k : {0.5, 1.0, 2.0, 3.0, 7.5, 40.0}) {
+  for (const int k : {1, 2, 3, 4, 7, 40}) {
     CAPTURE(k);
     for (const double x : {0.4, 0.9, 2.5, 5.991, 20.0, 60.0}) {
       check_derivative([&](const auto& t) { return cfp::chi_squared_survival(t, k); }, x);

@@ -78,7 +78,7 @@ TEMPLATE_TEST_CASE("Selecting three order statistics equals scoring and sorting 
                    double) {
   cfp::Random random(7, "object selection");
   for (const ObjectScore score : {ObjectScore::survival, ObjectScore::density}) {
-    for (const double k : {1.0, 2.0, 3.0, 5.0}) {
+    for (const int k : {1, 2, 3, 5}) {
       for (const std::size_t n : {1U, 2U, 3U, 9U, 10U, 11U, 30U, 99U, 500U}) {
         ObjectProbabilityOptions options;
         options.score = score;
@@ -141,7 +141,7 @@ TEMPLATE_TEST_CASE("Hostile distances give a probability in range", "[probabilit
                                          Limits::infinity(), -Limits::infinity(),  Limits::quiet_NaN(), TestType(1e30),
                                          TestType(-1),       TestType(1)};
   for (const ObjectScore score : {ObjectScore::survival, ObjectScore::density}) {
-    for (const double k : {0.5, 1.0, 2.0, 7.5}) {
+    for (const int k : {1, 2, 7, 100}) {
       ObjectProbabilityOptions options;
       options.score = score;
       options.degrees_of_freedom = k;
@@ -191,8 +191,10 @@ TEST_CASE("Object options outside their range are named", "[probability]") {
   options.positions[1] = std::numeric_limits<double>::quiet_NaN();
   CHECK(cfp::invalid_field(options).string() == "positions");
   options = {};
-  options.degrees_of_freedom = 0;
-  CHECK(cfp::invalid_field(options).string() == "degrees_of_freedom");
+  for (const int k : {-1, 0, 101}) {
+    options.degrees_of_freedom = k;
+    CHECK(cfp::invalid_field(options).string() == "degrees_of_freedom");
+  }
   options = {};
   options.min_pairs = 0;
   CHECK(cfp::invalid_field(options).string() == "min_pairs");

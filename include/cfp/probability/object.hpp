@@ -26,8 +26,8 @@ enum class ObjectScore : std::uint8_t {
 
 struct ObjectProbabilityOptions {
   ObjectScore score = ObjectScore::survival;
-  /// k, > 0. The paper's 2; a distance from a line has statistically one degree of freedom.
-  double degrees_of_freedom = 2;
+  /// k, in [1, 100]. The paper's 2; a distance from a line has statistically one degree of freedom.
+  int degrees_of_freedom = 2;
   /// Scale of the distances in pixels, > 0. With 1 (the paper) the score reaches 0.9 at 0.46 px and a static object
   /// with unit noise scores 0.43 at the paper's positions: O is a score on a pixel scale, and sigma sets the scale.
   double sigma_px = 1;
@@ -55,7 +55,7 @@ struct ObjectProbability {
 inline namespace CFP_ISA {
 
 [[nodiscard]] inline OptionPath invalid_field(const ObjectProbabilityOptions& o) noexcept {
-  if (!detail::positive(o.degrees_of_freedom)) return "degrees_of_freedom";
+  if (!is_degrees_of_freedom(o.degrees_of_freedom)) return "degrees_of_freedom";
   if (!detail::positive(o.sigma_px)) return "sigma_px";
   if (!detail::non_negative(o.noise_factor)) return "noise_factor";
   if (!(o.positions[0] > 0 && o.positions[0] <= o.positions[1] && o.positions[1] <= o.positions[2] &&
@@ -82,7 +82,7 @@ template <typename Scalar>
 [[nodiscard]] Scalar object_score(Scalar epipolar_distance_px, const ObjectProbabilityOptions& options) noexcept {
   if (!is_finite(epipolar_distance_px)) return Scalar(0);
   const Scalar r = epipolar_distance_px / Scalar(options.sigma_px);
-  const double k = options.degrees_of_freedom;
+  const int k = options.degrees_of_freedom;
   return clamp_probability(options.score == ObjectScore::survival ? chi_squared_survival(r * r, k)
                                                                   : chi_squared_density(r * r, k));
 }
@@ -101,19 +101,10 @@ template <typename Range, typename Scalar = range_value_t<Range>>
   result.pairs = n;
   if (n < (std::max)(options.min_pairs, std::size_t(1))) return result;
 
-  // Where the score falls with the distance, the ascending order of the negated distances is that of the scores, and
-  // only the three selected need one.
-  const bool monotone = options.score == ObjectScore::survival || options.degrees_of_freedom <= 2;
-  const span<Scalar> values = workspace.subspan(0, n);
-  if (monotone) {
-    for (Scalar& value : values) value = -value;
-  } else {
-    for (Scalar& value : values) value = object_score(value, options);
-  }
+  const span<Scalar> scores = workspace.subspan(0, n);
+  for (Scalar& value : scores) value = object_score(value, options);
   double sum = 0;
-  for (const Scalar value : select_quantiles(values, options.positions)) {
-    sum += static_cast<double>(monotone ? object_score(value, options) : value);
-  }
+  for (const Scalar score : select_quantiles(scores, options.positions)) sum += static_cast<double>(score);
   result.static_probability = clamp_probability(sum / static_cast<double>(options.positions.size()));
   result.status = Status::ok;
   return result;
