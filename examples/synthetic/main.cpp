@@ -57,6 +57,8 @@ int main(int argc, char* argv[]) {
   app.add_option("--people", options.people, "of the two; 0: an empty room")
       ->check(CLI::Range(0, 2))
       ->capture_default_str();
+  auto* close_up = app.add_flag("--close-up", options.close_up, "people fill the view: 40 % of it, up to 70 %");
+  auto* furniture = app.add_flag("--furniture", options.furniture, "a table and a plant stand before the people");
   app.add_option("--width", width, "of the images, 4:3")->check(CLI::Range(64, 4096))->capture_default_str();
   app.add_option("--blur", options.blur_samples, "sub-exposures of the motion blur; 1 = none")
       ->check(CLI::Range(1, 64))
@@ -66,7 +68,8 @@ int main(int argc, char* argv[]) {
       ->capture_default_str();
   app.add_option("--threads", threads, "rendering threads")->check(CLI::Range(1, 256))->capture_default_str();
   app.add_option("--background", background, "a recording in TUM format with poses; the people are put into it")
-      ->check(CLI::ExistingDirectory);
+      ->check(CLI::ExistingDirectory)
+      ->excludes(close_up, furniture);
   app.add_option("--camera-height", camera_height, "of the first background camera above the floor, m")
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);

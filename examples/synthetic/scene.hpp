@@ -18,18 +18,25 @@ struct Scene {
   int shirts[2]{}, trousers[2]{}, heads[2]{}, skins[2]{}, shoes = 0;
 };
 
+/// What the scene and the people's scripts agree about.
+struct Stage {
+  bool room = true;        ///< false: the people are put into a real recording
+  bool furniture = false;  ///< stands between the camera and the people
+  struct Chair {
+    double x, y, heading;  ///< where one looks on it, from +x
+  } chairs[2] = {{-0.95, -0.95, 0.9}, {0.95, -0.95, 3.14159265358979 - 0.9}};
+  double lanes[2] = {-1.82, -1.5};  ///< y on which they walk; chairs reach to -1.2, the camera to -2.45
+  double front = -2.3;              ///< y of the nearest that they come in a close-up
+};
+
 constexpr double seat_height = 0.46;
-constexpr double chair_x[2] = {-0.95, 0.95};
-constexpr double chair_y = -0.95;
-constexpr double chair_heading[2] = {0.9, 3.14159265358979 - 0.9};  ///< where one looks on it, from +x
 
 class SceneBuilder {
  public:
   explicit SceneBuilder(std::uint64_t seed) : random_(seed, "textures") {}
 
-  /// Textures of the people and, when furnished, the room; otherwise only the chairs (for composing into a real
-  /// recording).
-  Scene build(bool furnished) {
+  /// Textures of the people and the room; without it only the chairs (for composing into a real recording).
+  Scene build(const Stage& stage) {
     for (int person = 0; person < 2; ++person) {
       const cv::Scalar skin = person == 0 ? cv::Scalar(125, 155, 205) : cv::Scalar(150, 180, 225);
       scene_.skins[person] = add(plain(random_, 256, skin, 4));
@@ -42,8 +49,9 @@ class SceneBuilder {
     scene_.trousers[1] = add(collage(random_, 512, {110, 70, 45}, 180, 0.12, 1));
     scene_.shoes = add(plain(random_, 128, {45, 45, 50}, 8));
     const int wood = add(collage(random_, 1024, {120, 170, 205}, 60, 0.06, 0.6));
-    for (int side = 0; side < 2; ++side) chair(chair_x[side], chair_y, chair_heading[side] - 1.5707963, wood);
-    if (furnished) furnish(wood);
+    for (int side = 0; side < 2; ++side) chair(stage.chairs[side], wood);
+    if (stage.room) furnish(wood);
+    if (stage.furniture) stand_in_front(wood);
     return std::move(scene_);
   }
 
@@ -66,11 +74,12 @@ class SceneBuilder {
     return scene_.surfaces.back();
   }
 
-  void chair(double x, double y, double yaw, int wood) {
+  void chair(const Stage::Chair& chair, int wood) {
+    const double yaw = chair.heading - 1.5707963;
     const Matrix3d R = Eigen::AngleAxisd(yaw, Vector3d::UnitZ()).toRotationMatrix();
     const auto part = [&](double dx, double dy, double bottom, const Vector3d& size) {
       const Vector3d at = R * Vector3d(dx, dy, 0);
-      box(x + at.x(), y + at.y(), bottom, size, wood, 0.5, yaw);
+      box(chair.x + at.x(), chair.y + at.y(), bottom, size, wood, 0.5, yaw);
     };
     part(0, 0, seat_height - 0.04, {0.42, 0.42, 0.04});
     part(0, -0.2, seat_height + 0.12, {0.42, 0.03, 0.3});
@@ -123,6 +132,38 @@ class SceneBuilder {
     box(0.05, 3.2, 0, {0.9, 0.4, 1.6}, wood, 1.1);
     box(3.2, 1.8, 0, {0.35, 0.35, 3.1}, brown, 1.2);  // pillars
     box(-3.3, 1.2, 0, {0.35, 0.35, 3.1}, grey, 1.2);
+  }
+
+  /// A high table and a plant on a stand, narrower than a person, as near to the camera as the lanes allow.
+  void stand_in_front(int wood) {
+    const int pottery = add(collage(random_, 512, {95, 120, 165}, 160, 0.2, 0.8));
+    const int foliage = add(blots(random_, 512, {70, 125, 75}));
+    const double y = -2.24, table = random_.uniform(-0.42, -0.3), plant = random_.uniform(0.26, 0.38);
+    box(table, y, 0, {0.26, 0.22, 0.03}, wood, 0.5);
+    box(table, y, 0.03, {0.06, 0.06, 0.97}, wood, 1.2);
+    box(table, y, 1, {0.42, 0.24, 0.03}, wood, 0.5);
+    for (int i = 0; i < 3; ++i) {
+      box(table + 0.13 * (i - 1), y + random_.uniform(-0.04, 0.04), 1.03,
+          {random_.uniform(0.08, 0.12), 0.1, random_.uniform(0.08, 0.28)}, pottery, 0.5, random_.uniform(-0.4, 0.4));
+    }
+    box(plant, y, 0, {0.2, 0.2, 0.8}, pottery, 1);
+    for (int leaf = 0; leaf < 16; ++leaf) {
+      const double turn = 2.4 * leaf, length = random_.uniform(0.3, 0.55), open = random_.uniform(0.1, 0.6);
+      const Vector3d out(std::cos(turn), std::sin(turn), 0);
+      Surface s;
+      s.shape = Shape::capsule;
+      s.half = Vector3d(0.01, 0.01, length / 2);
+      const Vector3d z = std::sin(open) * out + std::cos(open) * Vector3d::UnitZ();
+      const Vector3d x = Vector3d::UnitZ().cross(out);
+      s.centre = Vector3d(plant, y, 0.78) + length / 2 * z;
+      s.A.row(0) = x.transpose() / 2.2;
+      s.A.row(1) = z.cross(x).transpose();
+      s.A.row(2) = z.transpose();
+      s.texture = foliage;
+      s.tile_m = 0.3;
+      s.shift = Vector3d(0, 0, random_.uniform());
+      scene_.surfaces.push_back(s);
+    }
   }
 
   cfp::Random random_;

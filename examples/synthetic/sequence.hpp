@@ -31,6 +31,8 @@ struct SequenceOptions {
   double rate_hz = 30;
   std::uint64_t seed = 1;
   int people = 2;             ///< of the two; 0: an empty room
+  bool close_up = false;      ///< they fill the view
+  bool furniture = false;     ///< stands before them
   int blur_samples = 1;       ///< sub-exposures; 1: no motion blur
   double exposure_s = 0.012;  ///< over which they are spread
   ImageCamera camera = default_camera(640);
@@ -77,21 +79,23 @@ class Sequence {
         recording_(std::move(recording)),
         normal_(options.seed),
         motion_(options.motion, options.seed) {
-    const bool furnished = recording_ == nullptr;
+    const Stage stage = arranged();
     if (recording_ != nullptr) {
       options_.camera = recording_->camera;
       options_.sensor.depth_units_per_metre = recording_->depth_units_per_metre;
       options_.frames = std::min(options_.frames, static_cast<int>(recording_->views.size()));
     }
-    scene_ = SceneBuilder(options_.seed).build(furnished);
+    scene_ = SceneBuilder(options_.seed).build(stage);
     const double seconds =
         recording_ != nullptr ? time_of(options_.frames) + 1 : options_.frames / options_.rate_hz + 1;
     for (int person = 0; person < 2; ++person) {
       cfp::Random random(options_.seed, person == 0 ? "first person" : "second person");
-      scripts_[person] = options_.scenario == Scenario::sitting ? sitting_script(random, person, seconds)
-                                                                : walking_script(random, person, seconds, furnished);
+      const bool sits = options_.scenario == Scenario::sitting;
+      scripts_[person] = sits                ? sitting_script(random, person, seconds, stage)
+                         : options_.close_up ? close_up_script(random, person, seconds, stage, motion_)
+                                             : walking_script(random, person, seconds, stage);
     }
-    if (!furnished && options_.scenario == Scenario::walking) scene_.surfaces.clear();  // nobody sits: no chairs
+    if (!stage.room && options_.scenario == Scenario::walking) scene_.surfaces.clear();  // nobody sits: no chairs
   }
 
   [[nodiscard]] const SequenceOptions& options() const { return options_; }
@@ -146,6 +150,23 @@ class Sequence {
   }
 
  private:
+  [[nodiscard]] Stage arranged() const {
+    Stage stage;
+    stage.room = recording_ == nullptr;
+    stage.furniture = options_.furniture;
+    if (options_.furniture) {
+      stage.lanes[0] = -1.72;
+      stage.lanes[1] = -1.45;
+      stage.front = -1.8;
+    }
+    if (options_.close_up && options_.scenario == Scenario::sitting) {
+      const double y = options_.furniture ? -1.75 : -2.07;
+      stage.chairs[0] = {-0.32, y, 1.25};
+      stage.chairs[1] = {0.32, y, 3.14159265358979 - 1.25};
+    }
+    return stage;
+  }
+
   void blur(double time, Renderer& renderer, Frame& truth) const {
     cv::Mat sum = cv::Mat::zeros(truth.color.size(), CV_32FC3);
     Frame part;

@@ -7,6 +7,7 @@
 
 #include "cfp/core/random.hpp"
 
+#include "camera_motion.hpp"
 #include "scene.hpp"
 
 namespace synthetic {
@@ -105,10 +106,11 @@ class Director {
 };
 
 /// Two people on their chairs at the desk: gestures, looks, leaning, and much stillness.
-inline Script sitting_script(cfp::Random& random, int person, double seconds) {
-  const double inward = chair_heading[person];
+inline Script sitting_script(cfp::Random& random, int person, double seconds, const Stage& stage) {
+  const Stage::Chair& chair = stage.chairs[person];
+  const double inward = chair.heading;
   const double feet = 0.42;  // in front of the chair's middle
-  Director d(chair_x[person] + feet * std::cos(inward), chair_y + feet * std::sin(inward), inward, 1,
+  Director d(chair.x + feet * std::cos(inward), chair.y + feet * std::sin(inward), inward, 1,
              person == 0 ? 1.80 : 1.74);
   d.wait(person == 0 ? 0.3 : 1.2);
   while (d.now() < seconds) {
@@ -127,14 +129,15 @@ inline Script sitting_script(cfp::Random& random, int person, double seconds) {
 }
 
 /// They stand up, walk past each other before and behind the desk, stop to talk with a hand, and sit down again.
-inline Script walking_script(cfp::Random& random, int person, double seconds, bool furnished) {
+inline Script walking_script(cfp::Random& random, int person, double seconds, const Stage& stage) {
   const double side = person == 0 ? -1 : 1;
-  const double lane = person == 0 ? -1.82 : -1.5;  // y; chairs reach to -1.2, the camera to -2.45
-  const double inward = chair_heading[person];
-  const double seat_x = chair_x[person] + 0.42 * std::cos(inward), seat_y = chair_y + 0.42 * std::sin(inward);
+  const double lane = stage.lanes[person];
+  const Stage::Chair& chair = stage.chairs[person];
+  const double inward = chair.heading;
+  const double seat_x = chair.x + 0.42 * std::cos(inward), seat_y = chair.y + 0.42 * std::sin(inward);
   const double speed = random.uniform(0.75, 1.05);
-  const bool starts_seated = furnished && person == 0;
-  Director d(starts_seated ? seat_x : side * (furnished ? 1.0 : 0.5), starts_seated ? seat_y : lane,
+  const bool starts_seated = stage.room && person == 0;
+  Director d(starts_seated ? seat_x : side * (stage.room ? 1.0 : 0.5), starts_seated ? seat_y : lane,
              starts_seated ? inward : cfp::pi<double>, starts_seated ? 1 : 0, person == 0 ? 1.80 : 1.74);
   if (starts_seated) {
     d.wait(0.6);
@@ -152,7 +155,7 @@ inline Script walking_script(cfp::Random& random, int person, double seconds, bo
     } else if (choice < 0.8) {
       d.turn(random.uniform(1.1, 2.0));
       d.gesture(static_cast<int>(random.index(2)), random.uniform(0.4, 1.2));
-    } else if (choice < 0.88 || !furnished) {
+    } else if (choice < 0.88 || !stage.room) {
       // Around the desk, behind the partition, and back on the other side.
       const double s = left ? -1 : 1;
       d.walk(s * 1.95, lane + 0.1, speed);
@@ -170,6 +173,37 @@ inline Script walking_script(cfp::Random& random, int person, double seconds, bo
       d.gesture(person, random.uniform(0.3, 1));
       d.sit(0);
     }
+  }
+  return d.finish();
+}
+
+/// They come in from the sides and stay where the camera looks. Every three seconds both take new places: side by side,
+/// one before the other, the rear one stepping back; in between they gesture or look around. Each keeps his own
+/// distance, so that they do not walk through each other.
+inline Script close_up_script(cfp::Random& random, int person, double seconds, const Stage& stage,
+                              const CameraMotion& camera) {
+  const struct {
+    double bearing, distance;
+  } places[2][4] = {{{-0.26, 0.9}, {0.18, 0.92}, {-0.24, 0.92}, {-0.12, 0.88}},
+                    {{0, 1.2}, {0.3, 1.2}, {0.24, 1.18}, {0.26, 1.45}}};
+  const double home = person == 0 ? -1 : 1;
+  const double speed = random.uniform(0.8, 1.05), front = stage.front + 0.27 * person;
+  Director d(home * (0.75 + 0.15 * person), -1.95 + 0.3 * person, home > 0 ? cfp::pi<double> : 0, 0,
+             person == 0 ? 1.80 : 1.74);
+  for (int beat = 0; d.now() < seconds; ++beat) {
+    const auto& place = places[person][beat % 4];
+    // From where the camera will stand and look in the middle of the stop; y from the middle of its motion.
+    const cfp::SE3<double> T = camera(d.now() + 2);
+    const double angle = std::atan2(T.rotation(1, 2), T.rotation(0, 2)) - place.bearing - random.uniform(-0.04, 0.04);
+    d.walk(T.translation.x() + place.distance * std::cos(angle),
+           std::max(front, -2.95 + place.distance * std::sin(angle)), speed);
+    d.turn(random.uniform(1.1, 2.0));
+    if (random.uniform() < 0.6) {
+      d.gesture(static_cast<int>(random.index(2)), random.uniform(0, 0.4));
+    } else {
+      d.look(random.uniform(-0.9, 0.9));
+    }
+    d.wait(std::max(0.0, 3 * (beat + 1) - d.now()));
   }
   return d.finish();
 }

@@ -132,6 +132,97 @@ TEST_CASE("Labels, boxes and visible parts agree with the surfaces", "[synthetic
   CHECK(seen == std::set<int>{0, 1, 2});
 }
 
+TEST_CASE("Without close-up and furniture, room and people are what they were before these options", "[synthetic]") {
+  // Middle of the hips of both people at 7 s: figures of the generator without the options.
+  const double hips_of[2][2][3] = {{{-0.9592194, -0.9616179, 0.5529390}, {0.9502095, -0.9502640, 0.5345077}},
+                                   {{0.6497995, -1.8132880, 0.9350535}, {0.4274265, -1.5252786, 0.8699311}}};
+  for (const auto scenario : {Scenario::sitting, Scenario::walking}) {
+    const auto surfaces = Sequence(small(scenario, Motion::xyz)).surfaces_at(7);
+    REQUIRE(surfaces.size() == 91);
+    for (std::size_t who = 0; who < 2; ++who) {
+      const Vector3d hips = surfaces[surfaces.size() - 2 * parts.size() + who * parts.size() + 2].centre;
+      const auto& before = hips_of[static_cast<std::size_t>(scenario)][who];
+      CHECK((hips - Vector3d(before[0], before[1], before[2])).norm() < 1e-6);
+    }
+  }
+}
+
+TEST_CASE("In a close-up, people fill the view of every camera and keep clear of it", "[synthetic]") {
+  for (std::size_t m = 0; m < motion_names.size(); ++m) {
+    for (const std::uint64_t seed : {1U, 2U}) {
+      CAPTURE(motion_names[m], seed);
+      auto options = small(Scenario::walking, static_cast<Motion>(m));
+      options.frames = 300;
+      options.camera = SequenceOptions::default_camera(80);
+      options.seed = seed;
+      options.close_up = true;
+      const Sequence sequence(options);
+      std::vector<double> shares;
+      for (int frame = 0; frame < 300; frame += 5) {
+        const auto out = rendered(sequence, frame);
+        shares.push_back(1 - cv::countNonZero(out.label == label_static) / static_cast<double>(out.label.total()));
+        const auto surfaces = sequence.surfaces_at(sequence.time_of(frame));
+        const std::size_t first = surfaces.size() - 2 * parts.size(), second = first + parts.size();
+        for (std::size_t i = first; i < surfaces.size(); ++i)
+          REQUIRE(signed_distance(surfaces[i], sequence.T_stage_cam(frame).translation) > 0.2);
+        REQUIRE((surfaces[first + 2].centre - surfaces[second + 2].centre).norm() > 0.2);
+      }
+      std::sort(shares.begin(), shares.end());
+      CHECK(shares[shares.size() / 2] > 0.34);
+      CHECK(shares[shares.size() / 2] < 0.52);
+      CHECK(shares.back() > 0.5);
+      CHECK(shares.back() < 0.85);
+    }
+  }
+}
+
+TEST_CASE("Furniture stands before people, within their boxes, static, with depth, and none walks through it",
+          "[synthetic]") {
+  for (const bool close_up : {false, true}) {
+    for (const auto scenario : {Scenario::sitting, Scenario::walking}) {
+      auto options = small(scenario, Motion::xyz);
+      options.close_up = close_up;
+      const std::size_t people = 2 * parts.size(), room = Sequence(options).surfaces_at(0).size() - people;
+      options.furniture = true;
+      const Sequence sequence(options);
+      CAPTURE(close_up, scenario_names[static_cast<std::size_t>(scenario)]);
+      int frames = 0, hidden = 0, covered = 0, with_depth = 0;
+      for (int frame = 0; frame < options.frames; frame += 8, ++frames) {
+        const auto surfaces = sequence.surfaces_at(sequence.time_of(frame));
+        const std::size_t first = surfaces.size() - people;
+        REQUIRE(first > room);
+        for (std::size_t i = room; i < first; ++i) {
+          for (std::size_t p = first; p < surfaces.size(); ++p)
+            REQUIRE(signed_distance(surfaces[i], surfaces[p].centre) > 0.02);
+        }
+        const auto out = rendered(sequence, frame);
+        bool before_somebody = false;
+        for (const Sighting& s : out.truth.people) {
+          if (s.pixels == 0) continue;
+          double inside = 0;
+          for (int y = static_cast<int>(s.box.y1); y < static_cast<int>(s.box.y2); ++y) {
+            for (int x = static_cast<int>(s.box.x1); x < static_cast<int>(s.box.x2); ++x) {
+              const auto id = static_cast<std::size_t>(out.truth.surface.at<short>(y, x) / 8);
+              if (id < room || id >= first) continue;
+              REQUIRE(out.label.at<unsigned char>(y, x) == label_static);
+              ++inside;
+              ++covered;
+              with_depth += out.depth.at<std::uint16_t>(y, x) > 0 ? 1 : 0;
+            }
+          }
+          if (inside > 0.1 * cfp::area(s.box)) {
+            before_somebody = true;
+            CHECK(s.visible < 0.99);
+          }
+        }
+        hidden += before_somebody ? 1 : 0;
+      }
+      CHECK(hidden > 0.3 * frames);
+      CHECK(with_depth > 0.7 * covered);
+    }
+  }
+}
+
 TEST_CASE("Cameras move at the mean speeds of TUM's fr3_walking recordings", "[synthetic]") {
   // The benchmark's own figures: m/s, deg/s.
   const double tum[4][2] = {{0.012, 1.388}, {0.208, 5.490}, {0.221, 18.267}, {0.091, 20.903}};
