@@ -35,8 +35,9 @@ int main() {
   std::printf(
       "\"flags\": \"%s\", \"instruction set\": \"%s, %d floats and %d doubles at once\", \"cfp\": \"%s\", \"Eigen\": "
       "\"%d.%d.%d\"",
-      CFP_BENCHMARK_FLAGS, Eigen::SimdInstructionSetsInUse(), cfp::simd::native_lanes<float>, cfp::simd::native_lanes<double>,
-      CFP_VERSION_STRING, EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION);
+      CFP_BENCHMARK_FLAGS, Eigen::SimdInstructionSetsInUse(), static_cast<int>(cfp::simd::Packet<float>::lanes),
+      static_cast<int>(cfp::simd::Packet<double>::lanes), CFP_VERSION_STRING, EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION,
+      EIGEN_MINOR_VERSION);
 #ifdef CFP_HAVE_BOOST
   std::printf(", \"Boost\": \"%d.%d\"", BOOST_VERSION / 100000, BOOST_VERSION / 100 % 1000);
 #endif

@@ -294,7 +294,8 @@ void contaminated(int people) {
 
 int main(int argc, char** argv) {
   const int repetitions = argc > 1 ? std::max(1, std::atoi(argv[1])) : 48;
-  std::printf("packet lanes: %d double, %d float\n", cfp::simd::native_lanes<double>, cfp::simd::native_lanes<float>);
+  std::printf("packet lanes: %zu double, %zu float\n", cfp::simd::Packet<double>::lanes,
+              cfp::simd::Packet<float>::lanes);
   for (const bool stereo : {false, true}) {
     for (const double outliers : {0.1, 0.3}) {
       for (const int n : {100, 300, 1000, 2000}) run(n, outliers, stereo, repetitions);

@@ -86,14 +86,14 @@ TEST_CASE("Losses: a name that is none is known as such", "[optimization]") {
 TEMPLATE_TEST_CASE("Losses: a packet of residuals gives the scalar results", "[optimization]", float, double) {
   using Scalar = TestType;
   using P = cfp::simd::Packet<Scalar>;
-  constexpr int lanes = cfp::simd::lanes_of<P>;
+  constexpr int lanes = static_cast<int>(P::lanes);
   for (const cfp::LossType type : all_types) {
     for (Scalar base = 0; base < Scalar(100); base += Scalar(1.37)) {
       Scalar s[lanes], value[lanes], first[lanes];
       for (int i = 0; i < lanes; ++i) s[i] = base * static_cast<Scalar>(i + 1);
       cfp::with_loss<P>(type, P(Scalar(2.5)), [&](const auto& loss) {
-        cfp::simd::store(value, loss.value(cfp::simd::load<P>(s)));
-        cfp::simd::store(first, loss.first(cfp::simd::load<P>(s)));
+        loss.value(P::load(s)).store(value);
+        loss.first(P::load(s)).store(first);
       });
       const NamedLoss<Scalar> loss{type, Scalar(2.5)};
       for (int i = 0; i < lanes; ++i) {

@@ -31,19 +31,16 @@ struct SampsonPacket {
   P p0, p1, q0, q1, l0, l1, m0, m1, e, n2;
 
   SampsonPacket(const PairColumns<T>& in, std::size_t i, const Matrix3<T>& F) noexcept
-      : p0(simd::load<P>(in.row[0] + i)),
-        p1(simd::load<P>(in.row[1] + i)),
-        q0(simd::load<P>(in.row[2] + i)),
-        q1(simd::load<P>(in.row[3] + i)) {
+      : p0(P::load(in.row[0] + i)), p1(P::load(in.row[1] + i)), q0(P::load(in.row[2] + i)), q1(P::load(in.row[3] + i)) {
     const auto line = [](const P& x, const P& y, T a, T b, T c) {
-      return simd::multiply_add(P(a), x, simd::multiply_add(P(b), y, P(c)));
+      return multiply_add(P(a), x, multiply_add(P(b), y, P(c)));
     };
     l0 = line(p0, p1, F(0, 0), F(0, 1), F(0, 2));
     l1 = line(p0, p1, F(1, 0), F(1, 1), F(1, 2));
     m0 = line(q0, q1, F(0, 0), F(1, 0), F(2, 0));
     m1 = line(q0, q1, F(0, 1), F(1, 1), F(2, 1));
-    e = simd::multiply_add(q0, l0, simd::multiply_add(q1, l1, line(p0, p1, F(2, 0), F(2, 1), F(2, 2))));
-    n2 = simd::multiply_add(l0, l0, l1 * l1) + simd::multiply_add(m0, m0, m1 * m1);
+    e = multiply_add(q0, l0, multiply_add(q1, l1, line(p0, p1, F(2, 0), F(2, 1), F(2, 2))));
+    n2 = multiply_add(l0, l0, l1 * l1) + multiply_add(m0, m0, m1 * m1);
   }
 };
 
@@ -59,12 +56,12 @@ template <typename T>
   double sum = 0;
   for (std::size_t block = 0; block < in.size; block += PairArrays::block) {
     P cost(T(0));
-    for (std::size_t i = block; i < block + PairArrays::block; i += static_cast<std::size_t>(simd::lanes_of<P>)) {
+    for (std::size_t i = block; i < block + PairArrays::block; i += P::lanes) {
       const SampsonPacket<T> pair(in, i, f);
       const P d2 = pair.e * pair.e / (pair.n2 + tiny);
-      cost = simd::multiply_add(simd::load<P>(in.row[4] + i), simd::select(d2 < most, d2, most), cost);
+      cost = multiply_add(P::load(in.row[4] + i), select(d2 < most, d2, most), cost);
     }
-    sum += static_cast<double>(simd::reduce_add(cost));
+    sum += static_cast<double>(reduce_add(cost));
     if (!(sum < stop)) break;
   }
   return sum / limit;
@@ -76,9 +73,9 @@ template <typename T>
 void sampson_distances_sq(const PairColumns<T>& in, const Matrix3<T>& F, std::vector<T>& out) noexcept {
   using P = simd::Packet<T>;
   CFP_ASSERT(out.size() >= (in.size + PairArrays::block - 1) / PairArrays::block * PairArrays::block);
-  for (std::size_t i = 0; i < in.size; i += static_cast<std::size_t>(simd::lanes_of<P>)) {
+  for (std::size_t i = 0; i < in.size; i += P::lanes) {
     const SampsonPacket<T> pair(in, i, F);
-    simd::store(out.data() + i, pair.e * pair.e / pair.n2);
+    (pair.e * pair.e / pair.n2).store(out.data() + i);
   }
 }
 
@@ -98,20 +95,20 @@ double sampson_system(const PairColumns<T>& in, const Matrix3<double>& F, double
     for (P& m : row) m = zero;
   }
   for (P& h : g) h = zero;
-  for (std::size_t i = 0; i < in.size; i += static_cast<std::size_t>(simd::lanes_of<P>)) {
+  for (std::size_t i = 0; i < in.size; i += P::lanes) {
     const SampsonPacket<T> pair(in, i, f);
-    const P inverse_n2 = simd::reciprocal(pair.n2 + tiny);
+    const P inverse_n2 = one / (pair.n2 + tiny);
     const P k = pair.e * inverse_n2;
     const P x = pair.e * k * inverse_scale;
-    const P s = simd::reciprocal(x + one);
-    const P ws = simd::load<P>(in.row[4] + i) * s;
-    cost = simd::multiply_add(ws, x, cost);
+    const P s = one / (x + one);
+    const P ws = P::load(in.row[4] + i) * s;
+    cost = multiply_add(ws, x, cost);
     const P weight = ws * s * inverse_n2, we = weight * pair.e;
     const P p[2] = {pair.p0, pair.p1}, wq[2] = {weight * pair.q0, weight * pair.q1}, m[2] = {k * pair.m0, k * pair.m1};
     const P qq[6] = {wq[0] * pair.q0, wq[0] * pair.q1, wq[0], wq[1] * pair.q1, wq[1], weight};
     const P pp[5] = {p[0] * p[0], p[0] * p[1], p[0], p[1] * p[1], p[1]};
     for (int r = 0; r < 6; ++r) {
-      for (int c = 0; c < 5; ++c) moments[r][c] = simd::multiply_add(qq[r], pp[c], moments[r][c]);
+      for (int c = 0; c < 5; ++c) moments[r][c] = multiply_add(qq[r], pp[c], moments[r][c]);
       moments[r][5] += qq[r];
     }
     const P a[3] = {we * (pair.q0 - k * pair.l0), we * (pair.q1 - k * pair.l1), we},
@@ -123,12 +120,11 @@ double sampson_system(const PairColumns<T>& in, const Matrix3<double>& F, double
   }
   constexpr int symmetric[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
   for (int r = 0; r < 9; ++r) {
-    out.g[r] = static_cast<double>(simd::reduce_add(g[r])) / scale;
+    out.g[r] = static_cast<double>(reduce_add(g[r])) / scale;
     for (int c = 0; c < 9; ++c)
-      out.H(r, c) =
-          static_cast<double>(simd::reduce_add(moments[symmetric[r / 3][c / 3]][symmetric[r % 3][c % 3]])) / scale;
+      out.H(r, c) = static_cast<double>(reduce_add(moments[symmetric[r / 3][c / 3]][symmetric[r % 3][c % 3]])) / scale;
   }
-  return static_cast<double>(simd::reduce_add(cost));
+  return static_cast<double>(reduce_add(cost));
 }
 
 }  // namespace CFP_ISA

@@ -7,6 +7,7 @@
 
 #include "cfp/geometry/camera.hpp"
 #include "cfp/optimization/pose/pose_problem.hpp"
+#include "cfp/simd/packet.hpp"
 
 namespace cfp::detail {
 
@@ -50,11 +51,11 @@ void for_each_observation(const PoseColumns<Scalar>& columns, const PoseOptions&
   });
 }
 
-/// Divides the workspace up for n observations in packets of `lanes`. Columns begin at cache lines, and an odd number
+/// Divides the workspace up for n observations in packets. Columns begin at cache lines, and an odd number
 /// of lines apart, lest columns of 2^k points fall into the same set of the cache.
 template <typename Scalar>
-void reserve_columns(std::size_t n, std::size_t lanes, PoseWorkspace<Scalar>& workspace, PoseColumns<Scalar>& columns) {
-  constexpr std::size_t line = 64 / sizeof(Scalar), count = 10;
+void reserve_columns(std::size_t n, PoseWorkspace<Scalar>& workspace, PoseColumns<Scalar>& columns) {
+  constexpr std::size_t line = 64 / sizeof(Scalar), count = 10, lanes = simd::Packet<Scalar>::lanes;
   columns.stereo_begin = (n + lanes - 1) / lanes * lanes;
   const std::size_t slots = 2 * columns.stereo_begin, stride = (slots + line) / line * line + line;
   if (workspace.columns.size() < count * stride + line) workspace.columns.resize(count * stride + line);
@@ -72,7 +73,7 @@ void reserve_columns(std::size_t n, std::size_t lanes, PoseWorkspace<Scalar>& wo
 /// Weights by their mean, information from sigma or 1 / sigma^2, nothing left out, no errors yet; slots up to a whole
 /// packet are filled.
 template <typename Scalar>
-void finish_columns(PoseColumns<Scalar>& columns, std::size_t begin, std::size_t end, std::size_t lanes, bool sigmas,
+void finish_columns(PoseColumns<Scalar>& columns, std::size_t begin, std::size_t end, bool sigmas,
                     double scale) noexcept {
   const Scalar normal = static_cast<Scalar>(1 / columns.mean_weight), factor = static_cast<Scalar>(scale);
   for (std::size_t i = begin; i < end; ++i) {
@@ -82,7 +83,7 @@ void finish_columns(PoseColumns<Scalar>& columns, std::size_t begin, std::size_t
     columns.active[i] = columns.weight[i];
     columns.error[i] = Scalar(0);
   }
-  for (; end % lanes != 0; ++end) {
+  for (; end % simd::Packet<Scalar>::lanes != 0; ++end) {
     for (Scalar* column : {columns.x, columns.y, columns.z, columns.u, columns.v, columns.u_right, columns.weight,
                            columns.active, columns.error})
       column[end] = Scalar(0);
@@ -93,10 +94,9 @@ void finish_columns(PoseColumns<Scalar>& columns, std::size_t begin, std::size_t
 /// Copies the usable observations, points relative to `centre`; counts all into the result.
 template <typename Scalar, typename Input, typename Camera>
 void load_columns(const PoseObservations<Input>& observations, const Camera& camera, const Vector3<double>& centre,
-                  std::size_t lanes, PoseWorkspace<Scalar>& workspace, PoseColumns<Scalar>& columns,
-                  PoseResult& result) {
+                  PoseWorkspace<Scalar>& workspace, PoseColumns<Scalar>& columns, PoseResult& result) {
   const std::size_t n = observations.points.size();
-  reserve_columns(n, lanes, workspace, columns);
+  reserve_columns(n, workspace, columns);
   double fu = 1, fv = 1, cu = 0, cv = 0;
   if constexpr (is_pinhole<Camera>) {
     fu = 1 / static_cast<double>(camera.fx), fv = 1 / static_cast<double>(camera.fy);
@@ -144,8 +144,8 @@ void load_columns(const PoseObservations<Input>& observations, const Camera& cam
   if (result.used == 0) return;
   result.effective = sum / sum_sq * sum;
   columns.mean_weight = sum / result.used;
-  finish_columns(columns, 0, mono, lanes, has_sigmas, 1 / (fu * fu));
-  finish_columns(columns, columns.stereo_begin, stereo, lanes, has_sigmas, 1 / (fu * fu));
+  finish_columns(columns, 0, mono, has_sigmas, 1 / (fu * fu));
+  finish_columns(columns, columns.stereo_begin, stereo, has_sigmas, 1 / (fu * fu));
 }
 
 }  // namespace CFP_ISA

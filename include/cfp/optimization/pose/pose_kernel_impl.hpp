@@ -47,12 +47,10 @@ P stored_error(const Mask& front, const P& error) noexcept {
 }
 
 /// Pinhole pass over the packets [begin, end); sums in lanes, handed to double every 64 packets.
-template <typename P, bool stereo, typename Loss, typename C>
-void add_pinhole(const PoseColumns<simd::scalar_of<P>>& columns, std::size_t begin, std::size_t end,
-                 const PinholeCamera<C>& camera, double baseline_fx, const SE3<double>& T, const Loss& given_loss,
-                 PoseSystem& system) noexcept {
-  using Scalar = simd::scalar_of<P>;
-  constexpr std::size_t lanes = static_cast<std::size_t>(simd::lanes_of<P>);
+template <bool stereo, typename Scalar, typename Loss, typename C>
+void add_pinhole(const PoseColumns<Scalar>& columns, std::size_t begin, std::size_t end, const PinholeCamera<C>& camera,
+                 double baseline_fx, const SE3<double>& T, const Loss& given_loss, PoseSystem& system) noexcept {
+  using P = simd::Packet<Scalar>;
   // clang-format off
   enum {
     cost, influence, g0, g1, g2, g3, g4, g5, h00, h02, h03, h04, h05, h12, h13, h14, h15, h22, h23, h24, h33, h34, h35,
@@ -75,68 +73,66 @@ void add_pinhole(const PoseColumns<simd::scalar_of<P>>& columns, std::size_t beg
   using std::abs;
 
   while (begin < end) {
-    const std::size_t block_end = (std::min)(end, begin + 64 * lanes);
+    const std::size_t block_end = (std::min)(end, begin + 64 * P::lanes);
     P sum[count];
     for (P& x : sum) x = zero;
-    for (; begin < block_end; begin += lanes) {
-      const P X = simd::load<P>(columns.x + begin), Y = simd::load<P>(columns.y + begin),
-              Z = simd::load<P>(columns.z + begin);
-      const P px = simd::multiply_add(r00, X, simd::multiply_add(r01, Y, simd::multiply_add(r02, Z, t0)));
-      const P py = simd::multiply_add(r10, X, simd::multiply_add(r11, Y, simd::multiply_add(r12, Z, t1)));
-      const P pz = simd::multiply_add(r20, X, simd::multiply_add(r21, Y, simd::multiply_add(r22, Z, t2)));
-      const auto front = simd::both(pz > near, simd::both(abs(px) <= wide * pz, abs(py) <= wide * pz));
-      const P q = simd::select(front, simd::reciprocal(pz), zero);
+    for (; begin < block_end; begin += P::lanes) {
+      const P X = P::load(columns.x + begin), Y = P::load(columns.y + begin), Z = P::load(columns.z + begin);
+      const P px = multiply_add(r00, X, multiply_add(r01, Y, multiply_add(r02, Z, t0)));
+      const P py = multiply_add(r10, X, multiply_add(r11, Y, multiply_add(r12, Z, t1)));
+      const P pz = multiply_add(r20, X, multiply_add(r21, Y, multiply_add(r22, Z, t2)));
+      const auto front = both(pz > near, both(abs(px) <= wide * pz, abs(py) <= wide * pz));
+      const P q = select(front, one / pz, zero);
       const P x = px * q, y = py * q;
-      const P ru = x - simd::load<P>(columns.u + begin), rv = y - simd::load<P>(columns.v + begin);
+      const P ru = x - P::load(columns.u + begin), rv = y - P::load(columns.v + begin);
 
       // The rows of u and u_right: the sums of k and k^2, of r and k r.
       P m1 = x, m2 = x * x, sr = ru, skr = x * ru, uu = ru * ru;
       if constexpr (stereo) {
         const P k = x - base * q;
-        const P r = k - simd::load<P>(columns.u_right + begin);
-        m1 = m1 + k, m2 = simd::multiply_add(k, k, m2), sr = sr + r, skr = simd::multiply_add(k, r, skr),
-        uu = simd::multiply_add(r, r, uu);
+        const P r = k - P::load(columns.u_right + begin);
+        m1 = m1 + k, m2 = multiply_add(k, k, m2), sr = sr + r, skr = multiply_add(k, r, skr),
+        uu = multiply_add(r, r, uu);
       }
       const P kv = kappa * rv;
-      const P information = simd::load<P>(columns.information + begin), active = simd::load<P>(columns.active + begin);
-      const P s =
-          visible_error<P>(front, information * simd::multiply_add(kv, rv, uu), simd::load<P>(columns.error + begin));
-      simd::store(columns.error + begin, stored_error<P>(front, s));
-      sum[cost] = simd::multiply_add(active, loss.value(s), sum[cost]);
-      const P pull = simd::select(front, active * loss.first(s), zero), W = information * pull;
+      const P information = P::load(columns.information + begin), active = P::load(columns.active + begin);
+      const P s = visible_error<P>(front, information * multiply_add(kv, rv, uu), P::load(columns.error + begin));
+      stored_error<P>(front, s).store(columns.error + begin);
+      sum[cost] = multiply_add(active, loss.value(s), sum[cost]);
+      const P pull = select(front, active * loss.first(s), zero), W = information * pull;
       sum[influence] += pull;
 
-      const P br = W * kv, ar = W * sr, e = simd::multiply_add(y, br, W * skr);
-      sum[g0] = simd::multiply_add(q, ar, sum[g0]);
-      sum[g1] = simd::multiply_add(q, br, sum[g1]);
-      sum[g2] = simd::multiply_add(q, e, sum[g2]);
-      sum[g3] = simd::multiply_add(y, e, sum[g3] + br);
-      sum[g4] = simd::multiply_add(x, e, sum[g4] + ar);
-      sum[g5] = simd::multiply_add(y, ar, sum[g5] - x * br);
+      const P br = W * kv, ar = W * sr, e = multiply_add(y, br, W * skr);
+      sum[g0] = multiply_add(q, ar, sum[g0]);
+      sum[g1] = multiply_add(q, br, sum[g1]);
+      sum[g2] = multiply_add(q, e, sum[g2]);
+      sum[g3] = multiply_add(y, e, sum[g3] + br);
+      sum[g4] = multiply_add(x, e, sum[g4] + ar);
+      sum[g5] = multiply_add(y, ar, sum[g5] - x * br);
       const P Wq = W * q, Wqq = Wq * q, Wy = W * y, Wqy = Wq * y;
-      const P x2 = x * x, y2 = y * y, f1 = y2 + one, e1 = simd::multiply_add(x, m1, n);
-      const P c = simd::multiply_add(kappa, y2, m2), d = c + kappa, xc = simd::multiply_add(x, c, m1);
+      const P x2 = x * x, y2 = y * y, f1 = y2 + one, e1 = multiply_add(x, m1, n);
+      const P c = multiply_add(kappa, y2, m2), d = c + kappa, xc = multiply_add(x, c, m1);
       sum[h00] += Wqq;
-      sum[h02] = simd::multiply_add(Wqq, m1, sum[h02]);
-      sum[h03] = simd::multiply_add(Wqy, m1, sum[h03]);
-      sum[h04] = simd::multiply_add(Wq, e1, sum[h04]);
+      sum[h02] = multiply_add(Wqq, m1, sum[h02]);
+      sum[h03] = multiply_add(Wqy, m1, sum[h03]);
+      sum[h04] = multiply_add(Wq, e1, sum[h04]);
       sum[h05] += Wqy;
-      sum[h12] = simd::multiply_add(Wqq, y, sum[h12]);
-      sum[h13] = simd::multiply_add(Wq, f1, sum[h13]);
-      sum[h14] = simd::multiply_add(Wqy, x, sum[h14]);
-      sum[h15] = simd::multiply_add(Wq, x, sum[h15]);
-      sum[h22] = simd::multiply_add(Wqq, c, sum[h22]);
-      sum[h23] = simd::multiply_add(Wqy, d, sum[h23]);
-      sum[h24] = simd::multiply_add(Wq, xc, sum[h24]);
-      sum[h33] = simd::multiply_add(W, simd::multiply_add(y2, d, kappa * f1), sum[h33]);
-      sum[h34] = simd::multiply_add(Wy, simd::multiply_add(x, d, m1), sum[h34]);
-      sum[h35] = simd::multiply_add(W, y2 * m1 - kappa * (f1 * x), sum[h35]);
-      sum[h44] = simd::multiply_add(W, simd::multiply_add(x, xc, e1), sum[h44]);
-      sum[h45] = simd::multiply_add(Wy, e1 - kappa * x2, sum[h45]);
-      sum[h55] = simd::multiply_add(W, simd::multiply_add(kappa, x2, n * y2), sum[h55]);
+      sum[h12] = multiply_add(Wqq, y, sum[h12]);
+      sum[h13] = multiply_add(Wq, f1, sum[h13]);
+      sum[h14] = multiply_add(Wqy, x, sum[h14]);
+      sum[h15] = multiply_add(Wq, x, sum[h15]);
+      sum[h22] = multiply_add(Wqq, c, sum[h22]);
+      sum[h23] = multiply_add(Wqy, d, sum[h23]);
+      sum[h24] = multiply_add(Wq, xc, sum[h24]);
+      sum[h33] = multiply_add(W, multiply_add(y2, d, kappa * f1), sum[h33]);
+      sum[h34] = multiply_add(Wy, multiply_add(x, d, m1), sum[h34]);
+      sum[h35] = multiply_add(W, y2 * m1 - kappa * (f1 * x), sum[h35]);
+      sum[h44] = multiply_add(W, multiply_add(x, xc, e1), sum[h44]);
+      sum[h45] = multiply_add(Wy, e1 - kappa * x2, sum[h45]);
+      sum[h55] = multiply_add(W, multiply_add(kappa, x2, n * y2), sum[h55]);
     }
     double total[count];
-    for (int i = 0; i < count; ++i) total[i] = static_cast<double>(simd::reduce_add(sum[i]));
+    for (int i = 0; i < count; ++i) total[i] = static_cast<double>(reduce_add(sum[i]));
     system.cost += total[cost];
     system.influence += total[influence];
     Vector6<double>& g = system.equations.g;

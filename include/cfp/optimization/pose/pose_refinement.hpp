@@ -13,7 +13,6 @@
 #include "cfp/geometry/camera.hpp"
 #include "cfp/optimization/pose/pose_problem.hpp"
 #include "cfp/optimization/pose/pose_refinement_impl.hpp"
-#include "cfp/simd/packet.hpp"
 
 namespace cfp {
 inline namespace CFP_ISA {
@@ -32,7 +31,44 @@ template <typename Scalar, typename Input, typename Camera>
 [[nodiscard]] PoseResult refine_pose(const PoseObservations<Input>& observations, const Camera& camera,
                                      const SE3<double>& T_cam_world, const PoseOptions& options,
                                      PoseWorkspace<Scalar>& workspace, span<char> inliers = {}) {
-  return detail::refine_pose_with<simd::Packet<Scalar>>(observations, camera, T_cam_world, options, workspace, inliers);
+  CFP_ASSERT(!invalid_field(options));
+  PoseResult result;
+  result.T_cam_world = T_cam_world;
+  for (char& inlier : inliers) inlier = 0;
+  if (!detail::has_valid_shape(observations, inliers) || !is_rigid_motion(T_cam_world) ||
+      !detail::is_usable_camera(camera)) {
+    if (!is_finite(T_cam_world.rotation.sum() + T_cam_world.translation.sum())) result.T_cam_world = SE3<double>();
+    result.status = SolverStatus::invalid_input;
+    return result;
+  }
+  const SE3<double> start{normalized_rotation(T_cam_world.rotation), Vector3<double>::Zero()};
+  const Vector3<double> centre = -(start.rotation.transpose() * T_cam_world.translation);
+  detail::PoseModel<Scalar, Camera> model{camera, options, {}, {}, {}};
+  detail::load_columns(observations, camera, centre, workspace, model.columns, result);
+  if (result.used < options.min_observations) {
+    const bool no_weight = result.used == 0 && result.zero_weight > 0 && result.invalid == 0;
+    result.status = no_weight ? SolverStatus::no_weight : SolverStatus::not_enough_data;
+    return result;
+  }
+  SE3<double> pose;
+  detail::NormalEquations<6> equations;
+  result.status = detail::run_rounds(model, start, result, pose, equations);
+  result.evaluations = model.evaluations;
+  double counted = 0;
+  if (is_solved(result.status)) {
+    counted = detail::count_inliers(options, model.columns, result, inliers);
+    if (result.inliers < options.min_observations) result.status = SolverStatus::not_enough_inliers;
+  }
+  if (!is_solved(result.status)) {
+    for (char& inlier : inliers) inlier = 0;
+    result.inliers = 0, result.cost = result.chi2 = 0;
+    return result;
+  }
+  result.T_cam_world = {pose.rotation, pose.translation - pose.rotation * centre};
+  const double scale = model.influence > 0 ? counted / model.influence : 1.0;
+  const Matrix6<double> H = equations.H.selfadjointView<Eigen::Upper>();
+  result.information = H * model.columns.mean_weight * scale;
+  return result;
 }
 
 }  // namespace CFP_ISA

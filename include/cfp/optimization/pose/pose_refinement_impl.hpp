@@ -26,10 +26,8 @@ template <typename Camera>
 }
 
 /// What the loop minimises: the pose relative to the start position, so that float serves wherever the origin is.
-/// P: the packet, or the scalar, that walks over the columns.
-template <typename P, typename Camera>
+template <typename Scalar, typename Camera>
 struct PoseModel {
-  using Scalar = simd::scalar_of<P>;
   const Camera& camera;
   const PoseOptions& options;
   PoseColumns<Scalar> columns;  // errors are those at last_pose
@@ -43,8 +41,8 @@ struct PoseModel {
     for_each_kind(columns, options, [&](std::size_t begin, std::size_t end, double chi2, auto stereo) {
       const double delta = round.scale * std::sqrt(chi2);
       if constexpr (is_pinhole<Camera>) {
-        with_loss<P>(round.loss, P(static_cast<Scalar>(delta)), [&](const auto& loss) {
-          add_pinhole<P, decltype(stereo)::value>(columns, begin, end, camera, columns.baseline_fx, T, loss, system);
+        with_loss<simd::Packet<Scalar>>(round.loss, static_cast<Scalar>(delta), [&](const auto& loss) {
+          add_pinhole<decltype(stereo)::value>(columns, begin, end, camera, columns.baseline_fx, T, loss, system);
         });
       } else {
         with_loss<double>(round.loss, delta, [&](const auto& loss) {
@@ -108,11 +106,10 @@ template <typename Scalar>
 }
 
 /// Runs the rounds from a start at the origin; afterwards model and equations belong to the pose.
-template <typename P, typename Camera>
-SolverStatus run_rounds(PoseModel<P, Camera>& model, const SE3<double>& start, PoseResult& result, SE3<double>& pose,
-                        NormalEquations<6>& equations) noexcept {
-  using Scalar = simd::scalar_of<P>;
-  using Problem = DenseLeastSquares<6, SE3<double>, PoseModel<P, Camera>>;
+template <typename Scalar, typename Camera>
+SolverStatus run_rounds(PoseModel<Scalar, Camera>& model, const SE3<double>& start, PoseResult& result,
+                        SE3<double>& pose, NormalEquations<6>& equations) noexcept {
+  using Problem = DenseLeastSquares<6, SE3<double>, PoseModel<Scalar, Camera>>;
   const PoseOptions& options = model.options;
   SolverStatus status = SolverStatus::not_enough_data;
   pose = start;
@@ -150,51 +147,6 @@ template <typename Input>
   CFP_ASSERT(fits(observations.u_right.size()));
   return (observations.sigmas.empty() || observations.inverse_sigmas_sq.empty()) &&
          (observations.depths.empty() || observations.u_right.empty());
-}
-
-/// refine_pose with the packet type named: P = Scalar is the scalar path.
-template <typename P, typename Input, typename Camera>
-PoseResult refine_pose_with(const PoseObservations<Input>& observations, const Camera& camera,
-                            const SE3<double>& T_cam_world, const PoseOptions& options,
-                            PoseWorkspace<simd::scalar_of<P>>& workspace, span<char> inliers) {
-  CFP_ASSERT(!invalid_field(options));
-  PoseResult result;
-  result.T_cam_world = T_cam_world;
-  for (char& inlier : inliers) inlier = 0;
-  if (!has_valid_shape(observations, inliers) || !is_rigid_motion(T_cam_world) || !is_usable_camera(camera)) {
-    if (!is_finite(T_cam_world.rotation.sum() + T_cam_world.translation.sum())) result.T_cam_world = SE3<double>();
-    result.status = SolverStatus::invalid_input;
-    return result;
-  }
-  const SE3<double> start{normalized_rotation(T_cam_world.rotation), Vector3<double>::Zero()};
-  const Vector3<double> centre = -(start.rotation.transpose() * T_cam_world.translation);
-  PoseModel<P, Camera> model{camera, options, {}, {}, {}};
-  load_columns(observations, camera, centre, static_cast<std::size_t>(simd::lanes_of<P>), workspace, model.columns,
-               result);
-  if (result.used < options.min_observations) {
-    const bool no_weight = result.used == 0 && result.zero_weight > 0 && result.invalid == 0;
-    result.status = no_weight ? SolverStatus::no_weight : SolverStatus::not_enough_data;
-    return result;
-  }
-  SE3<double> pose;
-  NormalEquations<6> equations;
-  result.status = run_rounds(model, start, result, pose, equations);
-  result.evaluations = model.evaluations;
-  double counted = 0;
-  if (is_solved(result.status)) {
-    counted = count_inliers(options, model.columns, result, inliers);
-    if (result.inliers < options.min_observations) result.status = SolverStatus::not_enough_inliers;
-  }
-  if (!is_solved(result.status)) {
-    for (char& inlier : inliers) inlier = 0;
-    result.inliers = 0, result.cost = result.chi2 = 0;
-    return result;
-  }
-  result.T_cam_world = {pose.rotation, pose.translation - pose.rotation * centre};
-  const double scale = model.influence > 0 ? counted / model.influence : 1.0;
-  const Matrix6<double> H = equations.H.selfadjointView<Eigen::Upper>();
-  result.information = H * model.columns.mean_weight * scale;
-  return result;
 }
 
 }  // namespace CFP_ISA
