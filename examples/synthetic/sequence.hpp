@@ -161,8 +161,8 @@ class Sequence {
     }
     if (options_.close_up && options_.scenario == Scenario::sitting) {
       const double y = options_.furniture ? -1.75 : -2.07;
-      stage.chairs[0] = {-0.32, y, 1.25};
-      stage.chairs[1] = {0.32, y, 3.14159265358979 - 1.25};
+      stage.chairs[0] = {-0.32, y, 1.45};
+      stage.chairs[1] = {0.32, y, 3.14159265358979 - 1.45};
     }
     return stage;
   }

@@ -73,8 +73,10 @@ TEST_CASE("A frame depends on the seed and its number alone", "[synthetic]") {
 }
 
 TEST_CASE("True depth lies on the nearest surface of the scene", "[synthetic]") {
-  for (const auto scenario : {Scenario::sitting, Scenario::walking}) {
-    const Sequence sequence(small(scenario, Motion::halfsphere));
+  for (const int kind : {0, 1, 2, 3}) {
+    auto options = small(kind % 2 == 0 ? Scenario::sitting : Scenario::walking, Motion::halfsphere);
+    options.close_up = options.furniture = kind > 1;
+    const Sequence sequence(options);
     const int frame = 75;
     const auto out = rendered(sequence, frame);
     const auto surfaces = sequence.surfaces_at(sequence.time_of(frame));
@@ -95,8 +97,10 @@ TEST_CASE("True depth lies on the nearest surface of the scene", "[synthetic]") 
 
 TEST_CASE("Labels, boxes and visible parts agree with the surfaces", "[synthetic]") {
   std::set<int> seen;
-  for (const auto scenario : {Scenario::sitting, Scenario::walking}) {
-    const Sequence sequence(small(scenario, Motion::fixed));
+  for (const int kind : {0, 1, 2, 3}) {
+    auto options = small(kind % 2 == 0 ? Scenario::sitting : Scenario::walking, Motion::fixed);
+    options.close_up = options.furniture = kind > 1;
+    const Sequence sequence(options);
     for (int frame = 0; frame < 240; frame += 40) {
       const auto out = rendered(sequence, frame);
       const double time = sequence.time_of(frame), dt = sequence.options().render.frame_s;
@@ -218,7 +222,7 @@ TEST_CASE("Furniture stands before people, within their boxes, static, with dept
         hidden += before_somebody ? 1 : 0;
       }
       CHECK(hidden > 0.3 * frames);
-      CHECK(with_depth > 0.7 * covered);
+      CHECK(with_depth > 0.6 * covered);  // the camera comes nearer than 0.5 m
     }
   }
 }
