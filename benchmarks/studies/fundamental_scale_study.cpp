@@ -59,7 +59,7 @@ class Experiment {
     distances_sq_.resize(pairs_.capacity);
     cfp::detail::FundamentalSearch<double> search{pairs_, pairs_.factor * pairs_.factor, list_, distances_sq_,
                                                   cfp::Random(0, "fundamental_ransac")};
-    const cfp::Matrix3<double> found = cfp::lo_ransac(search, false, options_, search.random, sampling_).best.model;
+    const cfp::Matrix3<double> found = cfp::lo_ransac(search, options_, search.random, sampling_).best.model;
     cfp::detail::FactoredF<double> F(found);
     search.measure_noise(F.matrix());
     plain = errors(scene, scales, search, F);

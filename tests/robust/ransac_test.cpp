@@ -50,7 +50,7 @@ cfp::RansacOptions draws(std::size_t least, std::size_t most) {
 cfp::RansacSearch<std::uint32_t> search(Costs& costs, const cfp::RansacOptions& options, std::uint64_t seed = 1) {
   cfp::Random random(seed, "ransac");
   std::vector<double> sums;
-  return cfp::lo_ransac(costs, false, options, random, sums);
+  return cfp::lo_ransac(costs, options, random, sums);
 }
 
 }  // namespace

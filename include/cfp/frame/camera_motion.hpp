@@ -37,9 +37,8 @@ struct CameraMotion {
 /// Scratch memory, reused: after a call, calls of at most the same sizes allocate nothing.
 template <typename Scalar>
 struct CameraMotionWorkspace {
-  std::vector<std::array<Scalar, 3>> points;  // of the pairs that take part, in the previous camera
-  std::vector<std::array<Scalar, 2>> previous, current;
-  std::vector<Scalar> depths, sigmas, distances;
+  std::vector<std::array<Scalar, 3>> points;  // of the pairs, in the previous camera; NaN: takes no part
+  std::vector<Scalar> sigmas, distances;
   PoseWorkspace<Scalar> pose;
 };
 
@@ -75,39 +74,38 @@ template <typename Scalar>
                                                           CameraMotionWorkspace<Scalar>& workspace) {
   CFP_ASSERT(outside.size() == flow.current.size());
   CameraMotion<Scalar> motion;
-  workspace.points.clear();
-  workspace.previous.clear();
-  workspace.current.clear();
-  workspace.depths.clear();
+  const Scalar nowhere = std::numeric_limits<Scalar>::quiet_NaN();
+  workspace.points.assign(outside.size(), {nowhere, nowhere, nowhere});
+  std::size_t taken = 0;
   for (std::size_t i = 0; i < flow.previous_depths.size(); ++i) {
     const Scalar z = flow.previous_depths[i];
     Vector3<Scalar> ray;
     if (outside[i] == 0 || !is_valid_depth(z) || !camera.unproject(flow.previous[i], ray)) continue;
-    workspace.points.push_back({ray.x() * z, ray.y() * z, z});
-    workspace.previous.push_back({flow.previous(i, 0), flow.previous(i, 1)});
-    workspace.current.push_back({flow.current(i, 0), flow.current(i, 1)});
-    workspace.depths.push_back(z);
+    workspace.points[i] = {ray.x() * z, ray.y() * z, z};
+    ++taken;
   }
-  const std::size_t n = workspace.points.size();
-  if (n < options.min_pairs) return motion;
+  if (taken < options.min_pairs) return motion;
 
-  workspace.distances.resize(n);
+  workspace.distances.resize(outside.size());
   SE3<double> T = start;
   motion.sigma_px = Scalar(options.max_sigma_px);
   for (int pass = 0; pass < 2; ++pass) {
-    workspace.sigmas.assign(n, motion.sigma_px);
+    workspace.sigmas.assign(outside.size(), motion.sigma_px);
     PoseObservations<Scalar> observations;
     observations.points = workspace.points;
-    observations.pixels = workspace.current;
+    observations.pixels = flow.current;
     observations.sigmas = workspace.sigmas;
     const PoseResult refined = refine_pose(observations, camera, T, options.pose, workspace.pose);
     if (!is_solved(refined.status) ||
-        static_cast<double>(refined.inliers) < options.min_inlier_share * static_cast<double>(n))
+        static_cast<double>(refined.inliers) < options.min_inlier_share * static_cast<double>(taken))
       return motion;
     T = refined.T_cam_world;
     motion.T_cur_prev = T.template cast<Scalar>();
-    motion_distances(workspace.previous, workspace.depths, workspace.current, motion.T_cur_prev, camera,
-                     motion.sigma_px, options.distance, workspace.distances);
+    motion_distances(flow.previous, flow.previous_depths, flow.current, motion.T_cur_prev, camera, motion.sigma_px,
+                     options.distance, workspace.distances);
+    for (std::size_t i = 0; i < outside.size(); ++i) {
+      if (!is_finite(workspace.points[i][0])) workspace.distances[i] = Scalar(no_distance<double>);
+    }
     const Scalar sigma = robust_sigma(span<Scalar>(workspace.distances), 2);
     motion.sigma_px = (std::min)((std::max)(sigma, Scalar(options.min_sigma_px)), Scalar(options.max_sigma_px));
   }

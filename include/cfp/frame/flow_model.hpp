@@ -4,7 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <vector>
 
 #include "cfp/core/options.hpp"
@@ -59,8 +58,7 @@ struct FlowModel {
 /// Scratch memory, reused: after a call, calls of at most the same sizes allocate nothing.
 template <typename Scalar>
 struct FlowModelWorkspace {
-  std::vector<std::array<Scalar, 2>> outside_previous, outside_current;  ///< the pairs outside all boxes
-  std::vector<Scalar> distances;
+  std::vector<Scalar> weights, distances;
   CameraMotionWorkspace<Scalar> motion;
   FundamentalRansacWorkspace ransac;
 };
@@ -73,20 +71,12 @@ template <typename Scalar>
 FlowModel<Scalar> estimate_two_view_model(const FlowPairs<Scalar>& flow, span<const char> outside,
                                           const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
                                           FlowModelWorkspace<Scalar>& workspace) {
-  workspace.outside_previous.clear();
-  workspace.outside_current.clear();
-  workspace.outside_previous.reserve(outside.size());
-  workspace.outside_current.reserve(outside.size());
-  for (std::size_t i = 0; i < outside.size(); ++i) {
-    if (outside[i] == 0) continue;
-    workspace.outside_previous.push_back({flow.previous(i, 0), flow.previous(i, 1)});
-    workspace.outside_current.push_back({flow.current(i, 0), flow.current(i, 1)});
-  }
-  const bool enough = workspace.outside_current.size() >= options.min_outside_pairs;
-  const PointSpan<Scalar, 2> previous = enough ? PointSpan<Scalar, 2>(workspace.outside_previous) : flow.previous;
-  const PointSpan<Scalar, 2> current = enough ? PointSpan<Scalar, 2>(workspace.outside_current) : flow.current;
-  const FundamentalResult<Scalar> estimate =
-      fundamental_ransac(PointPairs<Scalar>{previous, current}, camera, options.ransac, workspace.ransac);
+  const auto inside = static_cast<std::size_t>(std::count(outside.begin(), outside.end(), char(0)));
+  const bool enough = outside.size() - inside >= options.min_outside_pairs;
+  workspace.weights.clear();
+  for (const char mark : outside) workspace.weights.push_back(enough && mark == 0 ? Scalar(0) : Scalar(1));
+  const FundamentalResult<Scalar> estimate = fundamental_ransac(
+      PointPairs<Scalar>{flow.previous, flow.current, workspace.weights}, camera, options.ransac, workspace.ransac);
 
   FlowModel<Scalar> model;
   model.status = estimate.status;

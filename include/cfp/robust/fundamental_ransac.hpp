@@ -60,9 +60,7 @@ template <typename Scalar>
   FundamentalSearch<double> search{pairs, threshold * threshold, workspace.list, workspace.distances_sq,
                                    Random(options.seed, "fundamental_ransac")};
 
-  RansacSearch<Matrix3<double>> found =
-      lo_ransac(search, !input.weights.empty() || search.total_weight() < 0.9 * pairs.total_weight, options,
-                search.random, workspace.sampling);
+  RansacSearch<Matrix3<double>> found = lo_ransac(search, options, search.random, workspace.sampling);
   result.iterations = found.iterations;
   Matrix3<double>& F = found.best.model;
   bool has_F = found.best.cost < search.total_weight();

@@ -69,7 +69,7 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
   if (observations.size < options.min_inliers || observations.size < 4) return result;
   detail::PnpProblem<double> problem{observations, options.threshold_px * options.threshold_px};
   Random random(options.seed, "pnp_ransac");
-  RansacSearch<SE3<double>> search = lo_ransac(problem, !weights.empty(), options, random, workspace.sampling);
+  RansacSearch<SE3<double>> search = lo_ransac(problem, options, random, workspace.sampling);
   result.iterations = search.iterations;
   result.status = RansacStatus::no_consensus;
   if (!(search.best.cost < observations.total_weight)) return result;

@@ -153,14 +153,14 @@ struct RansacSearch {
 ///   double cost(model, bound)                   may give up with any value above the bound
 ///   void optimize(candidate)                    local optimisation; keeps the better of both
 ///   auto inlier_test(model)                     a predicate of indices
-/// weighted: whether samples may follow the weights. sums: scratch memory.
+/// Samples follow weights, at most 1, whose mean is below 0.9; above it they would hardly differ. sums: scratch memory.
 template <typename Problem>
-[[nodiscard]] RansacSearch<typename Problem::Model> lo_ransac(Problem& problem, bool weighted,
-                                                              const RansacOptions& options, Random& random,
-                                                              std::vector<double>& sums) {
+[[nodiscard]] RansacSearch<typename Problem::Model> lo_ransac(Problem& problem, const RansacOptions& options,
+                                                              Random& random, std::vector<double>& sums) {
   using Model = typename Problem::Model;
   constexpr std::size_t sample_size = Problem::sample_size;
-  weighted = weighted && options.sampling == Sampling::weighted;
+  const bool weighted =
+      options.sampling == Sampling::weighted && problem.total_weight() < 0.9 * static_cast<double>(problem.size());
   MinimalSampler<sample_size> sampler(problem.size(), weighted ? problem.weights() : span<const double>(), sums);
   RansacSearch<Model> search;
   std::size_t needed = options.max_iterations;
