@@ -184,8 +184,8 @@ inline Script close_up_script(cfp::Random& random, int person, double seconds, c
                               const CameraMotion& camera) {
   const struct {
     double bearing, distance;
-  } places[2][4] = {{{-0.26, 0.9}, {0.18, 0.92}, {-0.24, 0.92}, {-0.12, 0.88}},
-                    {{0, 1.2}, {0.3, 1.2}, {0.24, 1.18}, {0.26, 1.45}}};
+  } places[2][4] = {{{-0.26, 0.9}, {0.18, 0.92}, {-0.24, 0.96}, {-0.12, 0.88}},
+                    {{0, 1.2}, {0.3, 1.2}, {0.24, 1.24}, {0.26, 1.45}}};
   const double home = person == 0 ? -1 : 1;
   const double speed = random.uniform(0.8, 1.05), front = stage.front + 0.27 * person;
   Director d(home * (0.75 + 0.15 * person), -1.95 + 0.3 * person, home > 0 ? cfp::pi<double> : 0, 0,
