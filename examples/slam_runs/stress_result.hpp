@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "cfp/evaluation/alignment.hpp"
 #include "cfp/evaluation/trajectory.hpp"
 #include "run_writer.hpp"
 #include "stress.hpp"
@@ -25,20 +26,33 @@ struct StressResult {
 
 namespace detail {
 
-// The rigid motion of the estimated world that brings most poses within 5 cm of the truth, tried of single poses: one
-// that a few wrong poses do not bend, as they bend a least-squares alignment.
+// The rigid motion of the estimated world that brings most poses within 5 cm of the truth, tried of single poses and
+// then fitted to those: one that a few wrong poses do not bend, as they bend a least-squares alignment of all.
 inline std::vector<double> aligned_errors(const std::vector<cfp::StampedPose<double>>& truth,
                                           const std::vector<cfp::StampedPose<double>>& poses) {
   std::vector<double> best, errors(poses.size());
-  std::ptrdiff_t most = -1;
-  for (std::size_t a = 0; a < poses.size(); a += 3) {
-    const cfp::SE3<double> T = truth[a].T_world_cam * poses[a].T_world_cam.inverse();
-    for (std::size_t k = 0; k < poses.size(); ++k)
-      errors[k] = (T * poses[k].T_world_cam.translation - truth[k].T_world_cam.translation).norm();
-    const auto right = std::count_if(errors.begin(), errors.end(), [](double e) { return e <= 0.05; });
-    if (right <= most) continue;
-    most = right;
+  std::vector<cfp::Vector3<double>> from, to;
+  std::size_t most = 0;
+  const auto improves = [&](const auto& T_truth_estimate) {
+    from.clear();
+    to.clear();
+    for (std::size_t k = 0; k < poses.size(); ++k) {
+      errors[k] = (T_truth_estimate * poses[k].T_world_cam.translation - truth[k].T_world_cam.translation).norm();
+      if (errors[k] > 0.05) continue;
+      from.push_back(poses[k].T_world_cam.translation);
+      to.push_back(truth[k].T_world_cam.translation);
+    }
+    if (from.size() <= most) return false;
+    most = from.size();
     best = errors;
+    return true;
+  };
+  for (std::size_t a = 0; a < poses.size(); a += 3) {
+    bool better = improves(truth[a].T_world_cam * poses[a].T_world_cam.inverse());
+    while (better) {
+      const cfp::AlignmentResult fitted = cfp::align_points(from, to);
+      better = fitted.status == cfp::Status::ok && improves(fitted.S_to_from);
+    }
   }
   return best;
 }

@@ -122,6 +122,38 @@ TEST_CASE("A world that is joined to another moves with all that it holds and he
   CHECK_THAT(map.point(b).position.x(), WithinAbs(-5, 1e-12));
 }
 
+TEST_CASE("What a frame sees through has gone; what is hidden, or where people are, proves nothing", "[slam]") {
+  Map map;
+  std::vector<int> board;
+  Frame frame;  // at the origin: forty places of a board at 1 m, of which the frame sees ten now
+  for (int i = 0; i < 40; ++i) {
+    MapPoint point;
+    point.position = {0.02 * i - 0.4, 0, 1};
+    board.push_back(map.add(std::move(point)));
+    if (i % 4 == 0) see(frame, {}, map.point(board.back()).position);
+  }
+  const int keyframe = add_keyframe(map, board);
+  KeypointGrid grid;
+  grid.build(frame, view);
+  const auto gone = [&](std::size_t behind, float static_probability, float depth_m = 1) {
+    for (std::size_t i = 0; i < frame.size(); ++i) frame.depths_m[i] = i < behind ? 3 : depth_m;
+    frame.static_probability.assign(frame.size(), static_probability);
+    return has_gone(map, keyframe, frame, grid, view);
+  };
+  CHECK_FALSE(gone(0, 1));
+  CHECK_FALSE(gone(2, 1));
+  CHECK(gone(3, 1));
+  CHECK(gone(10, 1));
+  CHECK(gone(10, 0));  // whoever stands behind
+  CHECK(gone(2, 0));   // who stands where it was is not it
+  CHECK_FALSE(gone(0, 0));
+  CHECK_FALSE(gone(0, 1, 0.5F));  // hidden
+  CHECK(gone(2, 1, 0.5F));
+  CHECK_FALSE(gone(0, 1, -1));
+  frame.T_cam_world = at(20);  // out of view
+  CHECK_FALSE(gone(10, 1));
+}
+
 TEST_CASE("The place of a point that has gone is another's only when nobody knows it any more", "[slam]") {
   Map map;
   const int a = map.add({});

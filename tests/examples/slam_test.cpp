@@ -369,6 +369,28 @@ TEST_CASE("A new map that has stood its trial is joined to the old one when both
   CHECK(result.right == result.poses);
 }
 
+TEST_CASE("Poses of a new map by what moved away before it was joined are taken back", "[slam]") {
+  // A board fills the view and moves with a camera that believes to stand still before it, then it goes.
+  Stress stress;
+  stress.name = "board";
+  stress.first = 20;
+  stress.last = 90;
+  const double units = Sequence(empty_room()).calibration().depth_units_per_metre;
+  stress.image = [&](std::size_t k, SequenceFrame& frame) {
+    const double shown = k < 70 ? 0.5 : 0.5 + 0.5 * double(k - 70) / 20;  // its left edge leaves to the right
+    detail::carry_board(shown, 1, 1.1, units, frame);
+  };
+  std::vector<FrameRecord> records;
+  Options options;
+  options.new_map_after_s = 0.3;
+  const StressResult result = under(stress, records, options);
+  CAPTURE(result.reported, result.poses, result.right, result.rmse_m);
+  CHECK(result.reported.find("1x joined") != std::string::npos);
+  CHECK(result.reported.find("1x poses by what has gone since are taken back") != std::string::npos);
+  CHECK(result.wrong == 0);
+  CHECK(result.poses - result.right < 3);  // a keyframe that saw board and room may stay
+}
+
 TEST_CASE("A detector that falls silent is noticed, and what it knew is carried on", "[slam]") {
   struct Silent final : cfp_examples::Detector {
     Silent() : Detector("silent", {"person"}) {}

@@ -119,6 +119,11 @@ class Map {
   [[nodiscard]] Keyframe& keyframe(int index) { return keyframes[static_cast<std::size_t>(index)]; }
   [[nodiscard]] const Keyframe& keyframe(int index) const { return keyframes[static_cast<std::size_t>(index)]; }
   [[nodiscard]] std::size_t alive_points() const { return points.size() - free_.size() - dead_.size(); }
+  // The keyframe that tells where it is: itself, if it has not gone.
+  [[nodiscard]] int ancestor(int index) const {
+    while (keyframe(index).parent >= 0) index = keyframe(index).parent;
+    return index;
+  }
   // Of a keyframe that may have gone.
   [[nodiscard]] cfp::SE3<double> pose(int index) const {
     cfp::SE3<double> T_cam_ancestor;

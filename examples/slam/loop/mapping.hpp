@@ -41,6 +41,30 @@ inline void update_points(Map& map, Frame& frame, const cfp::StaticProbability<C
   }
 }
 
+// Whether what a keyframe saw has gone: through a quarter of its points in view the frame sees what is behind. People
+// who stand where they were prove nothing.
+[[nodiscard]] inline bool has_gone(const Map& map, int keyframe, const Frame& frame, const KeypointGrid& grid,
+                                   const View& view) {
+  constexpr float near_px = 10;
+  constexpr double depth_tolerance = 0.1;  // of the depth
+  constexpr double gone_share = 0.25;
+  std::size_t behind = 0, there = 0;
+  for (const int p : map.keyframe(keyframe).frame.map_point) {
+    if (!map.is_alive(p)) continue;
+    cfp::Vector2<double> pixel;
+    const cfp::Vector3<double> in_camera = frame.T_cam_world * map.point(p).position;
+    if (!view.sees(in_camera, pixel)) continue;
+    grid.near(float(pixel.x()), float(pixel.y()), near_px, [&](std::size_t i) {
+      const double beyond = double(frame.depths_m[i]) / in_camera.z() - 1;
+      if (beyond > depth_tolerance)
+        ++behind;
+      else if (beyond > -depth_tolerance && frame.static_probability[i] >= 0.5F)
+        ++there;
+    });
+  }
+  return double(behind) > gone_share * double(behind + there);
+}
+
 class Mapping {
  public:
   explicit Mapping(const Options& options) : options_(options.mapping), probability_(options.probability) {}

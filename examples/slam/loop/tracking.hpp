@@ -370,10 +370,28 @@ class Tracking {
       probation_ = options_.probation;
       first_on_probation_ = poses_.size();
     } else {
+      const int newer = std::max(world_, other);
+      std::vector<int> joined;
+      std::copy_if(map_.alive_keyframes.begin(), map_.alive_keyframes.end(), std::back_inserter(joined),
+                   [&](int k) { return map_.keyframe(k).world == newer; });
       is_older ? map_.join(world_, other, T_other_world) : map_.join(other, world_, T_other_world.inverse());
       note(record, "joined to the old map");
+      take_back_what_has_gone(joined, frame, record);
     }
     world_ = std::min(world_, other);
+  }
+  // What filled the view while a map was on its own may have moved since: the poses by it were none in the room.
+  void take_back_what_has_gone(const std::vector<int>& keyframes, const Frame& frame, FrameRecord& record) {
+    std::vector<int> gone;
+    std::copy_if(keyframes.begin(), keyframes.end(), std::back_inserter(gone),
+                 [&](int k) { return has_gone(map_, k, frame, grid_, view_); });
+    if (gone.empty()) return;
+    const auto is_by_it = [&](const RelativePose& p) {
+      return std::find(gone.begin(), gone.end(), map_.ancestor(p.reference)) != gone.end();
+    };
+    poses_.erase(std::remove_if(poses_.begin(), poses_.end(), is_by_it), poses_.end());
+    for (const int k : gone) map_.erase_keyframe(k);
+    note(record, "poses by what has gone since are taken back");
   }
   // Where the camera of a frame is by two transformations.
   static bool agree(const cfp::SE3<double>& a, const cfp::SE3<double>& b, const Frame& frame) {
