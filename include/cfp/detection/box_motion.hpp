@@ -80,8 +80,7 @@ struct BoxFilter {
   RateFilter<Scalar> u, v, log_width, log_height;
 
   [[nodiscard]] CFP_INLINE Box<Scalar> box() const noexcept {
-    using std::exp;
-    const Scalar w = Scalar(0.5) * exp(log_width.value), h = Scalar(0.5) * exp(log_height.value);
+    const Scalar w = Scalar(0.5) * std::exp(log_width.value), h = Scalar(0.5) * std::exp(log_height.value);
     return {u.value - w, v.value - h, u.value + w, v.value + h};
   }
 };
@@ -124,7 +123,6 @@ inline namespace CFP_ISA {
 /// A filter at rest on a detected box, which has to be proper (is_proper) with edges below 1e6 px in magnitude.
 template <typename Scalar>
 [[nodiscard]] BoxFilter<Scalar> make_box_filter(const Box<Scalar>& box, const BoxMotionOptions& options) noexcept {
-  using std::log;
   const Scalar w = box.width(), h = box.height(), zero(0);
   const Scalar noise = Scalar(options.edge_noise) * Scalar(options.edge_noise);
   const Scalar rate_u = Scalar(options.initial_centre_rate) * w, rate_v = Scalar(options.initial_centre_rate) * h;
@@ -132,8 +130,8 @@ template <typename Scalar>
   BoxFilter<Scalar> filter;
   filter.u = {Scalar(0.5) * (box.x1 + box.x2), zero, noise * w * w / Scalar(2), zero, rate_u * rate_u};
   filter.v = {Scalar(0.5) * (box.y1 + box.y2), zero, noise * h * h / Scalar(2), zero, rate_v * rate_v};
-  filter.log_width = {Scalar(log(w)), zero, Scalar(2) * noise, zero, size_rate * size_rate};
-  filter.log_height = {Scalar(log(h)), zero, Scalar(2) * noise, zero, size_rate * size_rate};
+  filter.log_width = {Scalar(std::log(w)), zero, Scalar(2) * noise, zero, size_rate * size_rate};
+  filter.log_height = {Scalar(std::log(h)), zero, Scalar(2) * noise, zero, size_rate * size_rate};
   detail::confine(filter);
   return filter;
 }
@@ -143,10 +141,9 @@ template <typename Scalar>
 /// up to there.
 template <typename Scalar>
 void predict_box(BoxFilter<Scalar>& filter, non_deduced<Scalar> dt_s, const BoxMotionOptions& options) noexcept {
-  using std::exp;
   const Scalar q = Scalar(options.centre_acceleration), q_size = Scalar(options.size_acceleration);
-  filter.u.predict(dt_s, q * exp(filter.log_width.value));
-  filter.v.predict(dt_s, q * exp(filter.log_height.value));
+  filter.u.predict(dt_s, q * std::exp(filter.log_width.value));
+  filter.v.predict(dt_s, q * std::exp(filter.log_height.value));
   filter.log_width.predict(dt_s, q_size);
   filter.log_height.predict(dt_s, q_size);
   detail::confine(filter);
@@ -155,9 +152,8 @@ void predict_box(BoxFilter<Scalar>& filter, non_deduced<Scalar> dt_s, const BoxM
 /// Takes in a detected box (proper, else ignored).
 template <typename Scalar>
 void correct_box(BoxFilter<Scalar>& filter, const Box<Scalar>& measured, const BoxMotionOptions& options) noexcept {
-  using std::exp;
   if (!is_proper(measured)) return;
-  const Scalar w = exp(filter.log_width.value), h = exp(filter.log_height.value);
+  const Scalar w = std::exp(filter.log_width.value), h = std::exp(filter.log_height.value);
   const Scalar noise = Scalar(options.edge_noise) * Scalar(options.edge_noise);
   filter.u.correct(Scalar(0.5) * (measured.x1 + measured.x2) - filter.u.value, noise * w * w / Scalar(2));
   filter.v.correct(Scalar(0.5) * (measured.y1 + measured.y2) - filter.v.value, noise * h * h / Scalar(2));
@@ -174,17 +170,14 @@ void correct_box(BoxFilter<Scalar>& filter, const Box<Scalar>& measured, const B
 /// camera, or a size leaves the limits.
 template <typename Scalar>
 [[nodiscard]] bool warp_box(BoxFilter<Scalar>& filter, const Matrix3<Scalar>& H) noexcept {
-  using std::exp;
-  using std::log;
-  using std::sqrt;
   const Scalar u = filter.u.value, v = filter.v.value;
   const Scalar s = H(2, 0) * u + H(2, 1) * v + H(2, 2);
   if (!H.allFinite() || !(s * H(2, 2) > Scalar(0)) || !is_finite(s)) return false;
   const Scalar x = (H(0, 0) * u + H(0, 1) * v + H(0, 2)) / s, y = (H(1, 0) * u + H(1, 1) * v + H(1, 2)) / s;
   const Scalar a = (H(0, 0) - x * H(2, 0)) / s, b = (H(0, 1) - x * H(2, 1)) / s;
   const Scalar c = (H(1, 0) - y * H(2, 0)) / s, d = (H(1, 1) - y * H(2, 1)) / s;
-  const Scalar w = exp(filter.log_width.value), h = exp(filter.log_height.value);
-  const Scalar width = sqrt(a * a * w * w + b * b * h * h), height = sqrt(c * c * w * w + d * d * h * h);
+  const Scalar w = std::exp(filter.log_width.value), h = std::exp(filter.log_height.value);
+  const Scalar width = std::sqrt(a * a * w * w + b * b * h * h), height = std::sqrt(c * c * w * w + d * d * h * h);
   const Scalar far = Scalar(detail::box_farthest_px), largest = Scalar(detail::box_largest_px);
   const auto within = [](Scalar value, Scalar low, Scalar high) { return value >= low && value <= high; };
   if (!within(x, -far, far) || !within(y, -far, far)) return false;
@@ -196,8 +189,8 @@ template <typename Scalar>
   };
   filter.u = mix(a, b, x);
   filter.v = mix(c, d, y);
-  filter.log_width.value = log(width);
-  filter.log_height.value = log(height);
+  filter.log_width.value = std::log(width);
+  filter.log_height.value = std::log(height);
   detail::confine(filter);
   return true;
 }

@@ -21,7 +21,7 @@ struct BundleChunk {
   Array d[3];         // x - c
   Array row[3][3];    // d residual / d x
   Array residual[3];  // before the measurement is taken off
-  Array depth, omega;
+  Array depth;
   Array N[6], n[3];
 };
 

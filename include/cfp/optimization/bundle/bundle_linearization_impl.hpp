@@ -35,16 +35,14 @@ struct BundleLinearization {
 
 /// Sums over the observations of one pose, one partial sum per lane: H's blocks N (6), hat(d) N (9), hat(d) N hat(d)^T
 /// (6), and the gradient n (3), d x n (3).
-struct BundlePoseSums {
-  double lane[27][BundleChunk::lanes];
-};
+using BundlePoseSums = double[27][BundleChunk::lanes];
 
 /// Where the element of a symmetric 3x3 matrix stands among the six numbers 00 01 02 11 12 22.
 inline constexpr int symmetric[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
 
 inline namespace CFP_ISA {
 
-/// Residuals, omega and the cost of the chunk.
+/// Residuals, N, n and the cost of the chunk.
 template <bool Stereo, typename Loss>
 double weigh_chunk(int padded, double baseline_fx, const Loss& loss, const Matrix3<double>& rotation,
                    BundleChunk& chunk) noexcept {
@@ -62,29 +60,22 @@ double weigh_chunk(int padded, double baseline_fx, const Loss& loss, const Matri
     s *= chunk.information[i];
     const bool seen = chunk.depth[i] > Tolerance<double>::min_depth;
     cost += seen ? chunk.weight[i] * loss.value(s) : std::numeric_limits<double>::quiet_NaN();
-    chunk.omega[i] = chunk.weight[i] * chunk.information[i] * loss.first(s);
-  }
-  return cost;
-}
-
-/// N and n of every observation of the chunk.
-template <int Rows>
-void square_chunk(int padded, BundleChunk& chunk) noexcept {
-  for (int i = 0; i < padded; ++i) {
+    const double omega = chunk.weight[i] * chunk.information[i] * loss.first(s);
     double N[6] = {}, n[3] = {};
-    for (int row = 0; row < Rows; ++row) {
+    for (int row = 0; row < (Stereo ? 3 : 2); ++row) {
       const double x = chunk.row[row][0][i], y = chunk.row[row][1][i], z = chunk.row[row][2][i];
-      const double a = chunk.omega[i] * x, b = chunk.omega[i] * y, c = chunk.omega[i] * z, r = chunk.residual[row][i];
+      const double a = omega * x, b = omega * y, c = omega * z, r = chunk.residual[row][i];
       N[0] += a * x, N[1] += a * y, N[2] += a * z, N[3] += b * y, N[4] += b * z, N[5] += c * z;
       n[0] += a * r, n[1] += b * r, n[2] += c * r;
     }
     for (int e = 0; e < 6; ++e) chunk.N[e][i] = N[e];
     for (int e = 0; e < 3; ++e) chunk.n[e][i] = n[e];
   }
+  return cost;
 }
 
 /// From N and n of a chunk to the pose's sums.
-inline void add_to_pose(const BundleChunk& chunk, int padded, BundlePoseSums& sums) noexcept {
+inline void add_to_pose(const BundleChunk& chunk, int padded, BundlePoseSums& s) noexcept {
   for (int begin = 0; begin < padded; begin += BundleChunk::lanes) {
     for (int l = 0; l < BundleChunk::lanes; ++l) {
       const int i = begin + l;
@@ -94,7 +85,6 @@ inline void add_to_pose(const BundleChunk& chunk, int padded, BundlePoseSums& su
       const double c00 = y * n02 - z * n01, c01 = y * n12 - z * n11, c02 = y * n22 - z * n12;
       const double c10 = z * n00 - x * n02, c11 = z * n01 - x * n12, c12 = z * n02 - x * n22;
       const double c20 = x * n01 - y * n00, c21 = x * n11 - y * n01, c22 = x * n12 - y * n02;
-      auto& s = sums.lane;
       s[0][l] += n00, s[1][l] += n01, s[2][l] += n02, s[3][l] += n11, s[4][l] += n12, s[5][l] += n22;
       s[6][l] += c00, s[7][l] += c01, s[8][l] += c02;
       s[9][l] += c10, s[10][l] += c11, s[11][l] += c12;
@@ -113,7 +103,7 @@ inline void store_pose(const BundlePoseSums& sums, double* target) noexcept {
   double s[27];
   for (int e = 0; e < 27; ++e) {
     s[e] = 0;
-    for (const double lane : sums.lane[e]) s[e] += lane;
+    for (const double lane : sums[e]) s[e] += lane;
   }
   for (int r = 0; r < 3; ++r) {
     for (int c = 0; c < 3; ++c) {
@@ -143,7 +133,6 @@ double linearize_range(span<const BundleMeasurement> range, const Camera& camera
     }
     project_chunk(camera, pose, padded, chunk);
     cost += weigh_chunk<Stereo>(padded, baseline_fx, loss, pose.rotation, chunk);
-    square_chunk<Stereo ? 3 : 2>(padded, chunk);
     for (int i = 0; i < count; ++i) {
       double* const slot = slots.data() + BundleLinearization::slot_doubles * range[first + to_index(i)].slot;
       for (int e = 0; e < 6; ++e) slot[e] = chunk.N[e][i];
