@@ -16,7 +16,7 @@ namespace cfp {
 
 enum class Sampling : std::uint8_t {
   uniform,  ///< every datum equally likely
-  weighted  ///< each draw in proportion to the weight
+  weighted  ///< each draw in proportion to the weight, unless the weights hardly differ (lo_ransac)
 };
 
 struct RansacOptions {
