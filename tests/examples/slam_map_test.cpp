@@ -258,6 +258,37 @@ TEST_CASE("What only the last frame knows holds the pose, but puts no keyframe o
   CHECK_FALSE(mapping.wants_keyframe(map, frame, 0, pose.inliers, 10));
 }
 
+TEST_CASE("Of what the map knows of a view a frame must find some, but not more than it has keypoints", "[slam]") {
+  Options options;
+  options.unproven_share = 1e9;  // all weigh alike
+  const auto health_with = [&](int proven, std::size_t expected) {
+    cfp::Random random(2);
+    Map map;
+    Frame frame;
+    LastFrameMatches last;
+    std::vector<int> of_two, of_one;
+    for (int i = 0; i < 120; ++i) {
+      const cfp::Vector3<double> X{random.uniform(-1, 1), random.uniform(-0.8, 0.8), random.uniform(2, 3)};
+      see(frame, at(0.02), X);
+      MapPoint point;
+      point.position = X;
+      (i < proven ? of_two : of_one).push_back(frame.map_point.back() = map.add(std::move(point)));
+    }
+    add_keyframe(map, of_two);
+    add_keyframe(map, of_two);
+    add_keyframe(map, of_one);
+    last.match.assign(frame.size(), cfp::no_match);
+    const std::vector<float> weight(frame.size(), 1);
+    return PoseSolver(options)(frame, last, map, weight, view, expected, true, options.health, std::nullopt)
+        .health.status;
+  };
+  CHECK(health_with(30, 60) == cfp::PoseHealth::ok);
+  CHECK(health_with(3, 60) == cfp::PoseHealth::ok);  // 5 %
+  CHECK(health_with(5, 120) == cfp::PoseHealth::few_agree);
+  CHECK(health_with(30, 3000) == cfp::PoseHealth::ok);  // most of it is hidden, and a frame has 120 keypoints
+  CHECK(health_with(5, 3000) == cfp::PoseHealth::few_agree);
+}
+
 TEST_CASE("Depths tell the matches that one motion explains from the nine in ten that none does", "[slam]") {
   cfp::Random random(1, "rigid");
   const cfp::SE3<double> T_cam_world{cfp::so3_exp<double>({0.2, -0.4, 0.1}), {0.5, -0.2, 0.3}};

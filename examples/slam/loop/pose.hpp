@@ -78,7 +78,7 @@ class PoseSolver {
       }
     }
     if (out.health.ok() && double(expected) >= enough_expected &&
-        double(proven) < options_.min_known_share * double(expected))
+        double(proven) < options_.min_known_share * double(std::min(expected, frame.size())))
       out.health.status = cfp::PoseHealth::few_agree;
     return out;
   }
