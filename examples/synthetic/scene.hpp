@@ -69,7 +69,7 @@ class SceneBuilder {
     s.A = Eigen::AngleAxisd(-yaw, Vector3d::UnitZ()).toRotationMatrix();
     s.texture = texture;
     s.tile_m = tile_m;
-    s.shift = Vector3d(random_.uniform(), random_.uniform(), random_.uniform()) * tile_m;
+    for (int axis : {2, 1, 0}) s.shift[axis] = random_.uniform() * tile_m;
     scene_.surfaces.push_back(s);
     return scene_.surfaces.back();
   }
@@ -118,9 +118,10 @@ class SceneBuilder {
       box(0.62 * side, -0.12, 0.74, {0.42, 0.15, 0.02}, books, 0.7, 0.1);
     }
     for (int i = 0; i < 9; ++i) {
-      box(random_.uniform(-1.5, 1.5), random_.uniform(-0.3, 0.3), 0.74,
-          {random_.uniform(0.06, 0.25), random_.uniform(0.06, 0.2), random_.uniform(0.02, 0.25)},
-          i % 2 == 0 ? books : brown, 0.5, random_.uniform(-0.6, 0.6));
+      const double yaw = random_.uniform(-0.6, 0.6);
+      const Vector3d size{random_.uniform(0.06, 0.25), random_.uniform(0.06, 0.2), random_.uniform(0.02, 0.25)};
+      const double y = random_.uniform(-0.3, 0.3), x = random_.uniform(-1.5, 1.5);
+      box(x, y, 0.74, size, i % 2 == 0 ? books : brown, 0.5, yaw);
     }
     box(0, 0.56, 0, {3.5, 0.05, 1.22}, brown, 3.5);         // the partition behind the desk
     box(-2.75, 0.3, 0, {0.6, 0.9, 1.05}, books, 1.1, 0.2);  // low shelves and tables at the sides
@@ -143,8 +144,9 @@ class SceneBuilder {
     box(table, y, 0.03, {0.06, 0.06, 0.97}, wood, 1.2);
     box(table, y, 1, {0.42, 0.24, 0.03}, wood, 0.5);
     for (int i = 0; i < 3; ++i) {
-      box(table + 0.13 * (i - 1), y + random_.uniform(-0.04, 0.04), 1.03,
-          {random_.uniform(0.08, 0.12), 0.1, random_.uniform(0.08, 0.28)}, pottery, 0.5, random_.uniform(-0.4, 0.4));
+      const double yaw = random_.uniform(-0.4, 0.4);
+      const Vector3d size{random_.uniform(0.08, 0.12), 0.1, random_.uniform(0.08, 0.28)};
+      box(table + 0.13 * (i - 1), y + random_.uniform(-0.04, 0.04), 1.03, size, pottery, 0.5, yaw);
     }
     box(plant, y, 0, {0.2, 0.2, 0.8}, pottery, 1);
     for (int leaf = 0; leaf < 16; ++leaf) {

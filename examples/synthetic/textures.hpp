@@ -55,6 +55,9 @@ class Texture {
   std::vector<cv::Mat> levels_;
 };
 
+/// One of the whole numbers from 0 to n - 1.
+inline int below(cfp::Random& random, int n) { return static_cast<int>(random.index(static_cast<std::uint32_t>(n))); }
+
 /// A muted colour: rooms are grey and brown with a few bright things.
 inline cv::Scalar random_color(cfp::Random& random, double low = 20, double high = 240) {
   const double tone = random.uniform(low, high), chroma = random.uniform() < 0.12 ? 90 : 22;
@@ -87,10 +90,10 @@ inline cv::Mat collage(cfp::Random& random, int size, const cv::Scalar& ground, 
   const auto any_color = [&]() -> cv::Scalar { return ground + contrast * (random_color(random) - ground); };
   for (int i = 0; i < shapes; ++i) {
     const double scale = size * largest * std::pow(0.05, static_cast<double>(i) / shapes);
-    const cv::Point at(static_cast<int>(random.index(static_cast<std::uint32_t>(size))),
-                       static_cast<int>(random.index(static_cast<std::uint32_t>(size))));
-    const cv::Size extent(static_cast<int>(scale * random.uniform(0.3, 1)) + 2,
-                          static_cast<int>(scale * random.uniform(0.3, 1)) + 2);
+    const int y = below(random, size), x = below(random, size);
+    const cv::Point at(x, y);
+    const double height = scale * random.uniform(0.3, 1), width = scale * random.uniform(0.3, 1);
+    const cv::Size extent(static_cast<int>(width) + 2, static_cast<int>(height) + 2);
     const cv::Scalar color = any_color();
     const double kind = random.uniform();
     if (kind < 0.45) {
@@ -118,12 +121,12 @@ inline cv::Mat plaid(cfp::Random& random, int size, const cv::Scalar& ground) {
   cv::Mat image(size, size, CV_8UC3, ground);
   for (int direction = 0; direction < 2; ++direction) {
     for (int at = 0; at < size;) {
-      const int width = size / 64 + static_cast<int>(random.index(static_cast<std::uint32_t>(size / 20)));
+      const int width = size / 64 + below(random, size / 20);
       cv::Mat stripe = direction == 0 ? image.colRange(at, std::min(size, at + width))
                                       : image.rowRange(at, std::min(size, at + width));
       const cv::Mat color(stripe.size(), CV_8UC3, random_color(random, 0, 255));
       cv::addWeighted(stripe, 0.45, color, 0.55, 0, stripe);
-      at += width + size / 48 + static_cast<int>(random.index(static_cast<std::uint32_t>(size / 24)));
+      at += width + size / 48 + below(random, size / 24);
     }
   }
   add_grain(random, image, 5);
@@ -135,11 +138,9 @@ inline cv::Mat blots(cfp::Random& random, int size, const cv::Scalar& ground) {
   cv::Mat image(size, size, CV_8UC3, ground);
   for (int i = 0; i < 700; ++i) {
     const cv::Scalar tone = ground * random.uniform(0.35, 1.7);
-    const cv::Point at(static_cast<int>(random.index(static_cast<std::uint32_t>(size))),
-                       static_cast<int>(random.index(static_cast<std::uint32_t>(size))));
-    const cv::Size axes(3 + static_cast<int>(random.index(static_cast<std::uint32_t>(size / 24))),
-                        3 + static_cast<int>(random.index(static_cast<std::uint32_t>(size / 40))));
-    cv::ellipse(image, at, axes, random.uniform(0, 180), 0, 360, tone, cv::FILLED);
+    const int y = below(random, size), x = below(random, size);
+    const int high = 3 + below(random, size / 40), wide = 3 + below(random, size / 24);
+    cv::ellipse(image, {x, y}, {wide, high}, random.uniform(0, 180), 0, 360, tone, cv::FILLED);
   }
   add_grain(random, image, 5);
   return image;
@@ -169,7 +170,8 @@ inline cv::Mat head(cfp::Random& random, int size, const cv::Scalar& skin, const
   cv::line(image, at(0.25, 0.55), at(0.255, 0.43), skin * 0.7, size / 50);
   cv::line(image, at(0.2, 0.34), at(0.3, 0.34), {70, 60, 140}, size / 40);
   for (int i = 0; i < 500; ++i) {
-    const cv::Point p = at(random.uniform(), random.uniform(0.3, 1));
+    const double y = random.uniform(0.3, 1), x = random.uniform();
+    const cv::Point p = at(x, y);
     if (cv::norm(cv::Scalar(image.at<cv::Vec3b>(p)) - hair) < 40)
       cv::line(image, p, p + cv::Point(2, size / 24), hair * random.uniform(0.6, 1.8), 2);
   }

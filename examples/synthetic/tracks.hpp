@@ -116,7 +116,8 @@ inline Script sitting_script(cfp::Random& random, int person, double seconds, co
   while (d.now() < seconds) {
     const double choice = random.uniform();
     if (choice < 0.6) {
-      d.gesture(static_cast<int>(random.index(2)), random.uniform(0.8, 3));
+      const double seconds_up = random.uniform(0.8, 3);
+      d.gesture(static_cast<int>(random.index(2)), seconds_up);
     } else if (choice < 0.75) {
       d.look(random.uniform(-0.9, 0.9));
     } else if (choice < 0.9) {
@@ -150,11 +151,13 @@ inline Script walking_script(cfp::Random& random, int person, double seconds, co
     const double choice = random.uniform();
     const double x = (left ? -1 : 1) * random.uniform(0.25, 1.1);
     if (choice < 0.62) {
-      d.walk(x, lane + random.uniform(-0.1, 0.1), speed * random.uniform(0.8, 1.2));
+      const double hurry = random.uniform(0.8, 1.2), aside = random.uniform(-0.1, 0.1);
+      d.walk(x, lane + aside, speed * hurry);
       left = !left;
     } else if (choice < 0.8) {
       d.turn(random.uniform(1.1, 2.0));
-      d.gesture(static_cast<int>(random.index(2)), random.uniform(0.4, 1.2));
+      const double seconds_up = random.uniform(0.4, 1.2);
+      d.gesture(static_cast<int>(random.index(2)), seconds_up);
     } else if (choice < 0.88 || !stage.room) {
       // Around the desk, behind the partition, and back on the other side.
       const double s = left ? -1 : 1;
@@ -199,7 +202,8 @@ inline Script close_up_script(cfp::Random& random, int person, double seconds, c
            std::max(front, -2.95 + place.distance * std::sin(angle)), speed);
     d.turn(random.uniform(1.1, 2.0));
     if (random.uniform() < 0.6) {
-      d.gesture(static_cast<int>(random.index(2)), random.uniform(0, 0.4));
+      const double seconds_up = random.uniform(0, 0.4);
+      d.gesture(static_cast<int>(random.index(2)), seconds_up);
     } else {
       d.look(random.uniform(-0.9, 0.9));
     }
