@@ -105,6 +105,11 @@ class Director {
   double now_ = 0;
 };
 
+inline void gesture_with_either(Director& d, cfp::Random& random, double shortest_s, double longest_s) {
+  const double seconds = random.uniform(shortest_s, longest_s);  // before the arm, whatever order a compiler prefers
+  d.gesture(static_cast<int>(random.index(2)), seconds);
+}
+
 /// Two people on their chairs at the desk: gestures, looks, leaning, and much stillness.
 inline Script sitting_script(cfp::Random& random, int person, double seconds, const Stage& stage) {
   const Stage::Chair& chair = stage.chairs[person];
@@ -116,8 +121,7 @@ inline Script sitting_script(cfp::Random& random, int person, double seconds, co
   while (d.now() < seconds) {
     const double choice = random.uniform();
     if (choice < 0.6) {
-      const double seconds_up = random.uniform(0.8, 3);
-      d.gesture(static_cast<int>(random.index(2)), seconds_up);
+      gesture_with_either(d, random, 0.8, 3);
     } else if (choice < 0.75) {
       d.look(random.uniform(-0.9, 0.9));
     } else if (choice < 0.9) {
@@ -156,8 +160,7 @@ inline Script walking_script(cfp::Random& random, int person, double seconds, co
       left = !left;
     } else if (choice < 0.8) {
       d.turn(random.uniform(1.1, 2.0));
-      const double seconds_up = random.uniform(0.4, 1.2);
-      d.gesture(static_cast<int>(random.index(2)), seconds_up);
+      gesture_with_either(d, random, 0.4, 1.2);
     } else if (choice < 0.88 || !stage.room) {
       // Around the desk, behind the partition, and back on the other side.
       const double s = left ? -1 : 1;
@@ -202,8 +205,7 @@ inline Script close_up_script(cfp::Random& random, int person, double seconds, c
            std::max(front, -2.95 + place.distance * std::sin(angle)), speed);
     d.turn(random.uniform(1.1, 2.0));
     if (random.uniform() < 0.6) {
-      const double seconds_up = random.uniform(0, 0.4);
-      d.gesture(static_cast<int>(random.index(2)), seconds_up);
+      gesture_with_either(d, random, 0, 0.4);
     } else {
       d.look(random.uniform(-0.9, 0.9));
     }

@@ -20,6 +20,13 @@ SequenceOptions small(Scenario scenario, Motion motion) {
   return options;
 }
 
+/// People who sit (even) or walk (odd); from 2 on they fill the view and furniture stands before them.
+SequenceOptions of_kind(int kind, Motion motion) {
+  SequenceOptions options = small(kind % 2 == 0 ? Scenario::sitting : Scenario::walking, motion);
+  options.close_up = options.furniture = kind > 1;
+  return options;
+}
+
 RenderedFrame rendered(const Sequence& sequence, int frame) {
   Renderer renderer;
   RenderedFrame out;
@@ -74,9 +81,7 @@ TEST_CASE("A frame depends on the seed and its number alone", "[synthetic]") {
 
 TEST_CASE("True depth lies on the nearest surface of the scene", "[synthetic]") {
   for (const int kind : {0, 1, 2, 3}) {
-    auto options = small(kind % 2 == 0 ? Scenario::sitting : Scenario::walking, Motion::halfsphere);
-    options.close_up = options.furniture = kind > 1;
-    const Sequence sequence(options);
+    const Sequence sequence(of_kind(kind, Motion::halfsphere));
     const int frame = 75;
     const auto out = rendered(sequence, frame);
     const auto surfaces = sequence.surfaces_at(sequence.time_of(frame));
@@ -98,9 +103,7 @@ TEST_CASE("True depth lies on the nearest surface of the scene", "[synthetic]") 
 TEST_CASE("Labels, boxes and visible parts agree with the surfaces", "[synthetic]") {
   std::set<int> seen;
   for (const int kind : {0, 1, 2, 3}) {
-    auto options = small(kind % 2 == 0 ? Scenario::sitting : Scenario::walking, Motion::fixed);
-    options.close_up = options.furniture = kind > 1;
-    const Sequence sequence(options);
+    const Sequence sequence(of_kind(kind, Motion::fixed));
     for (int frame = 0; frame < 240; frame += 40) {
       const auto out = rendered(sequence, frame);
       const double time = sequence.time_of(frame), dt = sequence.options().render.frame_s;
