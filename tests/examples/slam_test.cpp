@@ -1,6 +1,7 @@
 #include "../../examples/slam/loop/run.hpp"
 
 #include <opencv2/imgcodecs.hpp>
+#include <unordered_map>
 
 #include "../../examples/detection/simple_detectors.hpp"
 #include "../../examples/slam_report/annotate.hpp"
@@ -411,6 +412,49 @@ TEST_CASE("A detector that falls silent is noticed, and what it knew is carried 
     CHECK((observer.records[k].note.find("detector silent") != std::string::npos) == (k >= 22));
     CHECK(observer.records[k].boxes.size() == 1);  // six frames without its being noticed
   }
+}
+
+TEST_CASE("A detector that is late is noticed, and what was known to move stays so meanwhile", "[slam]") {
+  struct Late final : cfp_examples::Detector {
+    Late() : Detector("late", {"person"}), in_time_((rendered() / "detections.txt").string(), {}) {}
+    cfp_examples::Detections detect(const cv::Mat& bgr, double time_s) override {
+      seen_.push_back(in_time_.detect(bgr, time_s));
+      return seen_[seen_.size() - std::min<std::size_t>(seen_.size(), 8)];
+    }
+    FileDetector in_time_;
+    std::vector<cfp_examples::Detections> seen_;
+  } detector;
+  struct Learning final : Observer {
+    struct Known {
+      int created_by;
+      float probability;
+    };
+    void decided(const cfp::StaticProbability<Camera>&, const Frame&, const Map& map) override {
+      for (const auto& [index, known] : moving) {
+        if (!late || !map.is_alive(index) || map.point(index).created_by != known.created_by) continue;
+        ++compared;
+        CHECK(map.point(index).static_probability <= known.probability);
+      }
+      moving.clear();
+      for (int p = 0; p < static_cast<int>(map.points.size()); ++p) {
+        if (map.is_alive(p) && map.point(p).static_probability < 0.5F)
+          moving[p] = {map.point(p).created_by, map.point(p).static_probability};
+      }
+    }
+    void finished(const FrameRecord& record) override {
+      late = record.note.find("detector late by 0.") != std::string::npos;
+      late_frames += late ? 1 : 0;
+    }
+    std::unordered_map<int, Known> moving;
+    bool late = false;
+    int late_frames = 0, compared = 0;
+  } observer;
+  Options options;
+  options.threads = false;
+  options.detector_lag.min_boxes = 8;
+  run_slam(Sequence(rendered()), detector, options, observer);
+  CHECK(observer.late_frames >= 5);
+  CHECK(observer.compared >= 20);
 }
 
 TEST_CASE("A detector that has nothing left to see is not called silent", "[slam]") {

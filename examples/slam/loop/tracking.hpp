@@ -162,7 +162,10 @@ class Tracking {
     const Part part(observer_, Module::coarse);
     const auto stage = probability_.coarse(frame);
     const double lag_s = lag_.update(frame, probability_.state());
-    if (lag_s > 0) note(record, "detector late by " + cfp_examples::fixed(lag_s, 1) + " s");
+    if (lag_s > 0) {
+      note(record, "detector late by " + cfp_examples::fixed(lag_s, 1) + " s");
+      detector_ok_ = false;  // its boxes are used: they are near
+    }
     return stage;
   }
 
