@@ -63,7 +63,7 @@ class PeopleScene {
   const cfp::PinholeCamera<double> camera{535.4, 539.2, 320.1, 247.6};
 
   PeopleScene(Acting acting, synthetic::Motion motion, double seconds, std::uint64_t seed)
-      : motion_(motion, seed), room_(synthetic::SceneBuilder(seed).build(true)), random_(seed, "people scene") {
+      : motion_(motion, seed), room_(synthetic::SceneBuilder(seed).build({})), random_(seed, "people scene") {
     for (int person = 0; person < 2; ++person) {
       cfp::Random random(seed, person == 0 ? "first person" : "second person");
       scripts_[static_cast<std::size_t>(person)] = script(acting, random, person, seconds);
@@ -90,11 +90,12 @@ class PeopleScene {
   };
 
   static synthetic::Script script(Acting acting, cfp::Random& random, int person, double seconds) {
-    if (acting == Acting::walking) return synthetic::walking_script(random, person, seconds, true);
-    if (acting == Acting::sitting) return synthetic::sitting_script(random, person, seconds);
-    const double inward = synthetic::chair_heading[person];
-    synthetic::Director d(synthetic::chair_x[person] + 0.42 * std::cos(inward),
-                          synthetic::chair_y + 0.42 * std::sin(inward), inward, 1, person == 0 ? 1.80 : 1.74);
+    const synthetic::Stage stage;
+    if (acting == Acting::walking) return synthetic::walking_script(random, person, seconds, stage);
+    if (acting == Acting::sitting) return synthetic::sitting_script(random, person, seconds, stage);
+    const synthetic::Stage::Chair& chair = stage.chairs[person];
+    synthetic::Director d(chair.x + 0.42 * std::cos(chair.heading), chair.y + 0.42 * std::sin(chair.heading),
+                          chair.heading, 1, person == 0 ? 1.80 : 1.74);
     if (acting == Acting::resting || person == 1) return d.finish();
     d.wait(seconds / 2);
     d.sit(0);
