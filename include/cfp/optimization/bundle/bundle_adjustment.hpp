@@ -61,7 +61,7 @@ template <typename Camera, typename Scalar, typename Executor,
   detail::build_index(problem, workspace.index, result);
   detail::prepare(problem, workspace, result);
   if (result.used > 0) {
-    with_loss<double>(options.loss, std::sqrt(options.chi2_mono), [&](auto mono) {
+    with_loss<simd::Packet<double>>(options.loss, std::sqrt(options.chi2_mono), [&](auto mono) {
       auto stereo = mono;
       stereo.delta = std::sqrt(options.chi2_stereo);
       detail::BundleLeastSquares<BundleProblem<Camera, Scalar>, decltype(mono), decltype(stereo),

@@ -13,22 +13,21 @@ struct BundlePose {
   Vector3<double> center;
 };
 
-/// Up to 32 observations of one pose: rows and residuals of u, v and u_right. What fills up the lanes has weight 0.
+/// Up to 32 observations of one pose. What fills up the lanes has weight 0.
 struct BundleChunk {
   static constexpr int size = 32, lanes = 8;
   using Array = double[size];
   Array u, v, disparity, weight, information;
-  Array d[3];         // x - c
-  Array row[3][3];    // d residual / d x
-  Array residual[3];  // before the measurement is taken off
+  Array d[3];  // x - c
+  Array projected[2];
+  double row[2][3][size];  // d projected / d x
   Array depth;
   Array N[6], n[3];
 };
 
 inline namespace CFP_ISA {
 
-/// Fills rows and residuals of u and v, and depths, of the first `count` points of the chunk; a point that the camera
-/// does not see gets depth 0.
+/// Projects the first `count` points of the chunk; a point that the camera does not see gets depth 0.
 template <typename Camera>
 void project_chunk(const Camera& camera, const BundlePose& pose, int count, BundleChunk& chunk) noexcept {
   using Real = typename Camera::ScalarType;
@@ -41,7 +40,7 @@ void project_chunk(const Camera& camera, const BundlePose& pose, int count, Bund
     const Matrix23<double> rows = A.template cast<double>().lazyProduct(R);
     chunk.depth[i] = seen ? p.z() : 0.0;
     for (int r = 0; r < 2; ++r) {
-      chunk.residual[r][i] = static_cast<double>(pixel[r]);
+      chunk.projected[r][i] = static_cast<double>(pixel[r]);
       for (int c = 0; c < 3; ++c) chunk.row[r][c][i] = rows(r, c);
     }
   }
@@ -61,8 +60,8 @@ void project_chunk(const PinholeCamera<Real>& camera, const BundlePose& pose, in
                  b = (R(1, 0) * x + R(1, 1) * y + R(1, 2) * z) * inv_z;
     const double su = fx * inv_z, sv = fy * inv_z;
     chunk.depth[i] = depth;
-    chunk.residual[0][i] = fx * a + cx;
-    chunk.residual[1][i] = fy * b + cy;
+    chunk.projected[0][i] = fx * a + cx;
+    chunk.projected[1][i] = fy * b + cy;
     for (int c = 0; c < 3; ++c) {
       chunk.row[0][c][i] = su * (R(0, c) - a * R(2, c));
       chunk.row[1][c][i] = sv * (R(1, c) - b * R(2, c));

@@ -113,12 +113,17 @@ template <int E, int K = 9 - E>
     right_side(k) = -Kept::gradient(linear, k);
   }
   for (std::size_t i = index.eliminated_part[part]; i < index.eliminated_part[part + 1]; ++i) {
-    typename Eliminated::Matrix triangle = Eliminated::damped(linear, lambda, i);
-    if (!invert_triangle(triangle)) return false;
-    const typename Eliminated::Vector y = triangle.lazyProduct(Eliminated::gradient(linear, i));
-    double* const solved = schur.triangles.data() + Eliminated::system * i;
-    std::copy(triangle.data(), triangle.data() + Eliminated::block, solved);
-    std::copy(y.data(), y.data() + E, solved + Eliminated::block);
+    typename Eliminated::Matrix inverse = Eliminated::damped(linear, lambda, i);
+    if (!invert_triangle(inverse)) return false;
+    Eigen::Map<typename Eliminated::Matrix> triangle(schur.triangles.data() + Eliminated::system * i);
+    triangle = inverse;
+    Eigen::Map<typename Eliminated::Vector>(triangle.data() + Eliminated::block) =
+        inverse.lazyProduct(Eliminated::gradient(linear, i));
+  }
+  for (std::size_t i = index.eliminated_part[part]; i < index.eliminated_part[part + 1]; ++i) {
+    const double* const solved = schur.triangles.data() + Eliminated::system * i;
+    const typename Eliminated::Matrix triangle = Eigen::Map<const typename Eliminated::Matrix>(solved);
+    const typename Eliminated::Vector y = Eigen::Map<const typename Eliminated::Vector>(solved + Eliminated::block);
     const std::size_t begin = index.slot_begin[i];
     std::size_t end = begin;
     for (std::size_t s = begin; s < index.slot_begin[i + 1] && Kept::slot(index, s) < kept; ++s, ++end) {

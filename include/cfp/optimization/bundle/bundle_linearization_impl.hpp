@@ -1,6 +1,6 @@
 /// @file bundle_linearization_impl.hpp
 /// Inside bundle_adjustment.hpp: cost and normal equations of one pose's observations, in chunks of structure-of-arrays
-/// loops that any compiler turns into vector instructions.
+/// loops that any compiler turns into vector instructions, or packets where there is a choice in the loop.
 ///
 /// Tangent of a pose: xi = (d, w) along the world's axes, about the camera's centre c: R <- R exp(hat(w)), c <- c - d.
 /// Then p = R (x - c) moves by R (d + w x (x - c)) and the Jacobians of a residual are J_x and J_x G^T with G^T = [I,
@@ -14,6 +14,7 @@
 #include "cfp/core/types.hpp"
 #include "cfp/optimization/bundle/bundle_chunk_impl.hpp"
 #include "cfp/optimization/bundle/bundle_index_impl.hpp"
+#include "cfp/simd/packet.hpp"
 
 namespace cfp::detail {
 
@@ -42,36 +43,40 @@ inline constexpr int symmetric[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
 
 inline namespace CFP_ISA {
 
-/// Residuals, N, n and the cost of the chunk.
+/// N, n and the cost of the chunk.
 template <bool Stereo, typename Loss>
 double weigh_chunk(int padded, double baseline_fx, const Loss& loss, const Matrix3<double>& rotation,
                    BundleChunk& chunk) noexcept {
-  double cost = 0;
-  for (int i = 0; i < padded; ++i) {
-    const double ru = chunk.residual[0][i] -= chunk.u[i];
-    const double rv = chunk.residual[1][i] -= chunk.v[i];
-    double s = ru * ru + rv * rv;
+  using P = simd::Packet<double>;
+  static_assert(to_index(BundleChunk::lanes) % P::lanes == 0);
+  P cost = 0.0;
+  for (int i = 0; i < padded; i += static_cast<int>(P::lanes)) {
+    const auto at = [i](const double* from) { return P::load(from + i); };
+    const P depth = at(chunk.depth), weight = at(chunk.weight), information = at(chunk.information);
+    P r[3] = {at(chunk.projected[0]) - at(chunk.u), at(chunk.projected[1]) - at(chunk.v), P(0.0)}, J[3][3];
+    for (int row = 0; row < 2; ++row)
+      for (int c = 0; c < 3; ++c) J[row][c] = at(chunk.row[row][c]);
     if constexpr (Stereo) {
-      chunk.residual[2][i] = ru + chunk.disparity[i] - baseline_fx / chunk.depth[i];
-      s += chunk.residual[2][i] * chunk.residual[2][i];
-      const double t = baseline_fx / (chunk.depth[i] * chunk.depth[i]);
-      for (int c = 0; c < 3; ++c) chunk.row[2][c][i] = chunk.row[0][c][i] + t * rotation(2, c);
+      const P disparity = P(baseline_fx) / depth;
+      r[2] = r[0] + at(chunk.disparity) - disparity;
+      for (int c = 0; c < 3; ++c) J[2][c] = J[0][c] + disparity / depth * rotation(2, c);
     }
-    s *= chunk.information[i];
-    const bool seen = chunk.depth[i] > Tolerance<double>::min_depth;
-    cost += seen ? chunk.weight[i] * loss.value(s) : std::numeric_limits<double>::quiet_NaN();
-    const double omega = chunk.weight[i] * chunk.information[i] * loss.first(s);
-    double N[6] = {}, n[3] = {};
+    const P s = information * (r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
+    const P omega = weight * information * loss.first(s);
+    cost += select(depth > P(Tolerance<double>::min_depth), weight * loss.value(s),
+                   P(std::numeric_limits<double>::quiet_NaN()));
+    P N[6], n[3];
+    std::fill_n(N, 6, P(0.0));
+    std::fill_n(n, 3, P(0.0));
     for (int row = 0; row < (Stereo ? 3 : 2); ++row) {
-      const double x = chunk.row[row][0][i], y = chunk.row[row][1][i], z = chunk.row[row][2][i];
-      const double a = omega * x, b = omega * y, c = omega * z, r = chunk.residual[row][i];
-      N[0] += a * x, N[1] += a * y, N[2] += a * z, N[3] += b * y, N[4] += b * z, N[5] += c * z;
-      n[0] += a * r, n[1] += b * r, n[2] += c * r;
+      const P *x = J[row], a = omega * x[0], b = omega * x[1], c = omega * x[2];
+      N[0] += a * x[0], N[1] += a * x[1], N[2] += a * x[2], N[3] += b * x[1], N[4] += b * x[2], N[5] += c * x[2];
+      n[0] += a * r[row], n[1] += b * r[row], n[2] += c * r[row];
     }
-    for (int e = 0; e < 6; ++e) chunk.N[e][i] = N[e];
-    for (int e = 0; e < 3; ++e) chunk.n[e][i] = n[e];
+    for (int e = 0; e < 6; ++e) N[e].store(chunk.N[e] + i);
+    for (int e = 0; e < 3; ++e) n[e].store(chunk.n[e] + i);
   }
-  return cost;
+  return reduce_add(cost);
 }
 
 /// From N and n of a chunk to the pose's sums.
