@@ -63,7 +63,7 @@ inline float weight_with(const CalibrationSample& sample, const CalibratedOption
   cfp::MapPointOptions options = run.probability.map_point;
   options.constraint_power = chosen.constraint_power;
   const float e = cfp::first_stage_evidence(sample.flow, known.object_probability, known.foreground, threshold);
-  const float k = cfp::second_stage_evidence(known, threshold);
+  const float k = cfp::keypoint_evidence(cfp::second_stage_evidence(known, threshold), e, known.foreground);
   return cfp::posterior_probability(k, std::min(e, 0.5F), sample.map_point, options);
 }
 

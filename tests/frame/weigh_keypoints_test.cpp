@@ -102,12 +102,13 @@ TEST_CASE("By Bayes' rule the weight is M outside boxes, and in one what all tha
   run.state.objects[1].static_probability = 0.97;  // shown to be static, which raises no point that has a history
   const auto check = [&](bool fine) {
     for (std::size_t i = 0; i < m.size(); ++i) {
-      const double k = run.state.static_probability[i];
+      double k = run.state.static_probability[i];
       double expected = m[i] < 0 ? 1 : m[i];
       if (run.state.box[i] != cfp::no_box) {
         const bool foreground = run.label(i) == cfp::KeypointLabel::foreground;
         const double o = run.state.objects[static_cast<std::size_t>(run.state.box[i])].static_probability;
-        const double e = cfp::first_stage_evidence(o, foreground, options.object_threshold);
+        const double e = cfp::first_stage_evidence(-1.0, o, foreground, options.object_threshold);
+        if (foreground && e < 0.5 && k > 0.5) k = 0.5;
         const double prior = foreground ? options.map_point.foreground_prior : options.map_point.background_prior;
         const double raised = cfp::posterior_probability(0.5, e > 0.5 ? e : 0.5, prior, options.map_point);
         expected =
@@ -198,6 +199,29 @@ TEST_CASE("The flow at a keypoint's place tells the part of a person that moves 
   options = {};
   frame.flow.previous_depths = {};
   without();
+}
+
+TEST_CASE("What begins to move more slowly than a match can see loses its weight by its flow, and its map point's",
+          "[frame]") {
+  const cfp::FrameOptions options;
+  FrameRun<double> run(make_dynamic_scene<double>({}, 78));
+  run.coarse(options);
+  run.fine(options);
+  for (const cfp::KeypointLabel label : {cfp::KeypointLabel::foreground, cfp::KeypointLabel::background}) {
+    const auto i = static_cast<std::size_t>(std::find(run.state.label.begin(), run.state.label.end(), label) -
+                                            run.state.label.begin());
+    run.state.flow_probability[i] = 0.1;
+    run.state.static_probability[i] = 0.99;
+    const double m = cfp::updated_map_point(i, 0.98, options, run.state);
+    if (label == cfp::KeypointLabel::foreground) {
+      CHECK(cfp::model_weight(i, 0.98, options, run.state) < 0.51);
+      CHECK(m < 0.96);
+      CHECK(cfp::model_weight(i, m, options, run.state) < 0.35);
+    } else {  // the flow beside it may be the object's
+      CHECK(cfp::model_weight(i, 0.98, options, run.state) > 0.8);
+      CHECK(m > 0.97);
+    }
+  }
 }
 
 TEST_CASE("A map point confirmed over many frames survives one box, a new one on a person earns its weight",

@@ -119,3 +119,14 @@ TEST_CASE("As evidence beside M, what no constraint judges says nothing, on the 
   p.box_associated = false;
   CHECK(cfp::second_stage_evidence(p, 0.9) == 0);  // its match is false, whatever it says
 }
+
+TEST_CASE("Beside a first stage that says its object moves, a keypoint's K may say so too, but not that it rests",
+          "[probability]") {
+  for (const double k : {0.0, 0.2, 0.5, 0.7, 1.0}) {
+    for (const double e : {0.0, 0.1, 0.4999}) {
+      CHECK(cfp::keypoint_evidence(k, e, true) == (k < 0.5 ? k : 0.5));
+      CHECK(cfp::keypoint_evidence(k, e, false) == k);  // behind it, the flow may be the object's
+    }
+    for (const double e : {0.5, 1.0}) CHECK(cfp::keypoint_evidence(k, e, true) == k);
+  }
+}

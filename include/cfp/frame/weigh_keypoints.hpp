@@ -10,6 +10,7 @@
 #include "cfp/frame/frame_state.hpp"
 #include "cfp/probability/first_stage_probability.hpp"
 #include "cfp/probability/map_point.hpp"
+#include "cfp/probability/second_stage_probability.hpp"
 
 namespace cfp {
 inline namespace CFP_ISA {
@@ -43,8 +44,8 @@ template <typename Scalar>
 }
 
 /// The weight by Bayes' rule, before any fallback. Outside all boxes it is M. In one, E can only lower it,
-/// because what rests may move in the next frame; K counts once the constraints were asked, and what came from nowhere
-/// is then left out.
+/// because what rests may move in the next frame; K counts once the constraints were asked, as keypoint_evidence has
+/// it, and what came from nowhere is then left out.
 template <typename Scalar>
 [[nodiscard]] Scalar posterior_weight(std::size_t i, non_deduced<Scalar> map_point_probability,
                                       const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
@@ -53,8 +54,9 @@ template <typename Scalar>
   if (state.box[i] == no_box) return state.label[i] == KeypointLabel::invalid ? Scalar(0) : clamp_probability(m);
   if (state.report.stage == Stage::fine && came_from_nowhere(i, state)) return Scalar(0);
   const Scalar e = (std::min)(first_stage_evidence(i, options, state), Scalar(0.5));
-  const Scalar k = state.report.constrained > 0 ? state.static_probability[i] : Scalar(0.5);
-  return posterior_probability(k, e, m, options.map_point);
+  const bool foreground = state.label[i] == KeypointLabel::foreground;
+  const Scalar k = keypoint_evidence(state.static_probability[i], e, foreground);
+  return posterior_probability(state.report.constrained > 0 ? k : Scalar(0.5), e, m, options.map_point);
 }
 
 /// Whether the printed weights leave the observation out because K and M are too far apart. In the coarse stage K is
@@ -90,8 +92,8 @@ template <typename Scalar>
 }
 
 /// M of the map point that keypoint i observes, after this frame: it learns from K, once the constraints were asked,
-/// and by Bayes' rule from flow at its place that moves; from its object never. No map point (M negative or NaN) stays
-/// none, and a keypoint without a pixel says nothing.
+/// and by Bayes' rule from flow at its place that moves, beside which K is keypoint_evidence; from its object never. No
+/// map point (M negative or NaN) stays none, and a keypoint without a pixel says nothing.
 template <typename Scalar>
 [[nodiscard]] Scalar updated_map_point(std::size_t i, non_deduced<Scalar> map_point_probability,
                                        const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
@@ -102,6 +104,7 @@ template <typename Scalar>
   Scalar k = state.static_probability[i];
   if (options.map_point.weight == WeightRule::posterior && state.flow_probability[i] >= Scalar(0)) {
     const Scalar e = (std::min)(first_stage_evidence(i, options, state), Scalar(0.5));
+    k = keypoint_evidence(k, e, state.label[i] == KeypointLabel::foreground);
     k = posterior_probability(Scalar(0.5), e, k, options.map_point);
   }
   return updated_map_point(k, map_point_probability, options.map_point);

@@ -40,24 +40,17 @@ template <typename Scalar>
 }
 
 /// E, what the first stage says of a keypoint whose map point's M is the prior: on the object, O's odds against those
-/// of O_Th, so that an object at O_Th says nothing (1/2); behind it 1/2. In [0, 1], continuous and increasing in O. NaN
-/// counts as O = 0. Not in the paper.
-template <typename Scalar>
-[[nodiscard]] constexpr Scalar first_stage_evidence(Scalar object_probability, bool foreground,
-                                                    Scalar object_threshold) noexcept {
-  if (!foreground) return Scalar(0.5);
-  const Scalar o = clamp_probability(object_probability);
-  const Scalar is_static = o * (Scalar(1) - object_threshold), moves = (Scalar(1) - o) * object_threshold;
-  return is_static / (is_static + moves);
-}
-
-/// The same where the flow at the keypoint's own place was scored (negative: it was not): that score stands for O, on
-/// the object and behind it.
+/// of O_Th, so that an object at O_Th says nothing (1/2); behind it 1/2. Where the flow at the keypoint's own place was
+/// scored, that score stands for O, on the object and behind it (negative or NaN: it was not). In [0, 1], continuous
+/// and increasing in O. NaN counts as O = 0. Not in the paper.
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar first_stage_evidence(Scalar flow_probability, Scalar object_probability, bool foreground,
                                                     Scalar object_threshold) noexcept {
-  return flow_probability >= Scalar(0) ? first_stage_evidence(flow_probability, true, object_threshold)
-                                       : first_stage_evidence(object_probability, foreground, object_threshold);
+  const bool scored = flow_probability >= Scalar(0);
+  if (!scored && !foreground) return Scalar(0.5);
+  const Scalar o = clamp_probability(scored ? flow_probability : object_probability);
+  const Scalar is_static = o * (Scalar(1) - object_threshold), moves = (Scalar(1) - o) * object_threshold;
+  return is_static / (is_static + moves);
 }
 
 }  // namespace CFP_ISA

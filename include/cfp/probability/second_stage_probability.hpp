@@ -107,5 +107,15 @@ template <typename Scalar>
   return from_nowhere || is_judged(keypoint) ? second_stage_probability(keypoint, object_threshold) : Scalar(0.5);
 }
 
+/// K beside E of the same keypoint: at most 1/2 on an object that E says moves (E < 1/2). Both measure one motion, and
+/// what moves by less than a match errs has a K near 1, while the flow, ten times finer, sees it. In [0, 1] as K is,
+/// non-decreasing in both, with a step in E at 1/2; NaN stays NaN, and counts as 0 where K does. Not in the paper.
+template <typename Scalar>
+[[nodiscard]] constexpr Scalar keypoint_evidence(Scalar keypoint_probability, Scalar first_stage_evidence,
+                                                 bool foreground) noexcept {
+  const Scalar half(0.5), k = keypoint_probability;
+  return foreground && first_stage_evidence < half && k > half ? half : k;
+}
+
 }  // namespace CFP_ISA
 }  // namespace cfp
