@@ -7,7 +7,13 @@
 //   refused    no F where the scene determines none; `named`: of those, with the right reason
 //   lost       no F where the scene determines one
 //   wrong      an F with a larger error, whatever the scene
-// Arguments: [problems per cell, default 40] [kinds by number, default all] or --smoke.
+//
+// Where the pairs do not tell (mixtures of a normal and a uniform distribution, best scale and share each): at 90 % of
+// mismatches and 0.5 px (`volume`, 30 cm) the true F was likelier than a wrong one in 11 of 30 problems; `volume +
+// walker` at 0.1 px, 40 % and 2 cm in 0 of 9.
+//
+// Arguments: [problems per cell, default 40] [kinds by number, default all] or --smoke. CFP_STUDY_ALONE: without the
+// peers; CFP_STUDY_SEED: draws other scenes.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -221,6 +227,7 @@ int main(int argc, char* argv[]) {
   for (int k = 2; k < argc; ++k) kinds.push_back(std::atoi(argv[k]));
   if (kinds.empty())
     for (int k = 0; k < static_cast<int>(Kind::count); ++k) kinds.push_back(k);
+  const char* const seed = std::getenv("CFP_STUDY_SEED");
   [[maybe_unused]] const bool peers = std::getenv("CFP_STUDY_ALONE") == nullptr;
   cfp::FundamentalRansacWorkspace workspace;
   cfp::FundamentalRansacOptions options;
@@ -237,7 +244,7 @@ int main(int argc, char* argv[]) {
         for (const double base : {0.02, 0.05, 0.1, 0.3}) {
           if ((!moves || smoke) && base != 0.1) continue;
           if (smoke && (noise == 0.5 || noise == 1.0 || outliers == 0.2)) continue;
-          cfp::Random random(7, "fundamental_degeneracy_study");
+          cfp::Random random(seed == nullptr ? 7 : std::strtoull(seed, nullptr, 10), "fundamental_degeneracy_study");
           Counts ours, magsac, accurate;
           for (int i = 0; i < problems; ++i) {
             // 1e-9: exact, but rounded to float.
