@@ -469,6 +469,30 @@ TEST_CASE("A person who moves before a camera at rest or turning gives no F", "[
   CHECK(named >= all - 5);
 }
 
+TEST_CASE("Where nine in ten pairs are mismatches no F of chance is called one", "[robust]") {
+  FundamentalRansacWorkspace workspace;
+  cfp::Random random(52, "mismatches");
+  int wrong = 0;
+  for (const SceneShape shape : {SceneShape::volume, SceneShape::plane}) {
+    for (const double noise_px : {0.0, 0.5}) {
+      for (int trial = 0; trial < 50; ++trial) {
+        TwoViewOptions options = noisy(300, 0.9);
+        options.noise_px = noise_px;
+        options.translation_m = 0.3;
+        options.shape = shape;
+        const auto scene = make_two_view_scene<double>(random, options);
+        const auto result =
+            fundamental_ransac(PointPairs{scene.prev, scene.cur}, FundamentalRansacOptions{}, workspace);
+        wrong += result.found() && (shape == SceneShape::plane ||
+                                    cfp_test::median_sampson_of_truth<double>(scene, result.F) > 0.05 + noise_px)
+                     ? 1
+                     : 0;
+      }
+    }
+  }
+  CHECK(wrong <= 4);
+}
+
 TEST_CASE("A person at the edge of the image, away from all other pairs, gives no F", "[robust]") {
   FundamentalRansacWorkspace workspace;
   cfp::Random random(49, "edge");
@@ -564,6 +588,33 @@ TEST_CASE("Two long lines of points give no F, however far the camera has moved"
     }
   }
   CHECK(found == 0);
+}
+
+TEST_CASE("Points on one line are named degenerate, mismatches beside them or not", "[robust]") {
+  FundamentalRansacWorkspace workspace;
+  cfp::Random random(53, "line");
+  int named = 0;
+  for (const double noise_px : {0.0, 1e-6, 0.1}) {
+    for (const double outliers : {0.0, 0.3}) {
+      for (int trial = 0; trial < 10; ++trial) {
+        const auto scene = make_two_view_scene<double>(random, noisy(8, 0));
+        std::vector<std::array<double, 2>> prev, cur;
+        while (prev.size() < 200) {
+          const double x = random.uniform(-0.9, 0.9);
+          const cfp::Vector3<double> point(x, 0.2 + 0.3 * x, 2.5 + 0.4 * x);
+          cfp::Vector2<double> u(0, 0), v(0, 0);
+          REQUIRE((scene.camera.project(point, u) && scene.camera.project(scene.T_cur_prev * point, v)));
+          if (random.uniform() < outliers) v += cfp::Vector2<double>(random.uniform(-40, 40), random.uniform(-40, 40));
+          prev.push_back({u.x() + noise_px * random.normal(), u.y() + noise_px * random.normal()});
+          cur.push_back({v.x() + noise_px * random.normal(), v.y() + noise_px * random.normal()});
+        }
+        const auto result = fundamental_ransac(PointPairs{prev, cur}, FundamentalRansacOptions{}, workspace);
+        CHECK_FALSE(result.found());
+        named += result.status == RansacStatus::degenerate ? 1 : 0;
+      }
+    }
+  }
+  CHECK(named >= 57);
 }
 
 TEST_CASE("Mismatches that all end in one place are no support", "[robust]") {

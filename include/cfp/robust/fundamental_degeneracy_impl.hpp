@@ -24,7 +24,7 @@ struct DegeneracyCheck {
   std::vector<T>& scratch;  // of twice the arrays' capacity
   const PairArrays& pairs = search.pairs;
   Matrix3<T> H = scaled_homography(Matrix3<T>::Identity());
-  bool sound = false, dominant = false;  // H explains more than chance does; half of the pairs
+  bool dominant = false;  // H explains half of the pairs
 
   // Transfer distances have two degrees of freedom and the noise of both images: 95 % of chi-squared is there at 3
   // times the squared threshold that holds 95 % of the Sampson distances.
@@ -61,7 +61,6 @@ struct DegeneracyCheck {
     for (const std::uint32_t i : search.list)
       explained += transfer_sq(pairs, H, i) <= transfer_limit() ? search.weights()[i] : 0.0;
     dominant = explained >= 0.5 * weight;
-    sound = explained >= 0.2 * weight && explained >= 10;
   }
 
   // Plane and parallax: with H known, two pairs off the plane give the epipole and F = [e']x H. Improves candidate when
@@ -97,33 +96,51 @@ struct DegeneracyCheck {
     if (best.cost < candidate.cost) candidate = best;
   }
 
+  // Whether more pairs lie near their lines than the pairs up to three times as far let chance put there: the binomial
+  // tail of that has to outdo the number of seven-point samples, C(n, 7), as the best of all their F fits some
+  // mismatches, too. Source: Moisan and Stival, "A probabilistic criterion to detect rigid point matches between two
+  // images and estimate the fundamental matrix", IJCV 2004.
+  [[nodiscard]] bool stands_out() const noexcept {
+    const T limit = (std::max)(search.limit, search.noise_limit());
+    T near = 0, all = 0, n = 0;
+    for (std::size_t i = 0; i < pairs.size; ++i) {
+      n += pairs.row(5)[i];
+      near += search.distances_sq[i] <= limit ? pairs.row(5)[i] : T(0);
+      all += search.distances_sq[i] <= 9 * limit ? pairs.row(5)[i] : T(0);
+    }
+    const auto nats = [&](T part, T share) { return part > 0 ? part * std::log(part / (share * all)) : T(0); };
+    return 3 * near > all && nats(near, T(1) / 3) + nats(all - near, T(2) / 3) > 7 * std::log((n - 3) / T(3.38));
+  }
+
   // Whether the F whose noise was measured last is one: its lines explain more than chance does, without any part of
   // the image in which a person may move, too, and without any two lines of points, which leave F undetermined. Against
   // no motion and against H. least: distinct pairs it has to explain.
   [[nodiscard]] bool has_parallax(double least) noexcept {
+    if (!stands_out()) return false;
     FundamentalEvidence<T> evidence{search, scratch};
     evidence.stride = (std::max)(pairs.size / PairArrays::enough, std::size_t(1));
     evidence.compare(H);
     const bool person_possible = find_homography_beside(evidence.judge().window);
     const auto suffices = [&](T factor) {
-      const T n = static_cast<T>(pairs.size);
       const auto stands = [&](const Matrix3<T>& other) {
         const T distinct = evidence.compare(other);
         const typename FundamentalEvidence<T>::Verdict v = evidence.judge();
-        // A sound homography leaves F few freedoms, and many pairs lie on no lines by chance; else any seven have an F.
-        const bool sure = sound || distinct >= (std::max)(T(0.3) * n, T(36));
-        return distinct >= least && v.all > factor * (sure ? T(11) : T(6.5) * std::log(n)) &&
-               (!person_possible || v.outside > 4 * factor);
+        return distinct >= least && v.all > 11 * factor && (!person_possible || v.outside > 4 * factor);
       };
       if (!stands(scaled_homography(Matrix3<T>::Identity())) || !stands(H)) return false;
-      evidence.drop_line();
-      evidence.drop_line();
-      return evidence.judge().all > 5 * factor;
+      return !evidence.rests_on_lines(factor);
     };
     // Some of the pairs are enough where they say it clearly.
     if (evidence.stride > 1 && suffices(3)) return true;
     evidence.stride = 1;
     return suffices(1);
+  }
+
+  // Whether it is two lines of points that speak for the F whose noise was measured last.
+  [[nodiscard]] bool rests_on_lines() noexcept {
+    FundamentalEvidence<T> evidence{search, scratch};
+    evidence.compare(scaled_homography(Matrix3<T>::Identity()));
+    return evidence.judge().all > 11 && evidence.rests_on_lines(1);
   }
 
   // Looks for the homography of the pairs outside the window of a person, who bends H towards F. H becomes that one,

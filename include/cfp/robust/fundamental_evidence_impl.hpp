@@ -103,6 +103,13 @@ struct FundamentalEvidence {
     return out;
   }
 
+  // Whether there is no evidence but that of two lines of points, which leave F undetermined. Takes it away.
+  [[nodiscard]] bool rests_on_lines(T factor) noexcept {
+    drop_line();
+    drop_line();
+    return !(judge().all > 5 * factor);
+  }
+
   // Takes away the pairs near the line of the previous image that carries most of the gains.
   void drop_line() noexcept {
     const T width_sq = 64 * (std::max)(search.noise_variance, search.limit / T(3.84));

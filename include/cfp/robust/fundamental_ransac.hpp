@@ -1,6 +1,7 @@
 /// @file fundamental_ransac.hpp
-/// The fundamental matrix of pairs with mismatches: seeded LO-RANSAC over seven-point samples, MSAC score, robust
-/// non-linear refinement, and a refusal instead of a wrong F when a rotation, a plane or no motion explains the pairs.
+/// The fundamental matrix of pairs with mismatches: seeded LO-RANSAC over seven-point samples, MSAC
+/// score, robust non-linear refinement, and a refusal instead of a wrong F when a rotation, a plane or no motion
+/// explains the pairs.
 /// F maps a pixel of the previous image to its line in the current one, x_cur^T F x_prev = 0. Distances in pixels.
 #pragma once
 
@@ -76,7 +77,9 @@ template <typename Scalar>
     search.polish(F, found.confident ? 1 : 4);
     search.collect_inliers();
     has_F = check.has_parallax(static_cast<double>(options.min_inliers));
+    if (!has_F && !check.rests_on_lines()) result.status = RansacStatus::no_consensus;
   } else {
+    if (is_finite(found.best.cost)) result.status = RansacStatus::no_consensus;
     for (std::size_t i = 0; i < pairs.size; ++i) search.distances_sq[i] = transfer_sq(pairs, check.H, i) / 4;
     search.measure_noise();
   }
@@ -87,7 +90,6 @@ template <typename Scalar>
     if (result.found()) result.F = unscaled_fundamental(F, pairs.scaling).template cast<Scalar>();
     return result;
   }
-  result.status = RansacStatus::no_consensus;
   if (!check.dominant) return result;
   result.status = check.classify(K);
   const auto is_inlier = [&](std::size_t i) { return transfer_sq(pairs, check.H, i) <= check.transfer_limit(); };
@@ -109,18 +111,19 @@ inline namespace CFP_ISA {
 }
 
 /// Robust F of pairs: `fundamental_ransac(PointPairs{previous, current}, options, workspace)`. Weights multiply the
-/// score, sum w min(d^2 / T^2, 1), and the refinement's loss, and steer the sampling; the inlier test sees the Sampson
-/// distance alone. inlier_mask: empty or one per pair, 1 = inlier. Works in double, scores in float.
+/// score, sum w min(d^2 / T^2, 1), and the refinement's loss, and steer the sampling; the inlier test sees the
+/// Sampson distance alone. inlier_mask: empty or one per pair, 1 = inlier. Works in double, scores in float.
 ///
 /// A homography that holds most inliers is looked for first: with parallax beside it the F is completed from both.
-/// There is no F, and `status` says why, unless its lines explain the pairs better than chance does beside that
-/// homography and beside no motion, without any part of the image as wide as a near person, and without any two lines
-/// of points. Pairs that begin or end in one place (a cell of two thresholds) count as one there. At 90 % of mismatches
-/// a moving region may still be taken for parallax. The result is refined under a Geman-McClure loss of 2.25 standard
-/// deviations of the noise that the pairs themselves show, from several starts, as a short baseline gives the cost
-/// several minima. Cost per sample about 1 us plus 0.3 us per 200 pairs, and some 100 us at the end. Sources: Chum,
-/// Matas, Kittler: "Locally optimized RANSAC", DAGM 2003; Torr and Zisserman: "MLESAC", CVIU 2000, for the score;
-/// DEGENSAC (see fundamental_degeneracy_impl.hpp).
+/// There is no F, and `status` says why, unless more pairs lie near its lines than the best of all samples gathers by
+/// chance (30 true pairs among 300 are not told from that), and its lines explain the pairs better than chance does
+/// beside that homography and beside no motion, without any part of the image as wide as a near person, and without any
+/// two lines of points (`degenerate`). Pairs that begin or end in one place (a cell of two thresholds) count as one
+/// there. Where most pairs are mismatches a moving region may still be taken for parallax. The result is refined under
+/// a Geman-McClure loss of 2.25 standard deviations of the noise that the pairs themselves show, from several starts,
+/// as a short baseline gives the cost several minima. Cost per sample about 1 us plus 0.3 us per 200 pairs, and some
+/// 100 us at the end. Sources: Chum, Matas, Kittler: "Locally optimized RANSAC", DAGM 2003; Torr and Zisserman:
+/// "MLESAC", CVIU 2000, for the score; DEGENSAC (see fundamental_degeneracy_impl.hpp).
 template <typename Scalar>
 [[nodiscard]] FundamentalResult<Scalar> fundamental_ransac(const PointPairs<Scalar>& pairs,
                                                            const FundamentalRansacOptions& options,
