@@ -21,8 +21,8 @@
 
 namespace synthetic {
 
-enum class Scenario { sitting, walking };
-inline constexpr std::array<const char*, 2> scenario_names{"sitting", "walking"};
+enum class Scenario { sitting, walking, rising };
+inline constexpr std::array<const char*, 3> scenario_names{"sitting", "walking", "rising"};
 
 struct SequenceOptions {
   Scenario scenario = Scenario::walking;
@@ -90,10 +90,11 @@ class Sequence {
         recording_ != nullptr ? time_of(options_.frames) + 1 : options_.frames / options_.rate_hz + 1;
     for (int person = 0; person < 2; ++person) {
       cfp::Random random(options_.seed, person == 0 ? "first person" : "second person");
-      const bool sits = options_.scenario == Scenario::sitting;
-      scripts_[person] = sits                ? sitting_script(random, person, seconds, stage)
-                         : options_.close_up ? close_up_script(random, person, seconds, stage, motion_)
-                                             : walking_script(random, person, seconds, stage);
+      const Scenario scenario = options_.scenario;
+      scripts_[person] = scenario == Scenario::sitting  ? sitting_script(random, person, seconds, stage)
+                         : scenario == Scenario::rising ? rising_script(person, seconds, stage)
+                         : options_.close_up            ? close_up_script(random, person, seconds, stage, motion_)
+                                                        : walking_script(random, person, seconds, stage);
     }
     if (!stage.room && options_.scenario == Scenario::walking) scene_.surfaces.clear();  // nobody sits: no chairs
   }
@@ -159,10 +160,11 @@ class Sequence {
       stage.lanes[1] = -1.45;
       stage.front = -1.8;
     }
-    if (options_.close_up && options_.scenario == Scenario::sitting) {
-      const double y = options_.furniture ? -1.75 : -2.07;
-      stage.chairs[0] = {-0.32, y, 1.45};
-      stage.chairs[1] = {0.32, y, 3.14159265358979 - 1.45};
+    const bool rising = options_.scenario == Scenario::rising;
+    if (rising || (options_.close_up && options_.scenario == Scenario::sitting)) {
+      const double x = rising ? 0.27 : 0.32, y = options_.furniture ? -1.75 : rising ? -2.3 : -2.07;
+      stage.chairs[0] = {-x, y, 1.45};
+      stage.chairs[1] = {x, y, 3.14159265358979 - 1.45};
     }
     return stage;
   }

@@ -110,13 +110,17 @@ inline void gesture_with_either(Director& d, cfp::Random& random, double shortes
   d.gesture(static_cast<int>(random.index(2)), seconds);
 }
 
+/// On their chairs; sit 1: seated, less: perched.
+inline Director seated(int person, const Stage& stage, double sit) {
+  const Stage::Chair& chair = stage.chairs[person];
+  const double feet = 0.42;  // in front of the chair's middle
+  return {chair.x + feet * std::cos(chair.heading), chair.y + feet * std::sin(chair.heading), chair.heading, sit,
+          person == 0 ? 1.80 : 1.74};
+}
+
 /// Two people on their chairs at the desk: gestures, looks, leaning, and much stillness.
 inline Script sitting_script(cfp::Random& random, int person, double seconds, const Stage& stage) {
-  const Stage::Chair& chair = stage.chairs[person];
-  const double inward = chair.heading;
-  const double feet = 0.42;  // in front of the chair's middle
-  Director d(chair.x + feet * std::cos(inward), chair.y + feet * std::sin(inward), inward, 1,
-             person == 0 ? 1.80 : 1.74);
+  Director d = seated(person, stage, 1);
   d.wait(person == 0 ? 0.3 : 1.2);
   while (d.now() < seconds) {
     const double choice = random.uniform();
@@ -129,6 +133,18 @@ inline Script sitting_script(cfp::Random& random, int person, double seconds, co
     } else {
       d.wait(random.uniform(0.4, 1.2));
     }
+  }
+  return d.finish();
+}
+
+/// Two people perched before the camera, at rest. When half of the time is over, the first gets up and leaves.
+inline Script rising_script(int person, double seconds, const Stage& stage) {
+  const Stage::Chair& chair = stage.chairs[person];
+  Director d = seated(person, stage, 0.3);
+  if (person == 0) {
+    d.wait(seconds / 2);
+    d.sit(0);
+    d.walk(chair.x - 1.6, chair.y + 0.3, 0.9);
   }
   return d.finish();
 }

@@ -94,10 +94,11 @@ TEST_CASE("Too few pairs with depth, or pairs that do not agree, give no motion"
   const auto estimate = [&](const Flow& f) {
     return cfp::estimate_camera_motion<double>(f.pairs(), f.outside, cfp::SE3<double>(), camera, {}, workspace).known;
   };
-  Flow few = flow(29, cfp::SE3<double>(), 0.1, 0, random);
+  const std::size_t too_few = cfp::CameraMotionOptions{}.min_pairs - 1;
+  Flow few = flow(too_few, cfp::SE3<double>(), 0.1, 0, random);
   CHECK_FALSE(estimate(few));
   Flow inside = flow(300, cfp::SE3<double>(), 0.1, 0, random);
-  for (std::size_t i = 20; i < inside.outside.size(); ++i) inside.outside[i] = 0;
+  for (std::size_t i = too_few; i < inside.outside.size(); ++i) inside.outside[i] = 0;
   CHECK_FALSE(estimate(inside));
   Flow blind = flow(300, cfp::SE3<double>(), 0.1, 0, random);
   for (double& z : blind.depths) z = std::numeric_limits<double>::quiet_NaN();

@@ -129,3 +129,26 @@ TEST_CASE("With a label image, the pairs on an object are those on its label", "
   CHECK(report.foreground == labelled);
   CHECK(report.background == 0);
 }
+
+TEST_CASE("Where people fill the view, what lies behind them tells the camera's motion, not they themselves",
+          "[frame]") {
+  for (const double person_motion_m : {0.0, 0.06}) {
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      CAPTURE(person_motion_m, seed);
+      cfp_test::DynamicSceneOptions crowded;
+      crowded.people = 1;
+      crowded.points_per_person = 300;
+      crowded.wall_points = 25;
+      crowded.pixel_noise_px = 0.2;
+      crowded.person_motion_m = person_motion_m;
+      FrameRun<double> run(make_dynamic_scene<double>(crowded, seed));
+      run.scene.boxes = {{-100, -100, 900, 700}};
+      cfp::Frame<double> frame = run.frame();
+      frame.flow.previous_depths = run.scene.previous_depths;
+      const cfp::FrameReport report = run.coarse({}, frame, run.scene.camera);
+      CHECK(report.flow_model == cfp::FlowModelKind::motion);
+      CHECK(report.flow_support == cfp::FlowSupport::background_pairs);
+      CHECK((run.state.objects[0].static_probability > 0.5) == (person_motion_m == 0));
+    }
+  }
+}

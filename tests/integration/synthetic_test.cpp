@@ -183,6 +183,29 @@ TEST_CASE("In a close-up, people fill the view of every camera and keep clear of
   }
 }
 
+TEST_CASE("Two people at rest fill the view until one of them gets up and leaves", "[synthetic]") {
+  for (std::size_t m = 0; m < motion_names.size(); ++m) {
+    CAPTURE(motion_names[m]);
+    auto options = small(Scenario::rising, static_cast<Motion>(m));
+    options.frames = 300;
+    options.camera = SequenceOptions::default_camera(80);
+    const Sequence sequence(options);
+    std::vector<double> shares;
+    for (int frame = 0; frame < 150; frame += 5) {
+      const auto out = rendered(sequence, frame);
+      shares.push_back(1 - cv::countNonZero(out.label == label_static) / static_cast<double>(out.label.total()));
+      REQUIRE(cv::countNonZero(out.label == label_moving) == 0);
+    }
+    std::sort(shares.begin(), shares.end());
+    CHECK(shares[shares.size() / 2] > 0.45);
+    CHECK(shares[shares.size() / 2] < 0.7);
+    CHECK(cv::countNonZero(rendered(sequence, 190).label == label_moving) > 0);
+    const auto surfaces = sequence.surfaces_at(sequence.time_of(299));
+    const std::size_t first = surfaces.size() - 2 * parts.size(), second = first + parts.size();
+    CHECK((surfaces[first].centre - surfaces[second].centre).norm() > 1.5);
+  }
+}
+
 TEST_CASE("Furniture stands before people, within their boxes, static, with depth, and none walks through it",
           "[synthetic]") {
   for (const bool close_up : {false, true}) {

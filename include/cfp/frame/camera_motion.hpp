@@ -18,7 +18,7 @@
 namespace cfp {
 
 struct CameraMotionOptions {
-  std::size_t min_pairs = 30;  ///< with depth, outside all boxes: with fewer there is no motion, >= 3
+  std::size_t min_pairs = 12;  ///< with depth, on no object: with fewer there is no motion, >= 3
   /// of these, within the outlier threshold of `pose`: a motion that fewer agree to is none, in [0, 1]
   double min_inlier_share = 0.5;
   double min_sigma_px = 0.05;  ///< the noise of the flow is measured and kept in these bounds, > 0

@@ -23,25 +23,12 @@ template <typename Scalar>
   return labels.empty() || box.compensated() ? contains(box.box, x, y) : label_at(labels, x, y) == box.detection + 1;
 }
 
-/// Marks in scratch.mask the flow pairs that lie on no object.
-template <typename Scalar>
-void mark_outside(const Frame<Scalar>& frame, FrameState<Scalar>& state) {
-  const PointSpan<Scalar, 2>& pixels = frame.flow.current;
-  state.scratch.mask.resize(pixels.size());
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    const bool inside = std::any_of(state.boxes.begin(), state.boxes.end(), [&](const TrackedBox<Scalar>& box) {
-      return lies_on(box, frame.labels, pixels(i, 0), pixels(i, 1));
-    });
-    state.scratch.mask[i] = inside ? char(0) : char(1);
-  }
-}
-
 /// What the flow pairs are judged by: the host's motion or F, or the model of the pairs outside all boxes.
 template <typename Scalar>
 [[nodiscard]] FlowModel<Scalar> flow_model(const Frame<Scalar>& frame, const FlowPairs<Scalar>& undistorted_flow,
                                            const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
                                            FrameState<Scalar>& state) {
-  const span<const char> outside(state.scratch.mask);
+  const span<const char> outside(state.scratch.outside);
   if (!frame.T_cur_prev && !frame.fundamental)
     return estimate_flow_model(undistorted_flow, outside, camera, options, state.scratch.flow);
   FlowModel<Scalar> model;
@@ -62,30 +49,69 @@ template <typename Scalar>
   return state.previous.known && found != objects.end() ? found->depth_m : Scalar(0);
 }
 
-/// Collects in scratch.samples the distances of the pairs on one object. Where it is told from its background by depth,
-/// so are the pairs: what lies behind it says nothing of it, and a pair on its silhouette may have either depth.
+/// Collects in scratch.members the flow pairs that lie on an object, and marks in scratch.mask those on its foreground:
+/// where it is told from its background by depth, so are the pairs.
 template <typename Scalar>
-void collect_object_distances(const Frame<Scalar>& frame, const TrackedBox<Scalar>& box, bool by_depth,
-                              const CoarseOptions& options, FrameState<Scalar>& state) {
+void collect_pairs(const Frame<Scalar>& frame, const TrackedBox<Scalar>& box, const FrameOptions& options,
+                   FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
   const FlowPairs<Scalar>& flow = frame.flow;
-  const bool has_depths = by_depth && !flow.previous_depths.empty();
-  scratch.samples.clear();
+  const bool by_depth =
+      options.coarse.use_depth_foreground && is_non_rigid(box.class_id, options) && !flow.previous_depths.empty();
+  scratch.members.clear();
   scratch.depths.clear();
   scratch.points.clear();
   for (std::size_t i = 0; i < flow.current.size(); ++i) {
     const Scalar x = flow.current(i, 0), y = flow.current(i, 1);
     if (!lies_on(box, frame.labels, x, y)) continue;
-    scratch.samples.push_back(state.flow_distances[i]);
+    scratch.members.push_back(static_cast<std::int32_t>(i));
     scratch.points.push_back({x, y});
-    scratch.depths.push_back(has_depths ? flow.previous_depths[i] : Scalar(0));
+    scratch.depths.push_back(by_depth ? flow.previous_depths[i] : Scalar(0));
   }
-  if (!has_depths) return;
-  scratch.mask.assign(scratch.samples.size(), char(1));
+  scratch.mask.assign(scratch.members.size(), char(1));
+  if (!by_depth) return;
   const ForegroundInput<Scalar> in{scratch.depths, scratch.points, box.box, remembered_depth(box, state)};
-  if (depth_foreground(in, options.foreground, scratch.foreground, scratch.mask).status != ForegroundStatus::ok) return;
-  for (std::size_t i = 0; i < scratch.samples.size(); ++i) {
-    if (scratch.mask[i] == 0) scratch.samples[i] = Scalar(no_distance<double>);
+  const auto foreground = depth_foreground(in, options.coarse.foreground, scratch.foreground, scratch.mask);
+  if (foreground.status != ForegroundStatus::ok) scratch.mask.assign(scratch.members.size(), char(1));
+}
+
+/// Marks in scratch.outside the flow pairs that lie on no object: outside all boxes or, where too few do, behind what
+/// is in them as well.
+template <typename Scalar>
+[[nodiscard]] FlowSupport mark_outside(const Frame<Scalar>& frame, const FrameOptions& options,
+                                       FrameState<Scalar>& state) {
+  const PointSpan<Scalar, 2>& pixels = frame.flow.current;
+  std::vector<char>& outside = state.scratch.outside;
+  outside.resize(pixels.size());
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const bool inside = std::any_of(state.boxes.begin(), state.boxes.end(), [&](const TrackedBox<Scalar>& box) {
+      return lies_on(box, frame.labels, pixels(i, 0), pixels(i, 1));
+    });
+    outside[i] = inside ? char(0) : char(1);
+  }
+  const auto found = static_cast<std::size_t>(std::count(outside.begin(), outside.end(), char(1)));
+  if (found >= options.coarse.flow.min_outside_pairs) return FlowSupport::outside_pairs;
+  outside.assign(pixels.size(), char(1));
+  for (const TrackedBox<Scalar>& box : state.boxes) {
+    collect_pairs(frame, box, options, state);
+    for (std::size_t m = 0; m < state.scratch.members.size(); ++m) {
+      if (state.scratch.mask[m] != 0) outside[static_cast<std::size_t>(state.scratch.members[m])] = char(0);
+    }
+  }
+  return FlowSupport::background_pairs;
+}
+
+/// Collects in scratch.samples the distances of the pairs on one object. What lies behind it says nothing of it, and a
+/// pair on its silhouette may have either depth.
+template <typename Scalar>
+void collect_object_distances(const Frame<Scalar>& frame, const TrackedBox<Scalar>& box, const FrameOptions& options,
+                              FrameState<Scalar>& state) {
+  FrameScratch<Scalar>& scratch = state.scratch;
+  collect_pairs(frame, box, options, state);
+  scratch.samples.clear();
+  for (std::size_t m = 0; m < scratch.members.size(); ++m) {
+    const auto i = static_cast<std::size_t>(scratch.members[m]);
+    scratch.samples.push_back(scratch.mask[m] != 0 ? state.flow_distances[i] : Scalar(no_distance<double>));
   }
 }
 
@@ -113,24 +139,26 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
                                frame.flow.previous_depths};
   const PinholeCamera<Scalar> pinhole = undistorted_camera(camera);
   const CoarseOptions& coarse = options.coarse;
-  detail::mark_outside(frame, state);
+  scratch.members.reserve(n);
+  scratch.points.reserve(n);
+  scratch.depths.reserve(n);
+  scratch.samples.reserve(n);
+  scratch.mask.reserve(n);
+  const FlowSupport support = detail::mark_outside(frame, options, state);
   const FlowModel<Scalar> model = detail::flow_model(frame, flow, pinhole, coarse.flow, state);
   report.flow_model = model.kind;
-  report.flow_support = model.support;
+  report.flow_support = model.support == FlowSupport::outside_pairs ? support : model.support;
   report.flow_status = model.status;
   report.flow_sigma_px = static_cast<double>(model.sigma_px);
   if (model.kind == FlowModelKind::none) return;
 
   state.flow_distances.resize(n);
   scratch.scratch.resize(n);
-  scratch.samples.reserve(n);
-  scratch.depths.reserve(n);
   flow_distances(model, flow, pinhole, coarse.flow, span<Scalar>(state.flow_distances));
   const ObjectProbabilityOptions scored = scaled_to_noise(coarse.object, static_cast<double>(model.sigma_px),
                                                           model.kind == FlowModelKind::fundamental ? 1 : 2);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
-    const bool by_depth = coarse.use_depth_foreground && is_non_rigid(state.boxes[b].class_id, options);
-    detail::collect_object_distances(frame, state.boxes[b], by_depth, coarse, state);
+    detail::collect_object_distances(frame, state.boxes[b], options, state);
     state.objects[b] = object_probability(scratch.samples, scored, scratch.scratch);
     if (state.objects[b].status == Status::ok) --report.unknown_objects;
   }

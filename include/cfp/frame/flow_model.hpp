@@ -17,8 +17,9 @@
 namespace cfp {
 
 struct FlowModelOptions {
-  /// Pairs outside all boxes alone support the model when there are at least this many; else all pairs do (>= 8).
-  /// People may fill the view, and then their own pairs would otherwise choose the model.
+  /// Pairs outside all boxes alone support the model when there are at least this many; else those behind what is in
+  /// the boxes do, too, and where that is too few for a two-view model, all pairs (>= 8). People may fill the view, and
+  /// then their own pairs would otherwise choose the model.
   std::size_t min_outside_pairs = 30;
   /// A camera that turns without moving, or stands still, has no fundamental matrix, but maps every static point by one
   /// homography; true: objects are judged by the distance from that (both coordinates count, not only the one across a
@@ -39,10 +40,11 @@ enum class FlowModelKind : std::uint8_t {
 };
 
 enum class FlowSupport : std::uint8_t {
-  none,           ///< no model was estimated
-  caller,         ///< the caller's motion or fundamental matrix
-  outside_pairs,  ///< the pairs outside all boxes
-  all_pairs       ///< too few of those: all pairs
+  none,              ///< no model was estimated
+  caller,            ///< the caller's motion or fundamental matrix
+  outside_pairs,     ///< the pairs outside all boxes
+  background_pairs,  ///< too few of those: those behind what is in the boxes, too
+  all_pairs          ///< too few of either: all pairs
 };
 
 template <typename Scalar>
@@ -138,7 +140,7 @@ void flow_distances(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flo
   }
 }
 
-/// What the pairs of the undistorted image are judged by, from those that `outside` marks as outside all boxes: the
+/// What the pairs of the undistorted image are judged by, from those that `outside` marks as on no object: the
 /// camera's motion if enough of them have a depth and agree, else the two-view model, for which all pairs serve where
 /// too few lie outside. The camera is that of the undistorted image. sigma_px is measured where enough pairs lie
 /// outside.

@@ -88,7 +88,7 @@ struct FrameScratch {
   std::vector<std::array<Scalar, 2>> points, undistorted_previous, undistorted_current;
   std::vector<Scalar> depths, projection, epipolar, samples, scratch;
   std::vector<std::int32_t> members;
-  std::vector<char> mask;
+  std::vector<char> mask, outside;
   std::vector<std::pair<std::int64_t, ObjectMemory>> memories;
 };
 
