@@ -1,7 +1,6 @@
 /// @file fundamental_ransac.hpp
-/// The fundamental matrix of pairs with mismatches: seeded LO-RANSAC over seven-point samples, MSAC
-/// score, robust non-linear refinement, and a refusal instead of a wrong F when a rotation, a plane or no motion
-/// explains the pairs.
+/// The fundamental matrix of pairs with mismatches: seeded LO-RANSAC over seven-point samples, MSAC score, robust
+/// non-linear refinement, and a refusal instead of a wrong F when a rotation, a plane or no motion explains the pairs.
 /// F maps a pixel of the previous image to its line in the current one, x_cur^T F x_prev = 0. Distances in pixels.
 #pragma once
 
