@@ -93,9 +93,7 @@ class PeopleScene {
     const synthetic::Stage stage;
     if (acting == Acting::walking) return synthetic::walking_script(random, person, seconds, stage);
     if (acting == Acting::sitting) return synthetic::sitting_script(random, person, seconds, stage);
-    const synthetic::Stage::Chair& chair = stage.chairs[person];
-    synthetic::Director d(chair.x + 0.42 * std::cos(chair.heading), chair.y + 0.42 * std::sin(chair.heading),
-                          chair.heading, 1, person == 0 ? 1.80 : 1.74);
+    synthetic::Director d = synthetic::seated(person, stage, 1);
     if (acting == Acting::resting || person == 1) return d.finish();
     d.wait(seconds / 2);
     d.sit(0);
