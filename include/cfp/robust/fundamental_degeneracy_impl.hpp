@@ -96,28 +96,12 @@ struct DegeneracyCheck {
     if (best.cost < candidate.cost) candidate = best;
   }
 
-  // Whether more pairs lie near their lines than the pairs up to three times as far let chance put there: the binomial
-  // tail of that has to outdo the number of seven-point samples, C(n, 7), as the best of all their F fits some
-  // mismatches, too. Source: Moisan and Stival, "A probabilistic criterion to detect rigid point matches between two
-  // images and estimate the fundamental matrix", IJCV 2004.
-  [[nodiscard]] bool stands_out() const noexcept {
-    const T limit = (std::max)(search.limit, search.noise_limit());
-    T near = 0, all = 0, n = 0;
-    for (std::size_t i = 0; i < pairs.size; ++i) {
-      n += pairs.row(5)[i];
-      near += search.distances_sq[i] <= limit ? pairs.row(5)[i] : T(0);
-      all += search.distances_sq[i] <= 9 * limit ? pairs.row(5)[i] : T(0);
-    }
-    const auto nats = [&](T part, T share) { return part > 0 ? part * std::log(part / (share * all)) : T(0); };
-    return 3 * near > all && nats(near, T(1) / 3) + nats(all - near, T(2) / 3) > 7 * std::log((n - 3) / T(3.38));
-  }
-
   // Whether the F whose noise was measured last is one: its lines explain more than chance does, without any part of
   // the image in which a person may move, too, and without any two lines of points, which leave F undetermined. Against
   // no motion and against H. least: distinct pairs it has to explain.
   [[nodiscard]] bool has_parallax(double least) noexcept {
-    if (!stands_out()) return false;
     FundamentalEvidence<T> evidence{search, scratch};
+    if (!evidence.stands_out()) return false;
     evidence.stride = (std::max)(pairs.size / PairArrays::enough, std::size_t(1));
     evidence.compare(H);
     const bool person_possible = find_homography_beside(evidence.judge().window);

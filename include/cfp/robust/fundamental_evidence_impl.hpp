@@ -52,6 +52,22 @@ struct FundamentalEvidence {
     for (std::size_t i = 0; i < pairs.size; i += stride) visit(i);
   }
 
+  // Whether more pairs lie near their lines than the pairs up to three times as far let chance put there: the binomial
+  // tail of that has to outdo the number of seven-point samples, C(n, 7), as the best of all their F fits some
+  // mismatches, too. Source: Moisan and Stival, "A probabilistic criterion to detect rigid point matches between two
+  // images and estimate the fundamental matrix", IJCV 2004.
+  [[nodiscard]] bool stands_out() const noexcept {
+    const T limit = (std::max)(search.limit, search.noise_limit());
+    T near = 0, all = 0, n = 0;
+    for (std::size_t i = 0; i < pairs.size; ++i) {
+      n += pairs.row(5)[i];
+      near += search.distances_sq[i] <= limit ? pairs.row(5)[i] : T(0);
+      all += search.distances_sq[i] <= 9 * limit ? pairs.row(5)[i] : T(0);
+    }
+    const auto nats = [&](T part, T chance) { return part > 0 ? part * std::log(part / (chance * all)) : T(0); };
+    return 3 * near > all && nats(near, T(1) / 3) + nats(all - near, T(2) / 3) > 7 * std::log((n - 3) / T(3.38));
+  }
+
   // The gains of the F whose distances were measured last. Returns how many distinct pairs F explains.
   T compare(const Matrix3<T>& H) noexcept {
     const T variance = 2 * search.noise_variance + T(1e-4) * pairs.factor * pairs.factor, s2 = 2 * variance;
