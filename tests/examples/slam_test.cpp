@@ -415,15 +415,14 @@ TEST_CASE("A detector that falls silent is noticed, and what it knew is carried 
 }
 
 TEST_CASE("A detector that is late is noticed, and what was known to move stays so meanwhile", "[slam]") {
-  struct Late final : cfp_examples::Detector {
-    Late() : Detector("late", {"person"}), in_time_((rendered() / "detections.txt").string(), {}) {}
-    cfp_examples::Detections detect(const cv::Mat& bgr, double time_s) override {
-      seen_.push_back(in_time_.detect(bgr, time_s));
-      return seen_[seen_.size() - std::min<std::size_t>(seen_.size(), 8)];
-    }
-    FileDetector in_time_;
-    std::vector<cfp_examples::Detections> seen_;
-  } detector;
+  const Sequence sequence(rendered());
+  FileDetector in_time((rendered() / "detections.txt").string(), {});
+  Stress late;
+  late.last = frames;
+  late.detections = [](std::size_t, const std::vector<cfp_examples::Detections>& seen) {
+    return seen[seen.size() - std::min<std::size_t>(seen.size(), 8)];
+  };
+  StressedDetector detector(in_time, sequence, late);
   struct Learning final : Observer {
     struct Known {
       int created_by;
@@ -452,7 +451,7 @@ TEST_CASE("A detector that is late is noticed, and what was known to move stays 
   Options options;
   options.threads = false;
   options.detector_lag.min_boxes = 8;
-  run_slam(Sequence(rendered()), detector, options, observer);
+  run_slam(sequence, detector, options, observer);
   CHECK(observer.late_frames >= 5);
   CHECK(observer.compared >= 20);
 }
