@@ -97,7 +97,7 @@ void frame(benchmark::State& state) {
   }
   state.counters["keypoints"] = keypoints;
   cfp::CalibrationWorkspace workspace;
-  state.counters["auc"] = cfp::roc_auc(k, is_static, {}, workspace).auc;
+  state.counters["auc"] = cfp::roc_auc(k, is_static, workspace).auc;
 }
 
 }  // namespace

@@ -50,7 +50,7 @@ inline CalibrationSummary summarize(const LabelledSamples& samples) {
   CalibrationSummary out;
   if (samples.probability.size() != samples.is_static.size()) return out;
   cfp::CalibrationWorkspace workspace;
-  const auto result = cfp::evaluate_calibration(samples.probability, samples.is_static, {}, workspace);
+  const auto result = cfp::evaluate_calibration(samples.probability, samples.is_static, workspace);
   out.samples = result.used;
   if (result.used == 0) return out;
   out.static_fraction = result.static_fraction;

@@ -56,7 +56,7 @@
   CFP_LAYOUT(cfp::CalibrationWorkspace, ranked)                          \
   CFP_LAYOUT(cfp::AucResult, status)                                     \
   CFP_LAYOUT(cfp::ReliabilityBin, static_fraction)                       \
-  CFP_LAYOUT(cfp::CalibrationResult<10>, status)                         \
+  CFP_LAYOUT(cfp::CalibrationResult<10>, table)                          \
   CFP_LAYOUT(cfp::ErrorStatistics, count)                                \
   CFP_LAYOUT(cfp::StampedPose<float>, T_world_cam)                       \
   CFP_LAYOUT(cfp::StampedPose<double>, T_world_cam)                      \

@@ -11,18 +11,17 @@ namespace {
 
 template <typename Scalar>
 struct Samples {
-  std::vector<Scalar> probability, weight;
+  std::vector<Scalar> probability;
   std::vector<char> is_static;
 };
 
 /// Probabilities on a grid of 1 / levels, so that ties abound; labels that agree with them.
 template <typename Scalar>
-Samples<Scalar> random_samples(cfp::Random& random, std::size_t n, std::uint32_t levels, bool weighted) {
+Samples<Scalar> random_samples(cfp::Random& random, std::size_t n, std::uint32_t levels) {
   Samples<Scalar> s;
   for (std::size_t i = 0; i < n; ++i) {
     s.probability.push_back(static_cast<Scalar>(random.index(levels + 1)) / static_cast<Scalar>(levels));
     s.is_static.push_back(random.uniform() < static_cast<double>(s.probability.back()) ? 1 : 0);
-    if (weighted) s.weight.push_back(static_cast<Scalar>(random.index(4)) / Scalar(2));
   }
   return s;
 }
@@ -33,9 +32,8 @@ double auc_by_pairs(const Samples<Scalar>& s) {
   for (std::size_t i = 0; i < s.probability.size(); ++i) {
     for (std::size_t j = 0; j < s.probability.size(); ++j) {
       if (s.is_static[i] == 0 || s.is_static[j] != 0) continue;
-      const double w = s.weight.empty() ? 1 : static_cast<double>(s.weight[i]) * static_cast<double>(s.weight[j]);
-      pairs += w;
-      wins += w * (s.probability[i] > s.probability[j] ? 1 : s.probability[i] == s.probability[j] ? 0.5 : 0);
+      pairs += 1;
+      wins += s.probability[i] > s.probability[j] ? 1 : s.probability[i] == s.probability[j] ? 0.5 : 0;
     }
   }
   return wins / pairs;
@@ -43,19 +41,15 @@ double auc_by_pairs(const Samples<Scalar>& s) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("AUC equals the count over all pairs, ties and weights included", "[evaluation]", float, double) {
+TEMPLATE_TEST_CASE("AUC equals the count over all pairs, ties included", "[evaluation]", float, double) {
   cfp::Random random(51, "auc");
   cfp::CalibrationWorkspace workspace;
   for (int round = 0; round < 100; ++round) {
-    const auto s = random_samples<TestType>(random, 20 + random.index(60), 1 + random.index(30), round % 2 == 0);
-    const auto result = cfp::roc_auc(s.probability, s.is_static, s.weight, workspace);
+    const auto s = random_samples<TestType>(random, 20 + random.index(60), 1 + random.index(30));
+    const auto result = cfp::roc_auc(s.probability, s.is_static, workspace);
     REQUIRE(result.status == cfp::Status::ok);
     CHECK_THAT(result.auc, WithinAbs(auc_by_pairs(s), 1e-12));
-    double sums[2] = {0, 0};
-    for (std::size_t i = 0; i < s.is_static.size(); ++i)
-      sums[s.is_static[i] != 0 ? 1 : 0] += s.weight.empty() ? 1 : static_cast<double>(s.weight[i]);
-    CHECK_THAT(result.moving_weight, WithinAbs(sums[0], 1e-12));
-    CHECK_THAT(result.static_weight, WithinAbs(sums[1], 1e-12));
+    CHECK((result.used == s.probability.size() && result.skipped == 0));
   }
 }
 
@@ -63,86 +57,62 @@ TEST_CASE("Perfect, reversed and constant scores have AUC 1, 0 and one half", "[
   cfp::CalibrationWorkspace workspace;
   const std::vector<double> rising{0.1, 0.2, 0.8, 0.9}, falling{9, 8, -2, -3}, same(4, 0.3);
   const std::vector<char> labels{0, 0, 1, 1};
-  const auto auc = [&](const std::vector<double>& scores) { return cfp::roc_auc(scores, labels, {}, workspace).auc; };
+  const auto auc = [&](const std::vector<double>& scores) { return cfp::roc_auc(scores, labels, workspace).auc; };
   CHECK(auc(rising) == 1);
   CHECK(auc(falling) == 0);
   CHECK(auc(same) == 0.5);
 }
 
-TEMPLATE_TEST_CASE("Brier, log loss, ECE and the table equal those by hand", "[evaluation]", float, double) {
-  const Samples<TestType> s{{TestType(0.25), TestType(0.25), TestType(0.75), TestType(1)}, {1, 3, 2, 2}, {0, 1, 1, 1}};
+TEMPLATE_TEST_CASE("Brier, ECE and the table equal those by hand", "[evaluation]", float, double) {
+  constexpr TestType low(0.25), high(0.75);
+  const Samples<TestType> s{{low, low, low, low, high, high, 1, 1}, {0, 1, 1, 1, 1, 1, 1, 1}};
   cfp::CalibrationWorkspace workspace;
-  const auto r = cfp::evaluate_calibration<4>(s.probability, s.is_static, s.weight, workspace);
+  const auto r = cfp::evaluate_calibration<4>(s.probability, s.is_static, workspace);
   CHECK(r.status == cfp::Status::ok);
-  CHECK(r.used == 4);
+  CHECK(r.used == 8);
   CHECK_THAT(r.brier, WithinAbs((1 * 0.0625 + 3 * 0.5625 + 2 * 0.0625) / 8, 1e-15));
-  CHECK_THAT(r.log_loss, WithinAbs(-(std::log(0.75) + 3 * std::log(0.25) + 2 * std::log(0.75)) / 8, 1e-12));
   CHECK_THAT(r.static_fraction, WithinAbs(7.0 / 8, 1e-15));
   CHECK(r.table[0].count == 0);
-  CHECK(r.table[1].count == 2);
-  CHECK_THAT(r.table[1].weight, WithinAbs(4, 1e-12));
+  CHECK(r.table[1].count == 4);
   CHECK_THAT(r.table[1].static_fraction, WithinAbs(0.75, 1e-12));
-  CHECK(r.table[3].count == 2);  // 0.75 opens the last bin and 1 belongs to it
+  CHECK(r.table[3].count == 4);  // 0.75 opens the last bin and 1 belongs to it
   CHECK_THAT(r.table[3].mean_probability, WithinAbs(0.875, 1e-12));
   CHECK_THAT(r.expected_calibration_error, WithinAbs(0.5 * 0.5 + 0.5 * 0.125, 1e-12));
-  CHECK_THAT(r.largest_calibration_error, WithinAbs(0.5, 1e-12));
   CHECK_THAT(r.auc, WithinAbs(auc_by_pairs(s), 1e-12));
 }
 
 TEST_CASE("Labels drawn from the probabilities are found calibrated, squashed ones are not", "[evaluation]") {
   cfp::Random random(52, "calibrated");
-  auto s = random_samples<double>(random, 200000, 1000, false);
+  auto s = random_samples<double>(random, 200000, 1000);
   cfp::CalibrationWorkspace workspace;
-  const auto good = cfp::evaluate_calibration(s.probability, s.is_static, s.weight, workspace);
+  const auto good = cfp::evaluate_calibration(s.probability, s.is_static, workspace);
   CHECK(good.expected_calibration_error < 0.005);
   CHECK_THAT(good.brier, WithinAbs(1.0 / 6, 0.003));  // E p (1 - p) for uniform p
   for (double& p : s.probability) p = 0.5 + 0.25 * (p - 0.5);
-  const auto squashed = cfp::evaluate_calibration(s.probability, s.is_static, s.weight, workspace);
+  const auto squashed = cfp::evaluate_calibration(s.probability, s.is_static, workspace);
   CHECK(squashed.expected_calibration_error > 0.15);
   CHECK_THAT(squashed.auc, WithinAbs(good.auc, 1e-12));
 }
 
-TEST_CASE("Whole-number weights act as repetitions", "[evaluation]") {
-  cfp::Random random(53, "repeat");
-  Samples<double> weighted = random_samples<double>(random, 80, 20, false), repeated;
-  for (std::size_t i = 0; i < weighted.probability.size(); ++i) {
-    const std::uint32_t times = random.index(4);
-    weighted.weight.push_back(times);
-    repeated.probability.insert(repeated.probability.end(), times, weighted.probability[i]);
-    repeated.is_static.insert(repeated.is_static.end(), times, weighted.is_static[i]);
-  }
-  cfp::CalibrationWorkspace workspace;
-  const auto a = cfp::evaluate_calibration(weighted.probability, weighted.is_static, weighted.weight, workspace);
-  const auto b = cfp::evaluate_calibration(repeated.probability, repeated.is_static, repeated.weight, workspace);
-  CHECK_THAT(a.auc, WithinAbs(b.auc, 1e-12));
-  CHECK_THAT(a.brier, WithinAbs(b.brier, 1e-12));
-  CHECK_THAT(a.log_loss, WithinAbs(b.log_loss, 1e-12));
-  CHECK_THAT(a.expected_calibration_error, WithinAbs(b.expected_calibration_error, 1e-12));
-}
-
-TEMPLATE_TEST_CASE("Hostile probabilities and weights are skipped, and everything stays finite", "[evaluation]", float,
-                   double) {
+TEMPLATE_TEST_CASE("Hostile probabilities are skipped, and everything stays finite", "[evaluation]", float, double) {
   constexpr TestType nan = std::numeric_limits<TestType>::quiet_NaN(), inf = std::numeric_limits<TestType>::infinity();
   constexpr TestType huge = (std::numeric_limits<TestType>::max)(), tiny = std::numeric_limits<TestType>::denorm_min();
-  const Samples<TestType> s{
-      {nan, inf, -1, 2, TestType(0.5), TestType(0.5), TestType(0.5), 0, 1, 0, tiny, TestType(0.7)},
-      {1, 1, 1, 1, nan, -1, inf, huge, huge, huge, tiny, 0},
-      {0, 1, 0, 1, 0, 1, 0, 1, 0, 0, 1, 1}};
+  const Samples<TestType> s{{nan, inf, -inf, -1, 2, huge, -tiny, 0, 1, 0, tiny}, {0, 1, 0, 1, 0, 1, 0, 1, 0, 0, 1}};
   cfp::CalibrationWorkspace workspace;
-  const auto r = cfp::evaluate_calibration(s.probability, s.is_static, s.weight, workspace);
+  const auto r = cfp::evaluate_calibration(s.probability, s.is_static, workspace);
   CHECK(r.skipped == 7);
   CHECK(r.used == 4);
-  for (const double x : {r.auc, r.brier, r.expected_calibration_error, r.largest_calibration_error, r.static_fraction})
-    CHECK((x >= 0 && x <= 1));
-  CHECK((r.log_loss >= 0 && r.log_loss < 34.6));
-  for (const auto& bin : r.table)
-    CHECK((cfp::is_finite(bin.weight) && bin.static_fraction >= 0 && bin.static_fraction <= 1));
+  for (const double x : {r.auc, r.brier, r.expected_calibration_error, r.static_fraction}) CHECK((x >= 0 && x <= 1));
+  for (const auto& bin : r.table) {
+    CHECK((bin.mean_probability >= 0 && bin.mean_probability <= 1));
+    CHECK((bin.static_fraction >= 0 && bin.static_fraction <= 1));
+  }
 
-  const auto none = cfp::evaluate_calibration(std::vector<TestType>(), {}, {}, workspace);
+  const auto none = cfp::evaluate_calibration(std::vector<TestType>(), {}, workspace);
   CHECK(none.status == cfp::Status::not_enough_data);
   CHECK(none.auc == 0.5);
-  const Samples<TestType> one{{TestType(0.25)}, {}, {1}};
-  const auto single = cfp::evaluate_calibration(one.probability, one.is_static, one.weight, workspace);
+  const Samples<TestType> one{{TestType(0.25)}, {1}};
+  const auto single = cfp::evaluate_calibration(one.probability, one.is_static, workspace);
   CHECK(single.status == cfp::Status::degenerate);
   CHECK(single.auc == 0.5);
   CHECK(single.brier == 0.5625);
@@ -150,9 +120,9 @@ TEMPLATE_TEST_CASE("Hostile probabilities and weights are skipped, and everythin
 
 TEST_CASE("A second evaluation of the same size allocates nothing", "[evaluation]") {
   cfp::Random random(54, "allocation");
-  const auto s = random_samples<float>(random, 500, 100, true);
+  const auto s = random_samples<float>(random, 500, 100);
   cfp::CalibrationWorkspace workspace;
-  const auto work = [&] { (void)cfp::evaluate_calibration(s.probability, s.is_static, s.weight, workspace); };
+  const auto work = [&] { (void)cfp::evaluate_calibration(s.probability, s.is_static, workspace); };
   work();
   CHECK(cfp_test::allocations_in(work) == 0);
 }
