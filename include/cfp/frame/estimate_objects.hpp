@@ -41,78 +41,69 @@ template <typename Scalar>
   return model;
 }
 
-/// The depth of the box's object in the frame before, 0 where it is not known.
+/// Marks in scratch.mask which of scratch.members, indices of pixels and depths, lie on the object of their box: all
+/// where there are no depths, and where these cannot tell.
 template <typename Scalar>
-[[nodiscard]] Scalar remembered_depth(const TrackedBox<Scalar>& box, const FrameState<Scalar>& state) noexcept {
-  const auto& objects = state.previous.object_depths;
-  const auto found = std::find_if(objects.begin(), objects.end(), [&](const auto& o) { return o.id == box.id; });
-  return state.previous.known && found != objects.end() ? found->depth_m : Scalar(0);
-}
-
-/// Collects in scratch.members the flow pairs that lie on an object, and marks in scratch.mask those on its foreground:
-/// where it is told from its background by depth, so are the pairs.
-template <typename Scalar>
-void collect_pairs(const Frame<Scalar>& frame, const TrackedBox<Scalar>& box, const FrameOptions& options,
-                   FrameState<Scalar>& state) {
+ForegroundResult separate_members(const TrackedBox<Scalar>& box, const PointSpan<Scalar, 2>& pixels,
+                                  span<const Scalar> depths, const FrameOptions& options, FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
-  const FlowPairs<Scalar>& flow = frame.flow;
-  const bool by_depth =
-      options.coarse.use_depth_foreground && is_non_rigid(box.class_id, options) && !flow.previous_depths.empty();
-  scratch.members.clear();
+  scratch.mask.assign(scratch.members.size(), char(1));
+  if (depths.empty()) return {};
   scratch.depths.clear();
   scratch.points.clear();
-  for (std::size_t i = 0; i < flow.current.size(); ++i) {
-    const Scalar x = flow.current(i, 0), y = flow.current(i, 1);
-    if (!lies_on(box, frame.labels, x, y)) continue;
-    scratch.members.push_back(static_cast<std::int32_t>(i));
-    scratch.points.push_back({x, y});
-    scratch.depths.push_back(by_depth ? flow.previous_depths[i] : Scalar(0));
+  for (const std::int32_t member : scratch.members) {
+    const auto i = static_cast<std::size_t>(member);
+    scratch.depths.push_back(depths[i]);
+    scratch.points.push_back({pixels(i, 0), pixels(i, 1)});
   }
-  scratch.mask.assign(scratch.members.size(), char(1));
-  if (!by_depth) return;
-  const ForegroundInput<Scalar> in{scratch.depths, scratch.points, box.box, remembered_depth(box, state)};
-  const auto foreground = depth_foreground(in, options.coarse.foreground, scratch.foreground, scratch.mask);
-  if (foreground.status != ForegroundStatus::ok) scratch.mask.assign(scratch.members.size(), char(1));
+  ForegroundInput<Scalar> in{scratch.depths, scratch.points, box.box};
+  const auto& objects = state.previous.object_depths;
+  const auto found = std::find_if(objects.begin(), objects.end(), [&](const auto& o) { return o.id == box.id; });
+  if (state.previous.known && found != objects.end()) in.previous_depth_m = found->depth_m;
+  return depth_foreground(in, options.coarse.foreground, scratch.foreground, scratch.mask);
+}
+
+/// Sets scratch.pair_label: per box and flow pair, how the pair stands to the object of that box. Where the object is
+/// told from its background by depth, so are the pairs.
+template <typename Scalar>
+void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
+  FrameScratch<Scalar>& scratch = state.scratch;
+  const FlowPairs<Scalar>& flow = frame.flow;
+  const std::size_t n = flow.current.size();
+  scratch.pair_label.assign(state.boxes.size() * n, KeypointLabel::outside);
+  for (std::size_t b = 0; b < state.boxes.size(); ++b) {
+    const TrackedBox<Scalar>& box = state.boxes[b];
+    scratch.members.clear();
+    for (std::size_t i = 0; i < n; ++i) {
+      if (lies_on(box, frame.labels, flow.current(i, 0), flow.current(i, 1)))
+        scratch.members.push_back(static_cast<std::int32_t>(i));
+    }
+    const bool by_depth = options.coarse.use_depth_foreground && is_non_rigid(box.class_id, options);
+    separate_members(box, flow.current, by_depth ? flow.previous_depths : span<const Scalar>(), options, state);
+    for (std::size_t m = 0; m < scratch.members.size(); ++m)
+      scratch.pair_label[b * n + static_cast<std::size_t>(scratch.members[m])] =
+          scratch.mask[m] != 0 ? KeypointLabel::foreground : KeypointLabel::background;
+  }
 }
 
 /// Marks in scratch.outside the flow pairs that lie on no object: outside all boxes or, where too few do, behind what
 /// is in them as well.
 template <typename Scalar>
-[[nodiscard]] FlowSupport mark_outside(const Frame<Scalar>& frame, const FrameOptions& options,
-                                       FrameState<Scalar>& state) {
-  const PointSpan<Scalar, 2>& pixels = frame.flow.current;
-  std::vector<char>& outside = state.scratch.outside;
-  outside.resize(pixels.size());
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    const bool inside = std::any_of(state.boxes.begin(), state.boxes.end(), [&](const TrackedBox<Scalar>& box) {
-      return lies_on(box, frame.labels, pixels(i, 0), pixels(i, 1));
-    });
-    outside[i] = inside ? char(0) : char(1);
-  }
-  const auto found = static_cast<std::size_t>(std::count(outside.begin(), outside.end(), char(1)));
-  if (found >= options.coarse.flow.min_outside_pairs) return FlowSupport::outside_pairs;
-  outside.assign(pixels.size(), char(1));
-  for (const TrackedBox<Scalar>& box : state.boxes) {
-    collect_pairs(frame, box, options, state);
-    for (std::size_t m = 0; m < state.scratch.members.size(); ++m) {
-      if (state.scratch.mask[m] != 0) outside[static_cast<std::size_t>(state.scratch.members[m])] = char(0);
+[[nodiscard]] FlowSupport mark_outside(std::size_t pairs, const FlowModelOptions& options,
+                                       FrameScratch<Scalar>& scratch) {
+  for (const FlowSupport support : {FlowSupport::outside_pairs, FlowSupport::background_pairs}) {
+    scratch.outside.assign(pairs, char(1));
+    for (std::size_t box = 0; box < scratch.pair_label.size(); box += pairs) {
+      for (std::size_t i = 0; i < pairs; ++i) {
+        const KeypointLabel label = scratch.pair_label[box + i];
+        const bool behind = label == KeypointLabel::background && support == FlowSupport::background_pairs;
+        if (label != KeypointLabel::outside && !behind) scratch.outside[i] = char(0);
+      }
     }
+    const auto found = std::count(scratch.outside.begin(), scratch.outside.end(), char(1));
+    if (static_cast<std::size_t>(found) >= options.min_outside_pairs) return support;
   }
   return FlowSupport::background_pairs;
-}
-
-/// Collects in scratch.samples the distances of the pairs on one object. What lies behind it says nothing of it, and a
-/// pair on its silhouette may have either depth.
-template <typename Scalar>
-void collect_object_distances(const Frame<Scalar>& frame, const TrackedBox<Scalar>& box, const FrameOptions& options,
-                              FrameState<Scalar>& state) {
-  FrameScratch<Scalar>& scratch = state.scratch;
-  collect_pairs(frame, box, options, state);
-  scratch.samples.clear();
-  for (std::size_t m = 0; m < scratch.members.size(); ++m) {
-    const auto i = static_cast<std::size_t>(scratch.members[m]);
-    scratch.samples.push_back(scratch.mask[m] != 0 ? state.flow_distances[i] : Scalar(no_distance<double>));
-  }
 }
 
 }  // namespace CFP_ISA
@@ -144,7 +135,8 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   scratch.depths.reserve(n);
   scratch.samples.reserve(n);
   scratch.mask.reserve(n);
-  const FlowSupport support = detail::mark_outside(frame, options, state);
+  detail::label_pairs(frame, options, state);
+  const FlowSupport support = detail::mark_outside(n, coarse.flow, scratch);
   const FlowModel<Scalar> model = detail::flow_model(frame, flow, pinhole, coarse.flow, state);
   report.flow_model = model.kind;
   report.flow_support = model.support == FlowSupport::outside_pairs ? support : model.support;
@@ -158,7 +150,12 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   const ObjectProbabilityOptions scored = scaled_to_noise(coarse.object, static_cast<double>(model.sigma_px),
                                                           model.kind == FlowModelKind::fundamental ? 1 : 2);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
-    detail::collect_object_distances(frame, state.boxes[b], options, state);
+    // What lies behind an object says nothing of it, and a pair on its silhouette may have either depth.
+    scratch.samples.clear();
+    for (std::size_t i = 0; i < n; ++i) {
+      if (scratch.pair_label[b * n + i] == KeypointLabel::foreground)
+        scratch.samples.push_back(state.flow_distances[i]);
+    }
     state.objects[b] = object_probability(scratch.samples, scored, scratch.scratch);
     if (state.objects[b].status == Status::ok) --report.unknown_objects;
   }

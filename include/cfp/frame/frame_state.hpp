@@ -89,6 +89,7 @@ struct FrameScratch {
   std::vector<Scalar> depths, projection, epipolar, samples, scratch;
   std::vector<std::int32_t> members;
   std::vector<char> mask, outside;
+  std::vector<KeypointLabel> pair_label;
   std::vector<std::pair<std::int64_t, ObjectMemory>> memories;
 };
 

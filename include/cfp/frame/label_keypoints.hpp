@@ -30,25 +30,6 @@ bool collect_members(const Frame<Scalar>& frame, const TrackedBox<Scalar>& box, 
   return by_index || (!frame.labels.empty() && !box.compensated());
 }
 
-/// Marks in scratch.mask which of the members lie on their object, and remembers its depth for the next frame. Returns
-/// whether the depths could tell.
-template <typename Scalar>
-bool separate_foreground(const TrackedBox<Scalar>& box, const CoarseOptions& options, FrameState<Scalar>& state) {
-  FrameScratch<Scalar>& scratch = state.scratch;
-  if (state.current.depths.empty()) return false;
-  scratch.depths.clear();
-  scratch.points.clear();
-  for (const std::int32_t i : scratch.members) {
-    scratch.depths.push_back(state.current.depths[static_cast<std::size_t>(i)]);
-    scratch.points.push_back(state.current.keypoints[static_cast<std::size_t>(i)]);
-  }
-  const ForegroundInput<Scalar> in{scratch.depths, scratch.points, box.box, remembered_depth(box, state)};
-  const ForegroundResult result = depth_foreground(in, options.foreground, scratch.foreground, scratch.mask);
-  if (result.status != ForegroundStatus::ok) return false;
-  state.current.object_depths.push_back({box.id, static_cast<Scalar>(result.depth_m)});
-  return true;
-}
-
 /// Sets state.flow_probability: the score of the flow pair next to the keypoint, among the pairs in its box. Only the
 /// camera's motion judges a pair with depth well enough for that; after estimate_objects.
 template <typename Scalar>
@@ -102,10 +83,15 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
   scratch.mask.reserve(state.size());
   const Scalar threshold = static_cast<Scalar>(options.object_threshold);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
-    const bool segmented = detail::collect_members(frame, state.boxes[b], state);
-    scratch.mask.assign(scratch.members.size(), char(1));
-    if (!segmented && is_non_rigid(state.boxes[b].class_id, options) && options.coarse.use_depth_foreground &&
-        !detail::separate_foreground(state.boxes[b], options.coarse, state))
+    const TrackedBox<Scalar>& box = state.boxes[b];
+    const bool segmented = detail::collect_members(frame, box, state);
+    const bool by_depth = !segmented && options.coarse.use_depth_foreground && is_non_rigid(box.class_id, options);
+    const ForegroundResult separated = detail::separate_members(
+        box, PointSpan<Scalar, 2>(state.current.keypoints),
+        by_depth ? span<const Scalar>(state.current.depths) : span<const Scalar>(), options, state);
+    if (separated.status == ForegroundStatus::ok)
+      state.current.object_depths.push_back({box.id, static_cast<Scalar>(separated.depth_m)});
+    else if (by_depth)
       ++report.undecided_foregrounds;
 
     const Scalar o = static_cast<Scalar>(state.objects[b].static_probability);
