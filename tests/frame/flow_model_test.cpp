@@ -66,6 +66,14 @@ TEST_CASE("The measured noise is kept within its bounds", "[frame]") {
   CHECK(room.model(options).sigma_px == 0.6);
 }
 
+TEST_CASE("Without a model no noise is measured", "[frame]") {
+  cfp::FlowModelOptions options;
+  options.use_rotation_homography = false;
+  const cfp::FlowModel<double> turning = Room(motion(0, 0.02), 0.2, 1).model(options);
+  CHECK(turning.kind == cfp::FlowModelKind::none);
+  CHECK(turning.sigma_px == 0);
+}
+
 TEST_CASE("Too few pairs outside the boxes: all support the model, and no noise is measured", "[frame]") {
   Room room(motion(0.1, 0.02), 0.2, 6);
   for (const std::size_t outside : {30U, 29U}) {

@@ -94,7 +94,7 @@ FlowModel<Scalar> estimate_two_view_model(const FlowPairs<Scalar>& flow, span<co
   return model;
 }
 
-/// Measures the noise of the pairs marked in `outside` under the model.
+/// Measures the noise of the pairs marked in `outside` under the model, if enough of them have a distance.
 template <typename Scalar>
 void measure_sigma(const FlowPairs<Scalar>& flow, span<const char> outside, const PinholeCamera<Scalar>& camera,
                    const FlowModelOptions& options, FlowModel<Scalar>& model, std::vector<Scalar>& distances) {
@@ -102,7 +102,7 @@ void measure_sigma(const FlowPairs<Scalar>& flow, span<const char> outside, cons
   flow_distances(model, flow, camera, options, span<Scalar>(distances));
   std::size_t kept = 0;
   for (std::size_t i = 0; i < outside.size(); ++i) {
-    if (outside[i] != 0) distances[kept++] = distances[i];
+    if (outside[i] != 0 && has_distance(distances[i])) distances[kept++] = distances[i];
   }
   if (kept < options.min_outside_pairs) return;
   const Scalar sigma =
