@@ -22,47 +22,30 @@ namespace cfp {
 namespace detail {
 inline namespace CFP_ISA {
 
-// cv::Mat::at checks in debug builds by calling the library; the address arithmetic does not.
-template <typename T>
-[[nodiscard]] T matrix_element(const cv::Mat& matrix, int row, int column) noexcept {
-  T value;
-  std::memcpy(
-      &value,
-      matrix.data + matrix.step.p[0] * static_cast<std::size_t>(row) + sizeof(T) * static_cast<std::size_t>(column),
-      sizeof(T));
-  return value;
-}
-
 [[nodiscard]] inline bool is_matrix(const cv::Mat& matrix) noexcept {
   return matrix.dims == 2 && matrix.data != nullptr && matrix.rows > 0 && matrix.cols > 0;
 }
-
-// An element of a CV_32F or CV_64F matrix.
-[[nodiscard]] inline double real_element(const cv::Mat& matrix, int row, int column) noexcept {
-  return matrix.type() == CV_32FC1 ? static_cast<double>(matrix_element<float>(matrix, row, column))
-                                   : matrix_element<double>(matrix, row, column);
-}
-
 [[nodiscard]] inline bool is_real_matrix(const cv::Mat& matrix) noexcept {
   return is_matrix(matrix) && (matrix.type() == CV_32FC1 || matrix.type() == CV_64FC1);
 }
+[[nodiscard]] inline bool is_pose_matrix(const cv::Mat& matrix) noexcept {
+  return is_real_matrix(matrix) && matrix.cols == 4 && (matrix.rows == 4 || matrix.rows == 3);
+}
 
-template <typename T>
-bool sample_depth_of(const cv::Mat& depth, const PointSpan<float, 2>& pixels, double metres_per_unit,
-                     span<float> depth_m) noexcept {
-  bool any = false;
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    depth_m[i] = -1.0F;
-    // Compared before the conversion to int: NaN and values beyond int take the failing branch.
-    const double column = static_cast<double>(pixels(i, 0)) + 0.5, row = static_cast<double>(pixels(i, 1)) + 0.5;
-    if (!(column >= 0 && column < depth.cols && row >= 0 && row < depth.rows)) continue;
-    const double metres = metres_per_unit * static_cast<double>(matrix_element<T>(depth, static_cast<int>(row),
-                                                                                  static_cast<int>(column)));
-    if (!(metres > 0 && metres <= static_cast<double>((std::numeric_limits<float>::max)()))) continue;
-    depth_m[i] = static_cast<float>(metres);
-    any = any || depth_m[i] > 0;
-  }
-  return any;
+// cv::Mat::at checks in debug builds by calling the library; the address arithmetic does not.
+[[nodiscard]] inline unsigned char* element_address(const cv::Mat& matrix, int row, int column) noexcept {
+  return matrix.data + matrix.step.p[0] * static_cast<std::size_t>(row) +
+         matrix.step.p[1] * static_cast<std::size_t>(column);
+}
+
+// An element of a CV_16U, CV_32F or CV_64F matrix.
+[[nodiscard]] inline double element(const cv::Mat& matrix, int row, int column) noexcept {
+  const auto read_as = [&](auto value) {
+    std::memcpy(&value, element_address(matrix, row, column), sizeof(value));
+    return static_cast<double>(value);
+  };
+  if (matrix.type() == CV_16UC1) return read_as(std::uint16_t());
+  return matrix.type() == CV_32FC1 ? read_as(float()) : read_as(double());
 }
 
 }  // namespace CFP_ISA
@@ -79,23 +62,21 @@ inline namespace CFP_ISA {
 inline Status sample_depth(const cv::Mat& depth, const PointSpan<float, 2>& pixels, double metres_per_unit,
                            span<float> depth_m) noexcept {
   CFP_ASSERT(depth_m.size() == pixels.size());
-  const int type = detail::is_matrix(depth) && metres_per_unit > 0 && is_finite(metres_per_unit) ? depth.type() : -1;
-  bool any = false;
-  switch (type) {
-    case CV_16UC1:
-      any = detail::sample_depth_of<unsigned short>(depth, pixels, metres_per_unit, depth_m);
-      break;
-    case CV_32FC1:
-      any = detail::sample_depth_of<float>(depth, pixels, metres_per_unit, depth_m);
-      break;
-    case CV_64FC1:
-      any = detail::sample_depth_of<double>(depth, pixels, metres_per_unit, depth_m);
-      break;
-    default:
-      for (float& metres : depth_m) metres = -1.0F;
-      return Status::invalid_input;
+  for (float& metres : depth_m) metres = -1.0F;
+  if (!detail::is_real_matrix(depth) && !(detail::is_matrix(depth) && depth.type() == CV_16UC1))
+    return Status::invalid_input;
+  if (!(metres_per_unit > 0 && is_finite(metres_per_unit))) return Status::invalid_input;
+  Status status = Status::not_enough_data;
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    // Compared before the conversion to int: NaN and values beyond int take the failing branch.
+    const double column = static_cast<double>(pixels(i, 0)) + 0.5, row = static_cast<double>(pixels(i, 1)) + 0.5;
+    if (!(column >= 0 && column < depth.cols && row >= 0 && row < depth.rows)) continue;
+    const double metres = metres_per_unit * detail::element(depth, static_cast<int>(row), static_cast<int>(column));
+    if (!(metres > 0 && metres <= static_cast<double>((std::numeric_limits<float>::max)()))) continue;
+    depth_m[i] = static_cast<float>(metres);
+    if (depth_m[i] > 0) status = Status::ok;
   }
-  return any ? Status::ok : Status::not_enough_data;
+  return status;
 }
 
 /// A pose from the upper 3x4 part of a 4x4 or 3x4 matrix, CV_32F or CV_64F (ORB-SLAM2's Tcw is T_cam_world). The
@@ -103,12 +84,11 @@ inline Status sample_depth(const cv::Mat& depth, const PointSpan<float, 2>& pixe
 /// type, an element that is not finite, a reflection, or a rotation part R with an element of R R^T - I beyond 0.01.
 template <typename Scalar>
 Status to_se3(const cv::Mat& matrix, SE3<Scalar>& pose) noexcept {
-  if (!detail::is_real_matrix(matrix) || matrix.cols != 4 || (matrix.rows != 4 && matrix.rows != 3))
-    return Status::invalid_input;
+  if (!detail::is_pose_matrix(matrix)) return Status::invalid_input;
   SE3<double> read;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 4; ++column) {
-      const double value = detail::real_element(matrix, row, column);
+      const double value = detail::element(matrix, row, column);
       if (!is_finite(static_cast<Scalar>(value))) return Status::invalid_input;
       (column < 3 ? read.rotation(row, column) : read.translation[row]) = value;
     }
@@ -128,29 +108,23 @@ template <typename Scalar>
                                RadialTangentialCamera<Scalar>& camera) noexcept {
   if (!detail::is_real_matrix(camera_matrix) || camera_matrix.rows != 3 || camera_matrix.cols != 3)
     return Status::invalid_input;
-  double values[9] = {detail::real_element(camera_matrix, 0, 0), detail::real_element(camera_matrix, 1, 1),
-                      detail::real_element(camera_matrix, 0, 2), detail::real_element(camera_matrix, 1, 2)};
+  double values[9] = {detail::element(camera_matrix, 0, 0), detail::element(camera_matrix, 1, 1),
+                      detail::element(camera_matrix, 0, 2), detail::element(camera_matrix, 1, 2)};
   if (distortion.data != nullptr) {  // empty() is a call of the library
     const int count = distortion.rows * distortion.cols;
     if (!detail::is_real_matrix(distortion) || (distortion.rows != 1 && distortion.cols != 1))
       return Status::invalid_input;
     if (count != 4 && count != 5) return Status::invalid_input;
     for (int i = 0; i < count; ++i)
-      values[4 + i] = detail::real_element(distortion, distortion.rows == 1 ? 0 : i, distortion.rows == 1 ? i : 0);
+      values[4 + i] = detail::element(distortion, distortion.rows == 1 ? 0 : i, distortion.rows == 1 ? i : 0);
   }
   for (const double value : values) {
     if (!is_finite(static_cast<Scalar>(value))) return Status::invalid_input;
   }
-  if (!(values[0] > 0 && values[1] > 0) || detail::real_element(camera_matrix, 0, 1) != 0) return Status::invalid_input;
-  camera.fx = static_cast<Scalar>(values[0]);
-  camera.fy = static_cast<Scalar>(values[1]);
-  camera.cx = static_cast<Scalar>(values[2]);
-  camera.cy = static_cast<Scalar>(values[3]);
-  camera.k1 = static_cast<Scalar>(values[4]);
-  camera.k2 = static_cast<Scalar>(values[5]);
-  camera.p1 = static_cast<Scalar>(values[6]);
-  camera.p2 = static_cast<Scalar>(values[7]);
-  camera.k3 = static_cast<Scalar>(values[8]);
+  if (!(values[0] > 0 && values[1] > 0) || detail::element(camera_matrix, 0, 1) != 0) return Status::invalid_input;
+  const RadialTangentialCamera<double> read{values[0], values[1], values[2], values[3], values[4],
+                                            values[5], values[6], values[7], values[8]};
+  camera = read.template cast<Scalar>();
   return Status::ok;
 }
 
@@ -159,22 +133,18 @@ template <typename Scalar>
 /// its elements with its shallow copies, as always in OpenCV.
 template <typename Scalar>
 Status write_pose(const SE3<Scalar>& pose, cv::Mat& matrix) noexcept {
-  if (!detail::is_matrix(matrix) || matrix.cols != 4 || (matrix.rows != 4 && matrix.rows != 3))
-    return Status::invalid_input;
-  const bool is_float = matrix.type() == CV_32FC1;
-  if (!is_float && matrix.type() != CV_64FC1) return Status::invalid_input;
+  if (!detail::is_pose_matrix(matrix)) return Status::invalid_input;
   for (int row = 0; row < matrix.rows; ++row) {
     for (int column = 0; column < 4; ++column) {
       const Scalar value =
           row == 3 ? Scalar(column == 3 ? 1 : 0) : (column < 3 ? pose.rotation(row, column) : pose.translation[row]);
-      unsigned char* const row_start = matrix.data + matrix.step.p[0] * static_cast<std::size_t>(row);
-      const auto as_float = static_cast<float>(value);
-      const auto as_double = static_cast<double>(value);
-      if (is_float) {
-        std::memcpy(row_start + sizeof(float) * static_cast<std::size_t>(column), &as_float, sizeof(float));
-      } else {
-        std::memcpy(row_start + sizeof(double) * static_cast<std::size_t>(column), &as_double, sizeof(double));
-      }
+      const auto write = [&](auto number) {
+        std::memcpy(detail::element_address(matrix, row, column), &number, sizeof(number));
+      };
+      if (matrix.type() == CV_32FC1)
+        write(static_cast<float>(value));
+      else
+        write(static_cast<double>(value));
     }
   }
   return Status::ok;
