@@ -84,6 +84,12 @@ span(C&) -> span<std::remove_pointer_t<decltype(std::declval<C&>().data())>>;
 
 namespace detail {
 
+/// Whether each of the optional arrays is empty or of length n.
+template <typename... Spans>
+[[nodiscard]] CFP_INLINE constexpr bool fits(std::size_t n, const Spans&... optional) noexcept {
+  return ((optional.empty() || optional.size() == n) && ...);
+}
+
 template <typename Point, typename Scalar, int Dim, typename = void>
 struct is_point : std::false_type {};
 template <typename Scalar, int Dim>

@@ -58,23 +58,20 @@ inline namespace CFP_ISA {
 template <typename From, typename To>
 [[nodiscard]] AlignmentResult align_points(const From& from, const To& to, bool with_scale = false) noexcept {
   CFP_ASSERT(from.size() == to.size());
-  const auto largest = [](const auto& points, std::size_t i) {
-    return points[i].template cast<double>().template lpNorm<Eigen::Infinity>();
-  };
+  const auto size = [](const auto& point) { return point.template cast<double>().template lpNorm<Eigen::Infinity>(); };
   const auto finite = [&](std::size_t i) { return from[i].allFinite() && to[i].allFinite(); };
   AlignmentResult result;
-  double from_size = 0, to_size = 0;
+  double largest = 0;
   for (std::size_t i = 0; i < from.size(); ++i) {
     if (!finite(i)) continue;
     ++result.used;
-    from_size = (std::max)(from_size, largest(from, i));
-    to_size = (std::max)(to_size, largest(to, i));
+    largest = (std::max)({largest, size(from[i]), size(to[i])});
   }
   result.skipped = from.size() - result.used;
   if (result.used == 0) return result;
 
   // A common unit keeps a rigid motion rigid; the product with 1/unit would overflow for a subnormal unit, so divide.
-  const double unit = (std::max)((std::max)(from_size, to_size), (std::numeric_limits<double>::min)());
+  const double unit = (std::max)(largest, (std::numeric_limits<double>::min)());
   const auto scaled = [unit](const auto& points, std::size_t i) -> Vector3<double> {
     return points[i].template cast<double>() / unit;
   };

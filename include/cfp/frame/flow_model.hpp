@@ -149,7 +149,7 @@ FlowModel<Scalar> estimate_flow_model(const FlowPairs<Scalar>& flow, span<const 
                                       const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
                                       FlowModelWorkspace<Scalar>& workspace) {
   CFP_ASSERT(flow.previous.size() == flow.current.size() && outside.size() == flow.current.size());
-  CFP_ASSERT(flow.previous_depths.empty() || flow.previous_depths.size() == flow.current.size());
+  CFP_ASSERT(detail::fits(flow.current.size(), flow.previous_depths));
   FlowModel<Scalar> model;
   if (options.use_depth) {
     const CameraMotion<Scalar> motion =

@@ -121,7 +121,7 @@ inline namespace CFP_ISA {
 template <typename Scalar>
 void begin_frame(const Frame<Scalar>& frame, FrameState<Scalar>& state) {
   const std::size_t n = frame.keypoints.size();
-  CFP_ASSERT(frame.depths.empty() || frame.depths.size() == n);
+  CFP_ASSERT(detail::fits(n, frame.depths));
   CFP_ASSERT(frame.descriptors.size == 0 || frame.descriptors.size == n);
   std::swap(state.previous, state.current);
   FrameMemory<Scalar>& current = state.current;

@@ -74,7 +74,7 @@ inline namespace CFP_ISA {
 template <typename Scalar>
 void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   CFP_ASSERT(state.objects.size() == state.boxes.size());
-  CFP_ASSERT(frame.object_of_keypoint.empty() || frame.object_of_keypoint.size() == state.size());
+  CFP_ASSERT(detail::fits(state.size(), frame.object_of_keypoint));
   FrameScratch<Scalar>& scratch = state.scratch;
   FrameReport& report = state.report;
   report.undecided_foregrounds = 0;

@@ -9,7 +9,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <limits>
 #include <vector>
 
 #include "cfp/frame/descriptor_matching.hpp"
@@ -65,7 +64,7 @@ void predict_keypoints(const FrameMemory<Scalar>& previous, const SE3<double>& T
 template <typename Scalar, typename Camera>
 void match_in_boxes(const SE3<double>& T_cur_prev, span<const std::int32_t> match, const Camera& camera,
                     const FrameOptions& options, FrameState<Scalar>& state) {
-  CFP_ASSERT(match.empty() || match.size() == state.size());
+  CFP_ASSERT(detail::fits(state.size(), match));
   const std::size_t previous_size = state.previous.known ? state.previous.keypoints.size() : 0;
   for (std::size_t i = 0; i < state.size(); ++i) {
     const std::int32_t j = match.empty() ? no_match : match[i];

@@ -123,7 +123,7 @@ template <typename Scalar>
                                          span<const non_deduced<Scalar>> weights, span<const char> inlier_mask,
                                          const std::optional<PoseStep<double>>& step,
                                          const PoseHealthOptions& options) noexcept {
-  CFP_ASSERT(inlier_mask.size() == pixels.size() && (weights.empty() || weights.size() == pixels.size()));
+  CFP_ASSERT(inlier_mask.size() == pixels.size() && detail::fits(pixels.size(), weights));
   constexpr int columns = 8, rows = 6;
   const bool sized = options.image_width > 0 && options.image_height > 0;
   std::array<bool, columns * rows> occupied{};

@@ -67,7 +67,7 @@ void motion_distances(const PointSpan<non_deduced<Scalar>, 2>& prev, span<const 
                       const Camera& camera, non_deduced<Scalar> sigma_px, const MotionDistanceOptions& options,
                       span<non_deduced<Scalar>> out) noexcept {
   CFP_ASSERT(prev.size() == out.size() && cur.size() == out.size());
-  CFP_ASSERT(depths_prev.empty() || depths_prev.size() == out.size());
+  CFP_ASSERT(detail::fits(out.size(), depths_prev));
   for (std::size_t i = 0; i < out.size(); ++i) {
     const Scalar depth = depths_prev.empty() ? Scalar(0) : depths_prev[i];
     out[i] = motion_distance(prev[i], depth, cur[i], T_cur_prev, camera, sigma_px, options);

@@ -26,12 +26,14 @@
 namespace cfp::simd {
 inline namespace CFP_ISA {
 
+namespace eigen = Eigen::internal;
+
 /// `lanes` numbers of type T: 4 floats for SSE2 and NEON, 16 for AVX-512; 1 where there is no vector unit for T. For
 /// registers and local arrays only: its alignment depends on flags, so no struct may hold one.
 template <typename T>
 struct Packet {
-  using Register = typename Eigen::internal::packet_traits<T>::type;
-  static constexpr std::size_t lanes = Eigen::internal::packet_traits<T>::size;
+  using Register = typename eigen::packet_traits<T>::type;
+  static constexpr std::size_t lanes = eigen::packet_traits<T>::size;
   Register bits;
 
   /// Result of a comparison: a choice per lane.
@@ -40,49 +42,37 @@ struct Packet {
   };
 
   Packet() = default;
-  Packet(const T& x) noexcept : bits(Eigen::internal::pset1<Register>(x)) {}
+  Packet(const T& x) noexcept : bits(eigen::pset1<Register>(x)) {}
   static Packet wrap(const Register& r) noexcept {
     Packet p;
     p.bits = r;
     return p;
   }
   /// `lanes` adjacent numbers, no alignment asked.
-  [[nodiscard]] static Packet load(const T* from) noexcept { return wrap(Eigen::internal::ploadu<Register>(from)); }
-  void store(T* to) const noexcept { Eigen::internal::pstoreu(to, bits); }
+  [[nodiscard]] static Packet load(const T* from) noexcept { return wrap(eigen::ploadu<Register>(from)); }
+  void store(T* to) const noexcept { eigen::pstoreu(to, bits); }
 
-  friend Packet operator+(const Packet& a, const Packet& b) noexcept {
-    return wrap(Eigen::internal::padd(a.bits, b.bits));
-  }
-  friend Packet operator-(const Packet& a, const Packet& b) noexcept {
-    return wrap(Eigen::internal::psub(a.bits, b.bits));
-  }
-  friend Packet operator*(const Packet& a, const Packet& b) noexcept {
-    return wrap(Eigen::internal::pmul(a.bits, b.bits));
-  }
-  friend Packet operator/(const Packet& a, const Packet& b) noexcept {
-    return wrap(Eigen::internal::pdiv(a.bits, b.bits));
-  }
+  friend Packet operator+(const Packet& a, const Packet& b) noexcept { return wrap(eigen::padd(a.bits, b.bits)); }
+  friend Packet operator-(const Packet& a, const Packet& b) noexcept { return wrap(eigen::psub(a.bits, b.bits)); }
+  friend Packet operator*(const Packet& a, const Packet& b) noexcept { return wrap(eigen::pmul(a.bits, b.bits)); }
+  friend Packet operator/(const Packet& a, const Packet& b) noexcept { return wrap(eigen::pdiv(a.bits, b.bits)); }
   Packet& operator+=(const Packet& b) noexcept { return *this = *this + b; }
 
   // A comparison with NaN is false.
-  friend Mask operator<(const Packet& a, const Packet& b) noexcept {
-    return {Eigen::internal::pcmp_lt(a.bits, b.bits)};
-  }
-  friend Mask operator<=(const Packet& a, const Packet& b) noexcept {
-    return {Eigen::internal::pcmp_le(a.bits, b.bits)};
-  }
+  friend Mask operator<(const Packet& a, const Packet& b) noexcept { return {eigen::pcmp_lt(a.bits, b.bits)}; }
+  friend Mask operator<=(const Packet& a, const Packet& b) noexcept { return {eigen::pcmp_le(a.bits, b.bits)}; }
   friend Mask operator>(const Packet& a, const Packet& b) noexcept { return b < a; }
-  friend Mask both(const Mask& a, const Mask& b) noexcept { return {Eigen::internal::pand(a.bits, b.bits)}; }
+  friend Mask both(const Mask& a, const Mask& b) noexcept { return {eigen::pand(a.bits, b.bits)}; }
 
   /// a b + c, fused (one rounding) where the flags allow.
   friend Packet multiply_add(const Packet& a, const Packet& b, const Packet& c) noexcept {
-    return wrap(Eigen::internal::pmadd(a.bits, b.bits, c.bits));
+    return wrap(eigen::pmadd(a.bits, b.bits, c.bits));
   }
-  friend Packet abs(const Packet& a) noexcept { return wrap(Eigen::internal::pabs(a.bits)); }
+  friend Packet abs(const Packet& a) noexcept { return wrap(eigen::pabs(a.bits)); }
   /// log(1 + x) for x > -1, within a few units in the last place.
-  friend Packet log1p(const Packet& a) noexcept { return wrap(Eigen::internal::generic_plog1p(a.bits)); }
+  friend Packet log1p(const Packet& a) noexcept { return wrap(eigen::generic_plog1p(a.bits)); }
   /// The sum of the lanes.
-  friend T reduce_add(const Packet& a) noexcept { return Eigen::internal::predux(a.bits); }
+  friend T reduce_add(const Packet& a) noexcept { return eigen::predux(a.bits); }
 };
 
 // For formulas of packets and of scalars alike, dual numbers included.
@@ -106,7 +96,7 @@ template <typename T>
 template <typename T>
 [[nodiscard]] Packet<T> select(const typename Packet<T>::Mask& condition, const Packet<T>& a,
                                const Packet<T>& b) noexcept {
-  return Packet<T>::wrap(Eigen::internal::pselect(condition.bits, a.bits, b.bits));
+  return Packet<T>::wrap(eigen::pselect(condition.bits, a.bits, b.bits));
 }
 
 /// 1 / sqrt(x) within 3 units in the last place; infinite at 0 (for packets also at denormals), 0 at infinity. One root
@@ -118,7 +108,7 @@ template <typename T>
 }
 template <typename T>
 [[nodiscard]] Packet<T> reciprocal_sqrt(const Packet<T>& x) noexcept {
-  return Packet<T>::wrap(Eigen::internal::prsqrt(x.bits));
+  return Packet<T>::wrap(eigen::prsqrt(x.bits));
 }
 
 }  // namespace CFP_ISA

@@ -33,11 +33,8 @@ template <typename Camera, typename Scalar>
 void assert_shapes([[maybe_unused]] const BundleProblem<Camera, Scalar>& problem) noexcept {
   [[maybe_unused]] const auto& o = problem.observations;
   [[maybe_unused]] const std::size_t n = o.pose.size();
-  CFP_ASSERT(o.point.size() == n && o.pixels.size() == n);
-  CFP_ASSERT(o.u_right.empty() || o.u_right.size() == n);
-  CFP_ASSERT(o.sigmas.empty() || o.sigmas.size() == n);
-  CFP_ASSERT(o.weights.empty() || o.weights.size() == n);
-  CFP_ASSERT(problem.fixed_poses.empty() || problem.fixed_poses.size() == problem.poses.size());
+  CFP_ASSERT(o.point.size() == n && o.pixels.size() == n && fits(n, o.u_right, o.sigmas, o.weights));
+  CFP_ASSERT(fits(problem.poses.size(), problem.fixed_poses));
   CFP_ASSERT(n == 0 || problem.cameras.size() == 1 || problem.cameras.size() == problem.poses.size());
 }
 

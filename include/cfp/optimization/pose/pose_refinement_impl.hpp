@@ -136,17 +136,10 @@ SolverStatus run_rounds(PoseModel<Scalar, Camera>& model, const SE3<double>& sta
 }
 
 template <typename Input>
-[[nodiscard]] bool has_valid_shape(const PoseObservations<Input>& observations,
-                                   [[maybe_unused]] span<char> inliers) noexcept {
-  [[maybe_unused]] const auto fits = [n = observations.points.size()](std::size_t size) {
-    return size == 0 || size == n;
-  };
-  CFP_ASSERT(observations.pixels.size() == observations.points.size() && fits(inliers.size()));
-  CFP_ASSERT(fits(observations.weights.size()) && fits(observations.sigmas.size()));
-  CFP_ASSERT(fits(observations.inverse_sigmas_sq.size()) && fits(observations.depths.size()));
-  CFP_ASSERT(fits(observations.u_right.size()));
-  return (observations.sigmas.empty() || observations.inverse_sigmas_sq.empty()) &&
-         (observations.depths.empty() || observations.u_right.empty());
+[[nodiscard]] bool has_valid_shape(const PoseObservations<Input>& o, [[maybe_unused]] span<char> inliers) noexcept {
+  CFP_ASSERT(o.pixels.size() == o.points.size());
+  CFP_ASSERT(fits(o.points.size(), inliers, o.weights, o.sigmas, o.inverse_sigmas_sq, o.depths, o.u_right));
+  return (o.sigmas.empty() || o.inverse_sigmas_sq.empty()) && (o.depths.empty() || o.u_right.empty());
 }
 
 }  // namespace CFP_ISA
