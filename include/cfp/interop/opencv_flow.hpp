@@ -31,11 +31,6 @@ struct OpticalFlowOptions {
   int levels = 4;                ///< of the pyramid, >= 1
   int iterations = 20;           ///< per level
   double precision = 0.02;       ///< an update below this ends the iterations, px
-  /// Track back as well, and drop pairs that return further than max_backward_px from where they came. Off: it doubles
-  /// the time, tells moving from still people no better, and O of one who moves an arm rises, as the pairs on the arm
-  /// are those it drops.
-  bool backward = false;
-  float max_backward_px = 0.5F;
 };
 
 inline namespace CFP_ISA {
@@ -65,15 +60,15 @@ class OpticalFlowTracker {
     const cv::TermCriteria stop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, options_.iterations,
                                 options_.precision);
     cv::calcOpticalFlowPyrLK(previous_pyramid_, pyramid_, from_, to_, found_, error_, window, top, stop);
-    keep([&](std::size_t i) {
-      return found_[i] != 0 && to_[i].x >= 0 && to_[i].y >= 0 && to_[i].x < float(gray.cols) &&
-             to_[i].y < float(gray.rows);
-    });
-    if (!options_.backward || from_.empty()) return;
-    cv::calcOpticalFlowPyrLK(pyramid_, previous_pyramid_, to_, back_, found_, error_, window, top, stop);
-    keep([&](std::size_t i) {
-      return found_[i] != 0 && std::hypot(back_[i].x - from_[i].x, back_[i].y - from_[i].y) <= options_.max_backward_px;
-    });
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < from_.size(); ++i) {
+      const cv::Point2f& to = to_[i];
+      if (found_[i] == 0 || !(to.x >= 0 && to.y >= 0 && to.x < float(gray.cols) && to.y < float(gray.rows))) continue;
+      from_[kept] = from_[i];
+      to_[kept++] = to;
+    }
+    from_.resize(kept);
+    to_.resize(kept);
   }
 
   /// Pixels of the pairs in the previous and in the current image; valid until the next call.
@@ -134,18 +129,6 @@ class OpticalFlowTracker {
     for (const cv::Point2f& corner : corners_) from_.push_back(scale * corner);
   }
 
-  template <typename Good>
-  void keep(const Good& good) {
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < from_.size(); ++i) {
-      if (!good(i)) continue;
-      from_[kept] = from_[i];
-      to_[kept++] = to_[i];
-    }
-    from_.resize(kept);
-    to_.resize(kept);
-  }
-
   struct Region {
     Box<float> box;
     int across, down;   // cells
@@ -156,7 +139,7 @@ class OpticalFlowTracker {
   std::vector<cv::Mat> previous_pyramid_, pyramid_;
   std::vector<Region> regions_;
   std::vector<const cv::KeyPoint*> strongest_;
-  std::vector<cv::Point2f> from_, to_, back_, corners_;
+  std::vector<cv::Point2f> from_, to_, corners_;
   std::vector<unsigned char> found_;
   std::vector<float> error_;
 };
