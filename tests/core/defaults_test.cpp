@@ -62,8 +62,6 @@ TEST_CASE("The defaults of what judges poses and detectors", "[core]") {
   CHECK((p.min_inliers == 20 && p.min_inlier_share == 0.3 && p.min_spread == 0.1));
   CHECK((p.max_position_sigma_m == 0.03 && p.max_rotation_sigma_rad == 0.02));
   CHECK((p.max_speed_m_s == 4 && p.max_turn_rad_s == 8 && p.slack_m == 0.05 && p.slack_rad == 0.05));
-  const cfp::FrameIntervalOptions i;
-  CHECK((i.factor == 3 && i.shortest_s == 0.2));
   const cfp::DetectorHealthOptions d;
   CHECK((d.silent_after == 3 && d.believed_after == 90 && d.stuck_after == 3 && d.confirmed_after == 10));
   CHECK((d.border_share == 0.03 && d.leaving_share == 0.15 && d.max_box_share == 0.9));

@@ -204,8 +204,6 @@ TEST_CASE("The ends of the ranges of the other options", "[core]") {
       CFP_FIELD(P, image_width, not_negative),
       CFP_FIELD(P, image_height, not_negative),
   });
-  using I = cfp::FrameIntervalOptions;
-  check_ends<I>({CFP_FIELD(I, factor, (Range{1, true, inf, false})), CFP_FIELD(I, shortest_s, positive)});
   using D = cfp::DetectorHealthOptions;
   check_ends<D>({
       CFP_FIELD(D, border_share, (Range{0, true, 0.5, true})),

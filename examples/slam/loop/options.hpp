@@ -52,13 +52,12 @@ struct Options {
   cfp::PoseHealthOptions relocalised_health = relocalised_pose_health();  // what one from the map alone must have
   cfp::DetectorHealthOptions detector_health;
   cfp::DetectorLagOptions detector_lag;
-  int max_idle = 30;                   // frames over which boxes are carried on while the detector is not believed
-  double new_map_after_s = 1;          // of being lost
-  cfp::FrameIntervalOptions interval;  // the motion model is not asked over a gap
-  double unproven_share = 0.01;        // in the pose: weight of what fewer than two keyframes saw, relative to all else
-  double min_known_share = 0.05;       // of the proven points that should be in view: fewer found, and it is not there
-  int probation = 5;                   // frames after a relocalisation in which the map learns nothing
-  std::size_t enough_matches = 40;     // with the last frame; with fewer the search is widened
+  int max_idle = 30;                // frames over which boxes are carried on while the detector is not believed
+  double new_map_after_s = 1;       // of being lost
+  double unproven_share = 0.01;     // in the pose: weight of what fewer than two keyframes saw, relative to all else
+  double min_known_share = 0.05;    // of the proven points that should be in view: fewer found, and it is not there
+  int probation = 5;                // frames after a relocalisation in which the map learns nothing
+  std::size_t enough_matches = 40;  // with the last frame; with fewer the search is widened
   std::size_t min_initial_points = 100;
   float search_radius = 15;  // pixels at level 0, around a point of the last frame
 

@@ -38,7 +38,6 @@ class Tracking {
         relocalize_(options.seed),
         local_map_(options.features),
         mapping_(options),
-        interval_(options.interval),
         detector_(options.detector_health),
         lag_(options.detector_lag) {}
 
@@ -456,9 +455,9 @@ class Tracking {
   Frame last_;
   MotionModel::Prediction predicted_;
   LastFrameMatches from_last_;
-  bool relocalised_ = false;  // in this frame
-  RefinedPose pose_;          // of this frame
-  cfp::FrameInterval interval_;
+  bool relocalised_ = false;     // in this frame
+  RefinedPose pose_;             // of this frame
+  cfp::FrameInterval interval_;  // the motion model is not asked over a gap
   cfp::DetectorHealth<float> detector_;
   cfp::DetectorLag<float> lag_;
   bool detector_ok_ = true;

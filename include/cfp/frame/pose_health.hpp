@@ -60,11 +60,6 @@ struct PoseStep {
   double dt_s = 0;  ///< time between them, > 0
 };
 
-struct FrameIntervalOptions {
-  double factor = 3;        ///< a gap is longer than the usual interval times this, >= 1,
-  double shortest_s = 0.2;  ///< and than this: over less, a velocity may be believed; > 0
-};
-
 inline namespace CFP_ISA {
 
 /// The enumerator's name, for reports.
@@ -159,23 +154,13 @@ template <typename Scalar>
   return out;
 }
 
-[[nodiscard]] inline OptionPath invalid_field(const FrameIntervalOptions& o) noexcept {
-  if (!(o.factor >= 1) || !is_finite(o.factor)) return "factor";
-  if (!detail::positive(o.shortest_s)) return "shortest_s";
-  return {};
-}
-
 /// The usual time between frames, and whether frames are missing before this one: then the camera may be anywhere, and
 /// a motion model finds nothing but chance matches.
 class FrameInterval {
  public:
-  explicit FrameInterval(const FrameIntervalOptions& options = {}) noexcept : options_(options) {
-    CFP_ASSERT(!invalid_field(options));
-  }
-
-  /// Once per frame, with its time. True: there is a gap before it. A time that does not grow is no gap, and is not
-  /// learnt. The usual interval follows within some ten frames, so a recording that becomes slower has no gap after
-  /// each of its frames.
+  /// Once per frame, with its time. True: there is a gap before it, longer than thrice the usual interval, and than
+  /// 0.2 s: over less, a velocity may be believed. A time that does not grow is no gap, and is not learnt. The usual
+  /// interval follows within some ten frames, so a recording that becomes slower has no gap after each of its frames.
   bool is_gap(double time_s) noexcept {
     const double dt = time_s - last_s_;
     const bool known = is_finite(last_s_);
@@ -183,17 +168,17 @@ class FrameInterval {
     last_s_ = time_s;
     if (!known) return false;
     if (!(usual_s_ > 0)) {
-      usual_s_ = dt < options_.shortest_s ? dt : options_.shortest_s;
-      return dt > options_.factor * usual_s_;
+      usual_s_ = dt < shortest_s ? dt : shortest_s;
+      return dt > factor * usual_s_;
     }
-    const bool gap = dt > options_.factor * usual_s_ && dt > options_.shortest_s;
+    const bool gap = dt > factor * usual_s_ && dt > shortest_s;
     usual_s_ += 0.2 * ((dt < 2 * usual_s_ ? dt : 2 * usual_s_) - usual_s_);
     return gap;
   }
   [[nodiscard]] double usual_s() const noexcept { return usual_s_; }  ///< 0: not known yet
 
  private:
-  FrameIntervalOptions options_;
+  static constexpr double factor = 3, shortest_s = 0.2;
   double last_s_ = std::numeric_limits<double>::quiet_NaN(), usual_s_ = 0;
 };
 
