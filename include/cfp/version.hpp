@@ -8,13 +8,7 @@
 #define CFP_VERSION_PATCH 0
 #define CFP_VERSION_STRING "0.1.0"
 
-#if defined(_MSVC_LANG)
-#define CFP_CPLUSPLUS _MSVC_LANG
-#else
-#define CFP_CPLUSPLUS __cplusplus
-#endif
-
-#if CFP_CPLUSPLUS < 201703L
+#if __cplusplus < 201703L && !(defined(_MSVC_LANG) && _MSVC_LANG >= 201703L)
 #error \
     "cfp needs C++17: compile with -std=c++17 or newer (a -std=c++11 or -std=c++14 in CMAKE_CXX_FLAGS wins over CMake's own setting)."
 #endif
@@ -54,11 +48,9 @@
 #define CFP_INLINE inline
 #endif
 
-#if defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
-#if defined(__GNUC__)
+#if defined(__GNUC__) && defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
 #pragma GCC warning \
     "cfp: -ffinite-math-only (part of -ffast-math) removes the NaN checks that cfp's guarantees rest on; it is not supported."
-#endif
 #endif
 
 // Programmer errors only (two arrays of different length, a null view, unsorted input where sorted is required); never

@@ -10,14 +10,11 @@
 #pragma once
 
 #include <array>
+#include <stdexcept>
 #include <string>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/version.hpp"
-
-#if defined(__cpp_exceptions) || defined(_CPPUNWIND)
-#include <stdexcept>
-#endif
 
 namespace cfp {
 inline namespace CFP_ISA {

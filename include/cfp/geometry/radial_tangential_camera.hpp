@@ -141,13 +141,8 @@ struct RadialTangentialCamera {
     if (jacobian != nullptr) {
       const Scalar fx_z = fx * inv_z;
       const Scalar fy_z = fy * inv_z;
-      Matrix23<Scalar>& J = *jacobian;
-      J(0, 0) = fx_z * d.xx;
-      J(0, 1) = fx_z * d.xy;
-      J(0, 2) = -fx_z * (d.xx * x + d.xy * y);
-      J(1, 0) = fy_z * d.xy;
-      J(1, 1) = fy_z * d.yy;
-      J(1, 2) = -fy_z * (d.xy * x + d.yy * y);
+      *jacobian = Matrix23<Scalar>{{fx_z * d.xx, fx_z * d.xy, -fx_z * (d.xx * x + d.xy * y)},
+                                   {fy_z * d.xy, fy_z * d.yy, -fy_z * (d.xy * x + d.yy * y)}};
     }
     return true;
   }
