@@ -58,7 +58,6 @@ template <typename Scalar>
                                                     const ConstraintOptions& constraint, const FrameOptions& options,
                                                     FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
-  scratch.samples.reserve(distances.size());
   scratch.scratch.resize(distances.size());
   const auto fit = [&](bool inside) {
     scratch.samples.clear();
@@ -78,7 +77,6 @@ template <typename Scalar>
 template <typename Scalar>
 [[nodiscard]] double median_depth(FrameScratch<Scalar>& scratch) {
   scratch.scratch.clear();
-  scratch.scratch.reserve(scratch.depths.size());
   std::copy_if(scratch.depths.begin(), scratch.depths.end(), std::back_inserter(scratch.scratch),
                [](Scalar z) { return is_valid_depth(z); });
   if (scratch.scratch.empty()) return 0;

@@ -130,11 +130,6 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
                                frame.flow.previous_depths};
   const PinholeCamera<Scalar> pinhole = undistorted_camera(camera);
   const CoarseOptions& coarse = options.coarse;
-  scratch.members.reserve(n);
-  scratch.points.reserve(n);
-  scratch.depths.reserve(n);
-  scratch.samples.reserve(n);
-  scratch.mask.reserve(n);
   detail::label_pairs(frame, options, state);
   const FlowSupport support = detail::mark_outside(n, coarse.flow, scratch);
   const FlowModel<Scalar> model = detail::flow_model(frame, flow, pinhole, coarse.flow, state);

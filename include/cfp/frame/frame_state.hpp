@@ -149,6 +149,15 @@ void begin_frame(const Frame<Scalar>& frame, FrameState<Scalar>& state) {
     state.label[i] = valid ? KeypointLabel::outside : KeypointLabel::invalid;
   }
   state.weight = state.static_probability;
+  // A box may hold all that the frame has.
+  FrameScratch<Scalar>& scratch = state.scratch;
+  const std::size_t most = (std::max)(n, frame.flow.current.size());
+  scratch.members.reserve(most);
+  scratch.mask.reserve(most);
+  scratch.points.reserve(most);
+  scratch.depths.reserve(most);
+  scratch.samples.reserve(most);
+  scratch.scratch.reserve(most);
   state.boxes.clear();
   state.objects.clear();
   FrameReport report;

@@ -78,9 +78,6 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
   FrameScratch<Scalar>& scratch = state.scratch;
   FrameReport& report = state.report;
   report.undecided_foregrounds = 0;
-  scratch.members.reserve(state.size());
-  scratch.depths.reserve(state.size());
-  scratch.mask.reserve(state.size());
   const Scalar threshold = static_cast<Scalar>(options.object_threshold);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     const TrackedBox<Scalar>& box = state.boxes[b];

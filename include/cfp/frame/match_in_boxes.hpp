@@ -74,7 +74,6 @@ void match_in_boxes(const SE3<double>& T_cur_prev, span<const std::int32_t> matc
   state.report.matched_in_boxes = state.report.unmatched_foreground = 0;
   if (previous_size > 0 && !state.previous.descriptors.empty() && !state.current.descriptors.empty()) {
     scratch.members.clear();
-    scratch.members.reserve(state.size());
     for (std::size_t i = 0; i < state.size(); ++i) {
       if (state.box[i] != no_box && state.match[i] == no_match) scratch.members.push_back(static_cast<std::int32_t>(i));
     }
