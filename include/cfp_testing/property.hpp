@@ -10,10 +10,10 @@
 namespace cfp_testing {
 
 /// What first_failure gives when the property held in every run.
-inline constexpr std::int64_t none = -1;
+inline constexpr std::int64_t no_failure = -1;
 
 /// Calls `holds(random)` with the generators of runs 0, 1, ..., `runs` - 1; the number of the first run that gives
-/// false, else `none`. Run k alone is `holds(random_of_run(k))`.
+/// false, else `no_failure`. Run k alone is `holds(random_of_run(k))`.
 [[nodiscard]] inline cfp::Random random_of_run(std::int64_t run) noexcept {
   return cfp::Random(static_cast<std::uint64_t>(run), "property");
 }
@@ -23,7 +23,7 @@ template <typename Property>
     cfp::Random random = random_of_run(run);
     if (!holds(random)) return run;
   }
-  return none;
+  return no_failure;
 }
 
 /// A row of a table of properties.

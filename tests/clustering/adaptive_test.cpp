@@ -9,18 +9,11 @@
 #include "cfp/core/random.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
+#include "support/random_depths.hpp"
 
 namespace {
 
 constexpr cfp::AdaptiveRule rules[] = {cfp::AdaptiveRule::foreground_density, cfp::AdaptiveRule::fixed};
-
-std::vector<double> random_depths(cfp::Random& random, std::size_t n) {
-  std::vector<double> depths;
-  for (std::size_t i = 0; i < n; ++i)
-    depths.push_back(random.index(2) == 0 ? 2 + 0.1 * random.normal() : random.uniform(0.5, 6));
-  std::sort(depths.begin(), depths.end());
-  return depths;
-}
 
 }  // namespace
 
@@ -128,7 +121,7 @@ TEST_CASE("The noise model gives its published figure", "[clustering]") {
 
 TEST_CASE("No rule allocates after warm-up", "[clustering]") {
   cfp::Random random(23, "allocation");
-  const std::vector<double> first = random_depths(random, 600), second = random_depths(random, 500);
+  const std::vector<double> first = cfp_test::random_depths(random, 600), second = cfp_test::random_depths(random, 500);
   for (const cfp::AdaptiveRule rule : rules) {
     cfp::DbscanWorkspace<double> workspace;
     cfp::AdaptiveOptions options;

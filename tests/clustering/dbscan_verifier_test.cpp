@@ -11,13 +11,13 @@ using cfp_testing::DbscanFault;
 
 // Core points at 0, 0.25, 0.5 and 2, 2.25, 2.5; border points 0.75 and 1.75; noise 1.25 and 9; eps 0.25, min_pts 3
 // counts the point itself.
-const std::vector<double> values{
+const std::vector<double> shared_values{
     0, 0.25, 0.5, 0.75, 1.25, 1.75, 2, 2.25, 2.5, 9, 0, 2.5, std::numeric_limits<double>::quiet_NaN()};
 const std::vector<int> right{0, 0, 0, 0, -1, 1, 1, 1, 1, -1, 0, 1, -1};
-const cfp::DbscanOptions options{0.25, 3};
+const cfp::DbscanOptions shared_options{0.25, 3};
 
 DbscanFault fault(std::vector<int> labels, const cfp_testing::DbscanVerifierOptions& strictness = {}) {
-  return cfp_testing::verify_dbscan(values, options, labels, strictness).fault;
+  return cfp_testing::verify_dbscan(shared_values, shared_options, labels, strictness).fault;
 }
 DbscanFault fault_with(std::size_t at, int label) {
   std::vector<int> labels = right;

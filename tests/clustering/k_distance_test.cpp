@@ -7,16 +7,9 @@
 
 #include "cfp/core/random.hpp"
 #include "support/catch.hpp"
+#include "support/random_depths.hpp"
 
 namespace {
-
-std::vector<double> random_depths(cfp::Random& random, std::size_t n) {
-  std::vector<double> depths;
-  for (std::size_t i = 0; i < n; ++i)
-    depths.push_back(random.index(2) == 0 ? 2 + 0.1 * random.normal() : random.uniform(0.5, 6));
-  std::sort(depths.begin(), depths.end());
-  return depths;
-}
 
 // All distances to the others, ascending; entry k - 1 is the k-distance.
 std::vector<double> sorted_distances(const std::vector<double>& values, std::size_t of) {
@@ -33,7 +26,7 @@ std::vector<double> sorted_distances(const std::vector<double>& values, std::siz
 TEST_CASE("k-distances agree with sorting all distances", "[clustering]") {
   cfp::Random random(21, "k distances");
   for (int round = 0; round < 200; ++round) {
-    const std::vector<double> values = random_depths(random, 2 + random.index(40));
+    const std::vector<double> values = cfp_test::random_depths(random, 2 + random.index(40));
     const std::size_t k = 1 + random.index(50), used = (std::min)(k, values.size() - 1);
     const std::vector<double> distances = cfp_study::k_distances(values, k);
     std::vector<double> expected;
@@ -60,7 +53,7 @@ TEST_CASE("KANN-DBSCAN takes mean k-distance and mean neighbour count of the lar
   cfp::Random random(22, "kann");
   cfp::DbscanWorkspace<double> dbscan_workspace;
   for (int round = 0; round < 60; ++round) {
-    const std::vector<double> values = random_depths(random, 10 + random.index(60));
+    const std::vector<double> values = cfp_test::random_depths(random, 10 + random.index(60));
     const std::size_t n = values.size(), max_k = n / 2, stable = 1 + random.index(6);
     // The definition, quadratic.
     cfp::DbscanOptions expected;

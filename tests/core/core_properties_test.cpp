@@ -41,5 +41,5 @@ TEST_CASE("The first failing run is named, and gives the same numbers alone", "[
   REQUIRE(run > 0);
   Random alone = cfp_testing::random_of_run(run);
   CHECK_FALSE(small(alone));
-  CHECK(cfp_testing::first_failure(run, small) == cfp_testing::none);
+  CHECK(cfp_testing::first_failure(run, small) == cfp_testing::no_failure);
 }

@@ -15,11 +15,13 @@
 #include "support/allocation_counter.hpp"
 #include "support/brute_force_assignment.hpp"
 #include "support/catch.hpp"
+#include "support/numbers.hpp"
+
+using cfp_test::nan_value;
 
 namespace {
 
 constexpr double inf = std::numeric_limits<double>::infinity();
-constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
 
 /// The objective of the header, for comparison with the oracle.
 double objective(double cost, std::size_t pairs, double gate) { return cost - gate * static_cast<double>(pairs); }

@@ -10,14 +10,15 @@
 #include "cfp/math/so3.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
+#include "support/numbers.hpp"
+
+using cfp_test::nan_value;
 
 namespace {
 
 using Box = cfp::Box<double>;
 using Detections = std::vector<cfp::Detection<double>>;
 using Boxes = std::vector<cfp::TrackedBox<double>>;
-
-constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
 
 Box shifted(const Box& b, double dx, double dy = 0) { return {b.x1 + dx, b.y1 + dy, b.x2 + dx, b.y2 + dy}; }
 Boxes copy(const cfp::BoxTrackerResult<double>& result) { return {result.boxes.begin(), result.boxes.end()}; }

@@ -1,7 +1,6 @@
 #include "cfp_testing/ekf.hpp"
 
 #include <cmath>
-#include <limits>
 #include <type_traits>
 
 #include <Eigen/Eigenvalues>
@@ -10,6 +9,9 @@
 #include "cfp/core/random.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
+#include "support/numbers.hpp"
+
+using cfp_test::nan_value;
 
 namespace {
 
@@ -103,7 +105,6 @@ TEST_CASE("The EKF leaves the state alone when it cannot use a measurement, and 
     return Measured(m[0]);
   };
   const auto before = state;
-  const double nan_value = std::numeric_limits<double>::quiet_NaN();
   CHECK(cfp_testing::ekf_update(state, Measured(nan_value), measure, Measured(1.0)).status ==
         cfp::Status::invalid_input);
   CHECK(cfp_testing::ekf_update(state, Measured(1.0), measure, Measured(nan_value)).status ==

@@ -18,19 +18,19 @@ namespace {
 
 cfp::ErrorStatistics statistics(std::vector<double> errors) { return cfp::error_statistics(errors); }
 
-struct Samples {
+struct Predictions {
   std::vector<double> p;
   std::vector<char> y;
 };
-Samples samples(Random& random) {
-  Samples s;
+Predictions predictions(Random& random) {
+  Predictions s;
   for (std::size_t n = cfp_testing::count(random, 2, 80), i = 0; i < n; ++i) {
     s.p.push_back(cfp_testing::probability(random));
     s.y.push_back(random.uniform() < s.p[i] ? 1 : 0);
   }
   return s;
 }
-cfp::CalibrationResult<10> calibration(const Samples& s) {
+cfp::CalibrationResult<10> calibration(const Predictions& s) {
   cfp::CalibrationWorkspace workspace;
   return cfp::evaluate_calibration(s.p, s.y, workspace);
 }
@@ -93,14 +93,14 @@ CFP_PROPERTIES("Properties of error statistics", "[evaluation]",
 CFP_PROPERTIES("Properties of calibration", "[evaluation]",
                {"the order of the samples does not matter", 100,
                 [](Random& random) {
-                  Samples s = samples(random), back = s;
+                  Predictions s = predictions(random), back = s;
                   std::reverse(back.p.begin(), back.p.end());
                   std::reverse(back.y.begin(), back.y.end());
                   return close(calibration(s), calibration(back));
                 }},
                {"every sample twice gives the same figures", 100, [](Random& random) {
-                  const Samples s = samples(random);
-                  Samples twice = s;
+                  const Predictions s = predictions(random);
+                  Predictions twice = s;
                   twice.p.insert(twice.p.end(), s.p.begin(), s.p.end());
                   twice.y.insert(twice.y.end(), s.y.begin(), s.y.end());
                   return close(calibration(s), calibration(twice));

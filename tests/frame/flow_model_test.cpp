@@ -9,10 +9,9 @@
 
 namespace {
 
-const cfp::PinholeCamera<double> camera{535.4, 539.2, 320.1, 247.6};
-
 /// Pairs without depth of a static room, all outside boxes, with noise in the current image alone.
 struct Room {
+  cfp::PinholeCamera<double> camera{535.4, 539.2, 320.1, 247.6};
   std::vector<std::array<double, 2>> previous, current;
   std::vector<char> outside;
 

@@ -22,8 +22,8 @@ DynamicScene<double> scene(Random& random) {
 }
 
 /// A host of one pair of frames: the weights and K of both stages, one after the other.
-struct Host {
-  explicit Host(const DynamicScene<double>& s) : scene(s), probability(s.camera) {}
+struct TwoFrames {
+  explicit TwoFrames(const DynamicScene<double>& s) : scene(s), probability(s.camera) {}
 
   std::vector<double> run() {
     std::vector<cfp::Detection<double>> detections;
@@ -69,11 +69,11 @@ CFP_PROPERTIES("Properties of the driver", "[frame]",
                     for (auto& p : *points)
                       p[0] = random.index(20) == 0 ? cfp_testing::any_number<double>(random) : p[0];
                   }
-                  return are_probabilities(Host(s).run());
+                  return are_probabilities(TwoFrames(s).run());
                 }},
                {"without boxes every keypoint of the wall counts fully", 15,
                 [](Random& random) {
-                  Host host(scene(random));
+                  TwoFrames host(scene(random));
                   host.detected = false;
                   const std::vector<double> out = host.run();
                   const auto k = host.probability.state().static_probability;
@@ -81,7 +81,7 @@ CFP_PROPERTIES("Properties of the driver", "[frame]",
                 }},
                {"keypoints outside of all boxes keep K = 1", 15,
                 [](Random& random) {
-                  Host host(scene(random));
+                  TwoFrames host(scene(random));
                   (void)host.run();
                   const auto& state = host.probability.state();
                   for (std::size_t i = 0; i < state.size(); ++i) {
@@ -92,14 +92,14 @@ CFP_PROPERTIES("Properties of the driver", "[frame]",
                {"the clock's zero does not matter", 15,
                 [](Random& random) {
                   const DynamicScene<double> s = scene(random);
-                  Host a(s), b(s);
+                  TwoFrames a(s), b(s);
                   b.start_s += 8192;
                   return a.run() == b.run();
                 }},
                {"what follows does not change what was: the first stage knows nothing of the second", 15,
                 [](Random& random) {
                   const DynamicScene<double> s = scene(random);
-                  Host a(s), b(s);
+                  TwoFrames a(s), b(s);
                   b.scene.T_cur_prev.translation.x() += 0.5;
                   const std::vector<double> x = a.run(), y = b.run();
                   const std::size_t both_coarse = 2 * s.previous_keypoints.size() + 2 * s.keypoints.size();
@@ -108,7 +108,7 @@ CFP_PROPERTIES("Properties of the driver", "[frame]",
                {"after a reset the frames give what they gave a new driver", 15,
                 [](Random& random) {
                   const DynamicScene<double> s = scene(random);
-                  Host host(s), other(scene(random));
+                  TwoFrames host(s), other(scene(random));
                   const std::vector<double> fresh = host.run();
                   other.run();
                   other.probability.reset();
@@ -119,7 +119,7 @@ CFP_PROPERTIES("Properties of the driver", "[frame]",
                {"M unknown (0.5 for every keypoint, or none held) keeps weights within [0, 1] and M within [0, 1]", 15,
                 [](Random& random) {
                   const DynamicScene<double> s = scene(random);
-                  Host host(s);
+                  TwoFrames host(s);
                   host.m =
                       cfp_testing::many(s.keypoints.size(), [&] { return cfp_testing::any_number<double>(random); });
                   const std::vector<double> out = host.run();
@@ -140,7 +140,7 @@ CFP_PROPERTIES("Properties of the driver", "[frame]",
                     const std::int32_t old = s.match[s.match.size() - 1 - i];
                     back.match[i] = old < 0 ? old : n - 1 - old;
                   }
-                  Host a(s), b(back);
+                  TwoFrames a(s), b(back);
                   (void)a.run(), (void)b.run();
                   std::vector<cfp::KeypointLabel> labels = b.probability.state().label;
                   std::reverse(labels.begin(), labels.end());

@@ -14,10 +14,9 @@ using cfp::PoseHealth;
 
 namespace {
 
-const cfp::PinholeCamera<double> camera{500, 500, 320, 240};
-
 /// What a camera at the origin sees of points 2 to 4 m away, over a part of the image.
-struct Scene {
+struct Observed {
+  cfp::PinholeCamera<double> camera{500, 500, 320, 240};
   std::vector<std::array<double, 3>> points;
   std::vector<std::array<double, 2>> pixels;
   std::vector<double> weights;
@@ -25,8 +24,8 @@ struct Scene {
   cfp::PoseResult pose;
   cfp::PoseHealthOptions options;
 
-  Scene() { options.image_width = 640, options.image_height = 480; }
-  Scene& add(std::size_t count, double width, double height, double noise_px = 0.5, double weight = 1) {
+  Observed() { options.image_width = 640, options.image_height = 480; }
+  Observed& add(std::size_t count, double width, double height, double noise_px = 0.5, double weight = 1) {
     cfp::Random random(count, "pose health");
     const auto uniform = [&] { return static_cast<double>(random() >> 11) / 9007199254740992.0; };
     for (std::size_t i = 0; i < count; ++i) {
@@ -37,7 +36,7 @@ struct Scene {
     }
     return *this;
   }
-  Scene& refine() {
+  Observed& refine() {
     cfp::PoseObservations<double> observations;
     observations.points = points;
     observations.pixels = pixels;
@@ -55,7 +54,7 @@ struct Scene {
 }  // namespace
 
 TEST_CASE("A pose from points all over the image is believed", "[health]") {
-  const Scene scene = Scene().add(200, 500, 350).refine();
+  const Observed scene = Observed().add(200, 500, 350).refine();
   const cfp::PoseAssessment a = scene.assess();
   CHECK(a.status == PoseHealth::ok);
   CHECK(a.ok());
@@ -67,11 +66,11 @@ TEST_CASE("A pose from points all over the image is believed", "[health]") {
 }
 
 TEST_CASE("Each reason not to believe a pose has its own name", "[health]") {
-  CHECK(Scene().add(12, 500, 350).refine().assess().status == PoseHealth::too_few_inliers);
-  CHECK(Scene().add(30, 500, 350).add(170, 500, 350, 200).refine().assess().status == PoseHealth::few_agree);
-  CHECK(Scene().add(100, 60, 60).refine().assess().status == PoseHealth::crowded);
-  CHECK(Scene().add(2, 500, 350).refine().assess().status == PoseHealth::not_solved);
-  Scene scene = Scene().add(200, 500, 350).refine();
+  CHECK(Observed().add(12, 500, 350).refine().assess().status == PoseHealth::too_few_inliers);
+  CHECK(Observed().add(30, 500, 350).add(170, 500, 350, 200).refine().assess().status == PoseHealth::few_agree);
+  CHECK(Observed().add(100, 60, 60).refine().assess().status == PoseHealth::crowded);
+  CHECK(Observed().add(2, 500, 350).refine().assess().status == PoseHealth::not_solved);
+  Observed scene = Observed().add(200, 500, 350).refine();
   scene.options.max_position_sigma_m = 1e-5;
   CHECK(scene.assess().status == PoseHealth::uncertain);
   scene.options = {};
@@ -94,7 +93,7 @@ TEST_CASE("Each reason not to believe a pose has its own name", "[health]") {
 }
 
 TEST_CASE("Observations that weigh nothing neither speak for a pose nor against it", "[health]") {
-  const cfp::PoseAssessment a = Scene().add(100, 500, 350).add(300, 500, 350, 200, 0.001).refine().assess();
+  const cfp::PoseAssessment a = Observed().add(100, 500, 350).add(300, 500, 350, 200, 0.001).refine().assess();
   CHECK(a.status == PoseHealth::ok);
   CHECK(a.inlier_share > 0.9);
 }
@@ -103,7 +102,7 @@ TEST_CASE("The uncertainty of a pose is that of its errors", "[health]") {
   // Noise of the default sigma, 1 px: many poses scatter as the information says.
   double squares = 0, expected = 0;
   for (std::size_t n = 60; n < 160; ++n) {
-    const Scene scene = Scene().add(n, 500, 350, 1.732).refine();  // uniform, standard deviation 1
+    const Observed scene = Observed().add(n, 500, 350, 1.732).refine();  // uniform, standard deviation 1
     squares += scene.pose.T_cam_world.inverse().translation.squaredNorm();
     const double sigma = scene.assess().position_sigma_m;
     expected += sigma * sigma;
@@ -112,7 +111,7 @@ TEST_CASE("The uncertainty of a pose is that of its errors", "[health]") {
 }
 
 TEST_CASE("A pixel at the image's edge or beyond counts in the cell of the edge", "[health]") {
-  Scene scene = Scene().add(3, 500, 350).refine();
+  Observed scene = Observed().add(3, 500, 350).refine();
   const auto cells = [&](const std::vector<std::array<double, 2>>& pixels) {
     scene.pixels = pixels;
     scene.weights.assign(pixels.size(), 1.0);
@@ -131,7 +130,7 @@ TEST_CASE("A pixel at the image's edge or beyond counts in the cell of the edge"
 }
 
 TEST_CASE("Without weights each observation weighs 1, and weights outside [0, 1] are clamped", "[health]") {
-  const Scene scene = Scene().add(200, 500, 350).refine();
+  const Observed scene = Observed().add(200, 500, 350).refine();
   std::vector<double> beyond(200, 7.0);
   for (const cfp::span<const double> weights : {cfp::span<const double>(), cfp::span<const double>(beyond)}) {
     const auto a = cfp::assess_pose<double>(scene.pose, scene.pixels, weights, scene.inliers, {}, scene.options);
@@ -147,10 +146,10 @@ TEST_CASE("Without weights each observation weighs 1, and weights outside [0, 1]
 
 TEST_CASE("Hostile input is judged, never believed", "[health]") {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  Scene scene = Scene().add(200, 500, 350).refine();
+  Observed scene = Observed().add(200, 500, 350).refine();
   for (auto& p : scene.pixels) p = {nan, nan};
   CHECK(scene.assess().status == PoseHealth::crowded);
-  scene = Scene().add(200, 500, 350).refine();
+  scene = Observed().add(200, 500, 350).refine();
   scene.pose.information.setConstant(nan);
   CHECK(scene.assess().status == PoseHealth::uncertain);
   scene.pose.information.setZero();
@@ -161,7 +160,7 @@ TEST_CASE("Hostile input is judged, never believed", "[health]") {
   step.dt_s = nan;
   step.T_cur_last.translation.x() = nan;
   CHECK(cfp::is_jump(step, {}));
-  CHECK(Scene().assess().status == PoseHealth::not_solved);
+  CHECK(Observed().assess().status == PoseHealth::not_solved);
 }
 
 TEST_CASE("A gap is a time far above the usual; a recording that becomes slower has few", "[health]") {

@@ -19,7 +19,7 @@ struct Pair {
   double depth;
 };
 
-cfp::SE3<double> motion(cfp::Random& random) {
+cfp::SE3<double> any_motion(cfp::Random& random) {
   cfp::Vector6<double> xi;
   for (int i = 0; i < 6; ++i) xi[i] = random.uniform(-0.05, 0.05);
   return cfp::se3_exp(xi);
@@ -42,7 +42,7 @@ cfp::MotionDistanceOptions exact_depth() {
 TEST_CASE("With an exact depth the motion distance is the reprojection distance", "[geometry][motion_distance]") {
   cfp::Random random(1, "exact");
   for (int i = 0; i < 500; ++i) {
-    const cfp::SE3<double> T = motion(random);
+    const cfp::SE3<double> T = any_motion(random);
     const Pair p = pair(random);
     const double expected = cfp::reprojection_distance(p.previous, p.depth, p.current, T, camera);
     CHECK_THAT(cfp::motion_distance(p.previous, p.depth, p.current, T, camera, 0.2, exact_depth()),
@@ -56,7 +56,7 @@ TEST_CASE("With a depth of which nothing is known the motion distance is the epi
   cfp::MotionDistanceOptions options;
   options.unknown_depth.inverse_sigma = 1e9;
   for (int i = 0; i < 500; ++i) {
-    const cfp::SE3<double> T = motion(random);
+    const cfp::SE3<double> T = any_motion(random);
     const Pair p = pair(random);
     const double expected = cfp::epipolar_distance(cfp::fundamental_from_pose(camera, T), p.previous, p.current);
     for (const double depth :
@@ -72,7 +72,7 @@ TEST_CASE("The motion distance is the Mahalanobis distance under pixel and depth
   cfp::Random random(3, "mahalanobis");
   const cfp::RadialTangentialCamera<double> lens{517.3, 516.5, 318.6, 255.3, 0.26, -0.95, -0.005, 0.0026, 1.16};
   for (int i = 0; i < 500; ++i) {
-    const cfp::SE3<double> T = motion(random);
+    const cfp::SE3<double> T = any_motion(random);
     Pair p = pair(random);
     p.previous = {random.uniform(100, 540), random.uniform(100, 380)};
     const double sigma = random.uniform(0.05, 1);
@@ -96,7 +96,7 @@ TEST_CASE("The motion distance is the Mahalanobis distance under pixel and depth
 TEST_CASE("A motion distance never grows with the depth's noise", "[geometry][motion_distance]") {
   cfp::Random random(4, "monotone");
   for (int i = 0; i < 200; ++i) {
-    const cfp::SE3<double> T = motion(random);
+    const cfp::SE3<double> T = any_motion(random);
     const Pair p = pair(random);
     double last = std::numeric_limits<double>::infinity();
     for (const double noise : {0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0}) {
@@ -125,7 +125,7 @@ TEST_CASE("Pairs that have no distance get none, and float is near double", "[ge
   std::vector<std::array<float, 2>> previous, current;
   std::vector<float> depths, out(200);
   std::vector<double> expected;
-  const cfp::SE3<double> T = motion(random);
+  const cfp::SE3<double> T = any_motion(random);
   for (std::size_t i = 0; i < out.size(); ++i) {
     const Pair p = pair(random);
     previous.push_back({float(p.previous.x()), float(p.previous.y())});

@@ -66,7 +66,7 @@ void check_only_unmet(const std::vector<RunSummary>& runs, const std::vector<Ind
   }
 }
 
-const auto ate = [](double value) { return [value](RunSummary& run) { run.ate_rmse_m = value; }; };
+const auto with_ate = [](double value) { return [value](RunSummary& run) { run.ate_rmse_m = value; }; };
 
 }  // namespace
 
@@ -86,20 +86,20 @@ TEST_CASE("Without runs nothing is claimed", "[slam]") {
 }
 
 TEST_CASE("One sequence that fails decides a claim, and its figures are named", "[slam]") {
-  const auto runs = changed("walking_static", "plain", ate(0.09));
+  const auto runs = changed("walking_static", "plain", with_ate(0.09));
   check_only_unmet(runs, {five_times});
   CHECK(check_claims(runs)[five_times].figures.find("walking_static: cfp 0.0201, plain 0.0900, factor 4.5") !=
         std::string::npos);
-  check_only_unmet(changed("sitting_xyz", "plain", ate(0.0098)), {harmless});
-  check_only_unmet(changed("sitting_rpy", "only-boxes", ate(0.0099)), {boxes});
-  check_only_unmet(changed("walking_rpy", "only-boxes", ate(0.25)), {mdc});
-  check_only_unmet(changed("walking_xyz", "cfp-minus", ate(0.01)), {best});
+  check_only_unmet(changed("sitting_xyz", "plain", with_ate(0.0098)), {harmless});
+  check_only_unmet(changed("sitting_rpy", "only-boxes", with_ate(0.0099)), {boxes});
+  check_only_unmet(changed("walking_rpy", "only-boxes", with_ate(0.25)), {mdc});
+  check_only_unmet(changed("walking_xyz", "cfp-minus", with_ate(0.01)), {best});
   check_only_unmet(changed("walking_xyz", "cfp", [](RunSummary& run) { run.second_stage.auc = 0.949; }), {auc});
   check_only_unmet(changed("sitting_xyz", "cfp", [](RunSummary& run) { run.second_stage.ece = 0.11; }), {calibrated});
 }
 
 TEST_CASE("Overlapping seeds are noise, a plain loss of the camera is not", "[slam]") {
-  auto runs = changed("walking_xyz", "cfp-minus", ate(0.0188));
+  auto runs = changed("walking_xyz", "cfp-minus", with_ate(0.0188));
   check_only_unmet(runs, {best});
   runs.push_back(run_of("walking_xyz", "cfp-minus", 0.0205));
   check_only_unmet(runs, {});

@@ -7,9 +7,11 @@
 
 #include "cfp/optimization/bundle/bundle_adjustment.hpp"
 #include "cfp/optimization/bundle/two_threads.hpp"
+#include "support/adjust.hpp"
 #include "support/allocation_counter.hpp"
-#include "support/ba_scene.hpp"
 #include "support/catch.hpp"
+
+using cfp_test::adjust;
 
 namespace {
 
@@ -42,11 +44,6 @@ bool all_finite(const cfp_test::BaScene& scene) {
   for (const auto& pose : scene.poses) sum += pose.rotation.sum() + pose.translation.sum();
   for (const auto& point : scene.points) sum += point.sum();
   return cfp::is_finite(sum);
-}
-
-cfp::BundleResult adjust(cfp_test::BaScene& scene, const cfp::BundleOptions& options = {}) {
-  cfp::BundleWorkspace workspace;
-  return cfp::adjust_bundle(scene.problem(), options, workspace);
 }
 
 }  // namespace

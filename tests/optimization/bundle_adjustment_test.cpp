@@ -4,8 +4,10 @@
 #include <numeric>
 #include <vector>
 
-#include "support/ba_scene.hpp"
+#include "support/adjust.hpp"
 #include "support/catch.hpp"
+
+using cfp_test::adjust;
 
 namespace {
 
@@ -23,11 +25,6 @@ cfp::BundleOptions until_converged() {
   options.levenberg_marquardt.max_iterations = 200;
   options.levenberg_marquardt.min_relative_decrease = 1e-13;
   return options;
-}
-
-cfp::BundleResult adjust(cfp_test::BaScene& scene, const cfp::BundleOptions& options = {}) {
-  cfp::BundleWorkspace workspace;
-  return cfp::adjust_bundle(scene.problem(), options, workspace);
 }
 
 /// The cost by its definition.

@@ -35,7 +35,7 @@ cfp_test::PoseScene<double> scene(Random& random) {
   return cfp_test::make_pose_scene<double>(random(), options);
 }
 
-cfp::PoseResult refine(const cfp_test::PoseScene<double>& scene, const std::vector<double>& weights) {
+cfp::PoseResult refine_to_the_end(const cfp_test::PoseScene<double>& scene, const std::vector<double>& weights) {
   cfp::PoseOptions options;
   options.min_decrease = 1e-14, options.handover_decrease = 0, options.max_iterations = 60;
   cfp::PoseWorkspace<double> workspace;
@@ -64,7 +64,7 @@ cfp_test::BaScene bundle_scene(Random& random) {
   return cfp_test::make_ba_scene(options, random());
 }
 
-cfp::BundleResult adjust(cfp_test::BaScene& scene) {
+cfp::BundleResult adjust_to_the_end(cfp_test::BaScene& scene) {
   cfp::BundleOptions options;
   options.levenberg_marquardt.max_iterations = 100;
   options.levenberg_marquardt.min_relative_decrease = 1e-13;
@@ -125,7 +125,7 @@ CFP_PROPERTIES("Properties of the pose refinement", "[optimization]",
                     weights[i] = 1 + random.index(3);
                     for (double k = 0; k < weights[i]; ++k) order.push_back(i);
                   }
-                  return close(refine(s, weights), refine(part(s, order), {}));
+                  return close(refine_to_the_end(s, weights), refine_to_the_end(part(s, order), {}));
                 }},
                {"weight 0 is absence", 25,
                 [](Random& random) {
@@ -136,7 +136,7 @@ CFP_PROPERTIES("Properties of the pose refinement", "[optimization]",
                     weights[i] = random.index(3) == 0 ? 0 : random.uniform(0.1, 1);
                     if (weights[i] > 0) order.push_back(i), rest.push_back(weights[i]);
                   }
-                  const auto a = refine(s, weights), b = refine(part(s, order), rest);
+                  const auto a = refine_to_the_end(s, weights), b = refine_to_the_end(part(s, order), rest);
                   return close(a, b) && a.used == b.used && a.zero_weight + a.used == static_cast<int>(weights.size());
                 }},
                {"the order of the observations does not matter", 25,
@@ -145,7 +145,7 @@ CFP_PROPERTIES("Properties of the pose refinement", "[optimization]",
                   std::vector<std::size_t> order(s.points.size());
                   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
                   std::shuffle(order.begin(), order.end(), random);
-                  return close(refine(s, {}), refine(part(s, order), {}));
+                  return close(refine_to_the_end(s, {}), refine_to_the_end(part(s, order), {}));
                 }},
                {"the world's frame and scale move and scale the pose", 25,
                 [](Random& random) {
@@ -157,22 +157,22 @@ CFP_PROPERTIES("Properties of the pose refinement", "[optimization]",
                     X = {Y.x(), Y.y(), Y.z()};
                   }
                   moved.start = s.start * T.inverse();
-                  cfp::PoseResult back = refine(moved, {});
+                  cfp::PoseResult back = refine_to_the_end(moved, {});
                   back.T_cam_world = back.T_cam_world * T;
-                  return close(refine(s, {}), back);
+                  return close(refine_to_the_end(s, {}), back);
                 }},
                {"the pose found is its own answer, and no costlier than the start", 25,
                 [](Random& random) {
                   auto s = scene(random);
-                  const auto once = refine(s, {});
+                  const auto once = refine_to_the_end(s, {});
                   s.start = once.T_cam_world;
-                  const auto twice = refine(s, {});
+                  const auto twice = refine_to_the_end(s, {});
                   return close(once, twice) && twice.cost <= once.cost * (1 + 1e-9);
                 }},
                {"all weights halved: the same pose, half the information", 25, [](Random& random) {
                   const auto s = scene(random);
                   const std::vector<double> ones(s.points.size(), 1.0), halves(s.points.size(), 0.5);
-                  const auto a = refine(s, ones), b = refine(s, halves);
+                  const auto a = refine_to_the_end(s, ones), b = refine_to_the_end(s, halves);
                   return close(a, b) && (a.information - 2 * b.information).norm() < 1e-6 * a.information.norm();
                 }})
 
@@ -202,7 +202,7 @@ CFP_PROPERTIES("Properties of bundle adjustment", "[optimization]",
                 [](Random& random) {
                   cfp_test::BaScene s = bundle_scene(random);
                   const auto before = s.poses;
-                  const auto result = adjust(s);
+                  const auto result = adjust_to_the_end(s);
                   return result.final_cost <= result.initial_cost && s.poses[0].rotation == before[0].rotation &&
                          s.poses[1].translation == before[1].translation;
                 }},
@@ -219,13 +219,13 @@ CFP_PROPERTIES("Properties of bundle adjustment", "[optimization]",
                     some.u_right.push_back(all.u_right[i]), some.sigma.push_back(all.sigma[i]);
                     some.weights.push_back(all.weights[i]);
                   }
-                  const auto a = adjust(all), b = adjust(some);
+                  const auto a = adjust_to_the_end(all), b = adjust_to_the_end(some);
                   return close(all, some) && std::abs(a.final_cost - b.final_cost) < 1e-6 * (1 + a.final_cost);
                 }},
                {"the scale of all weights moves no pose", 15, [](Random& random) {
                   cfp_test::BaScene a = bundle_scene(random), b = a;
                   for (double& w : b.weights) w *= 0.25;
-                  const auto first = adjust(a), second = adjust(b);
+                  const auto first = adjust_to_the_end(a), second = adjust_to_the_end(b);
                   return close(a, b) &&
                          std::abs(first.final_cost - 4 * second.final_cost) < 1e-6 * (1 + first.final_cost);
                 }})

@@ -18,8 +18,8 @@ using cfp_test::PoseScene;
 using cfp_test::PoseSceneOptions;
 
 template <typename Scalar>
-cfp::PoseResult refine(const PoseScene<Scalar>& scene, const std::vector<Scalar>& weights = {},
-                       cfp::span<char> mask = {}) {
+cfp::PoseResult refine_by_default(const PoseScene<Scalar>& scene, const std::vector<Scalar>& weights = {},
+                                  cfp::span<char> mask = {}) {
   cfp::PoseWorkspace<Scalar> workspace;
   return cfp::refine_pose(scene.observations(cfp::span<const Scalar>(weights)), scene.camera, scene.start,
                           cfp::PoseOptions(), workspace, mask);
@@ -51,18 +51,18 @@ TEMPLATE_TEST_CASE("Pose refinement: too little data leaves the pose untouched a
     auto few = scene;
     keep(few, n);
     std::vector<char> mask(n, 1);
-    const auto result = refine(few, {}, mask);
+    const auto result = refine_by_default(few, {}, mask);
     CHECK(result.status == SolverStatus::not_enough_data);
     CHECK(is_untouched(result, few));
     CHECK(std::count(mask.begin(), mask.end(), 0) == static_cast<std::ptrdiff_t>(n));
   }
-  const auto nothing = refine(scene, std::vector<TestType>(scene.points.size(), TestType(0)));
+  const auto nothing = refine_by_default(scene, std::vector<TestType>(scene.points.size(), TestType(0)));
   CHECK(nothing.status == SolverStatus::no_weight);
   CHECK(nothing.zero_weight == 300);
   CHECK(is_untouched(nothing, scene));
   std::vector<TestType> two(scene.points.size(), TestType(0));
   two[3] = two[77] = TestType(1);
-  CHECK(refine(scene, two).status == SolverStatus::not_enough_data);
+  CHECK(refine_by_default(scene, two).status == SolverStatus::not_enough_data);
 }
 
 TEMPLATE_TEST_CASE("Pose refinement: three observations suffice", "[optimization]", float, double) {
@@ -71,7 +71,7 @@ TEMPLATE_TEST_CASE("Pose refinement: three observations suffice", "[optimization
   int found = 0;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const auto scene = make_pose_scene<TestType>(seed, options);
-    const auto result = refine(scene);
+    const auto result = refine_by_default(scene);
     CHECK(is_finite(result));
     found += cfp::is_solved(result.status) && centre_distance(result.T_cam_world, scene.truth) < 2e-3 ? 1 : 0;
   }
@@ -94,7 +94,7 @@ TEMPLATE_TEST_CASE("Pose refinement: collinear and coincident points are degener
         line.pixels[i] = {static_cast<TestType>(pixel.x() + random.normal()),
                           static_cast<TestType>(pixel.y() + random.normal())};
       }
-      const auto result = refine(line);
+      const auto result = refine_by_default(line);
       CAPTURE(coincident, seed, to_string(result.status));
       CHECK(is_untouched(result, line));
       CHECK((result.status == SolverStatus::degenerate || result.status == SolverStatus::not_enough_inliers));
@@ -108,7 +108,7 @@ TEMPLATE_TEST_CASE("Pose refinement: everything behind the camera is degenerate;
   auto behind = scene;
   const cfp::SE3<double> half_turn{cfp::so3_exp<double>({0, cfp::pi<double>, 0}), cfp::Vector3<double>::Zero()};
   behind.start = half_turn * scene.start;
-  const auto result = refine(behind);
+  const auto result = refine_by_default(behind);
   CHECK(result.status == SolverStatus::degenerate);
   CHECK(is_untouched(result, behind));
 
@@ -118,7 +118,7 @@ TEMPLATE_TEST_CASE("Pose refinement: everything behind the camera is degenerate;
   one.pixels.push_back({TestType(320), TestType(240)});
   one.depths.push_back(TestType(-1)), one.sigmas.push_back(TestType(1));
   std::vector<char> mask(one.points.size());
-  const auto with = refine(one, {}, mask), without = refine(scene);
+  const auto with = refine_by_default(one, {}, mask), without = refine_by_default(scene);
   CHECK(centre_distance(with.T_cam_world, without.T_cam_world) < 1e-4);
   CHECK(mask.back() == 0);
   CHECK(with.inliers == without.inliers);
@@ -129,7 +129,7 @@ TEMPLATE_TEST_CASE("Pose refinement: unusable observations are skipped and count
   using Limits = std::numeric_limits<TestType>;
   const auto scene = make_pose_scene<TestType>(4);
   std::vector<TestType> weights(scene.points.size(), TestType(1));
-  const auto clean = refine(scene, weights);
+  const auto clean = refine_by_default(scene, weights);
   auto dirty = scene;
   int bad = 0;
   const auto add = [&](TestType x, TestType u, TestType sigma, TestType weight) {
@@ -148,7 +148,7 @@ TEMPLATE_TEST_CASE("Pose refinement: unusable observations are skipped and count
   add(TestType(1), TestType(5), Limits::denorm_min(), TestType(1));
   add(TestType(1), TestType(5), TestType(1), TestType(-0.5));
   std::vector<char> mask(weights.size());
-  const auto result = refine(dirty, weights, mask);
+  const auto result = refine_by_default(dirty, weights, mask);
   CHECK(result.invalid == bad);
   CHECK(result.used == 300);
   CHECK(result.T_cam_world.translation == clean.T_cam_world.translation);
@@ -191,9 +191,9 @@ TEST_CASE("Pose refinement: the ends of every range count, the next number beyon
 
 TEMPLATE_TEST_CASE("Pose refinement: weights of any size give the same pose", "[optimization]", float, double) {
   const auto scene = make_pose_scene<TestType>(5);
-  const auto one = refine(scene);
+  const auto one = refine_by_default(scene);
   for (const double w : {1e-30, 1e-6, 1e6, 1e29}) {
-    const auto result = refine(scene, std::vector<TestType>(scene.points.size(), static_cast<TestType>(w)));
+    const auto result = refine_by_default(scene, std::vector<TestType>(scene.points.size(), static_cast<TestType>(w)));
     CAPTURE(w);
     CHECK(centre_distance(result.T_cam_world, one.T_cam_world) < 1e-6);
     CHECK(result.cost == Approx(w * one.cost));
@@ -204,18 +204,18 @@ TEST_CASE("Pose refinement: an unusable start pose or camera is refused", "[opti
   auto scene = make_pose_scene<double>(6);
   const cfp::SE3<double> good = scene.start;
   scene.start.rotation *= 2;
-  CHECK(refine(scene).status == SolverStatus::invalid_input);
-  CHECK(is_untouched(refine(scene), scene));
+  CHECK(refine_by_default(scene).status == SolverStatus::invalid_input);
+  CHECK(is_untouched(refine_by_default(scene), scene));
   scene.start.rotation = -good.rotation;  // a reflection
-  CHECK(refine(scene).status == SolverStatus::invalid_input);
+  CHECK(refine_by_default(scene).status == SolverStatus::invalid_input);
   scene.start = good;
   scene.start.translation.x() = std::nan("");
-  CHECK(refine(scene).status == SolverStatus::invalid_input);
-  CHECK(is_finite(refine(scene)));
+  CHECK(refine_by_default(scene).status == SolverStatus::invalid_input);
+  CHECK(is_finite(refine_by_default(scene)));
   scene.start = good;
   for (const double f : {0.0, -500.0, std::nan(""), 1e300}) {
     scene.camera.fx = f;
-    CHECK(refine(scene).status == SolverStatus::invalid_input);
+    CHECK(refine_by_default(scene).status == SolverStatus::invalid_input);
   }
 }
 

@@ -41,7 +41,7 @@ cfp::PoseResult refine(const PoseScene<Scalar>& scene, const std::vector<Scalar>
                           workspace);
 }
 
-std::vector<double> random_weights(std::uint64_t seed, std::size_t n) {
+std::vector<double> uniform_weights(std::uint64_t seed, std::size_t n) {
   cfp::Random random(seed, "weights");
   std::vector<double> weights(n);
   for (double& w : weights) w = random.uniform();
@@ -129,7 +129,7 @@ TEST_CASE("Pose refinement: scaling the world scales the translation", "[optimiz
 
 TEST_CASE("Pose refinement: the order of the observations does not matter", "[optimization]") {
   const auto scene = make_pose_scene<double>(4, mixed());
-  std::vector<double> weights = random_weights(4, scene.points.size());
+  std::vector<double> weights = uniform_weights(4, scene.points.size());
   const auto a = refine(scene, weights);
   std::vector<std::size_t> order(scene.points.size());
   std::iota(order.begin(), order.end(), std::size_t(0));

@@ -1,10 +1,7 @@
-#include "support/catch.hpp"
-
-#include <rapidcheck/catch.h>
+#include "support/generators.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <numeric>
 #include <vector>
@@ -14,14 +11,6 @@
 #include "support/brute_force_assignment.hpp"
 
 namespace {
-
-/// A double of any bits: NaN, infinities and denormals included.
-double any_double() {
-  const std::uint64_t bits = *rc::gen::arbitrary<std::uint64_t>();
-  double value;
-  std::memcpy(&value, &bits, sizeof value);
-  return value;
-}
 
 /// Costs with many ties, some forbidden.
 std::vector<double> costs_of(std::size_t size) {
@@ -85,8 +74,8 @@ TEST_CASE("Properties of the assignment", "[properties]") {
   rc::prop("it ends on any doubles, with an assignment of allowed pairs", [] {
     const std::size_t rows = *rc::gen::inRange<std::size_t>(0, 12), cols = *rc::gen::inRange<std::size_t>(0, 12);
     std::vector<double> values(rows * cols);
-    for (double& v : values) v = any_double();
-    const double gate = any_double();
+    for (double& v : values) v = cfp_test::any_number();
+    const double gate = cfp_test::any_number();
     const cfp::CostMatrix costs(values, rows, cols);
     cfp::AssignmentWorkspace workspace;
     std::vector<int> columns(rows);

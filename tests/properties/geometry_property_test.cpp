@@ -1,6 +1,4 @@
-#include "support/catch.hpp"
-
-#include <rapidcheck/catch.h>
+#include "support/generators.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -14,10 +12,9 @@
 using cfp::SE3;
 using cfp::Vector2;
 using cfp::Vector3;
+using cfp_test::real;
 
 namespace {
-double real(double low, double high) { return low + (high - low) * *rc::gen::inRange(0, 1001) / 1000.0; }
-
 cfp::Vector6<double> tangent(double translation, double rotation) {
   cfp::Vector6<double> xi;
   for (int c = 0; c < 6; ++c) xi[c] = c < 3 ? real(-translation, translation) : real(-rotation, rotation);

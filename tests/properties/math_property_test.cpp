@@ -1,31 +1,16 @@
-#include "support/catch.hpp"
-
-#include <rapidcheck/catch.h>
+#include "support/generators.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
-#include <cstring>
 #include <vector>
 
 #include "cfp/math/chi_squared.hpp"
 #include "cfp/math/logistic.hpp"
 #include "cfp/math/order_statistic.hpp"
 
-namespace {
-/// A number of any bit pattern whatever, NaN and infinities included.
-template <typename Scalar, typename Bits>
-Scalar any_number() {
-  const Bits bits = *rc::gen::arbitrary<Bits>();
-  Scalar value;
-  static_assert(sizeof(value) == sizeof(bits));
-  std::memcpy(&value, &bits, sizeof(bits));
-  return value;
-}
-/// A real number in [low, high] with 1/1000 of the interval as its grain, so that shrinking reads well.
-double real(double low, double high) { return low + (high - low) * *rc::gen::inRange(0, 1001) / 1000.0; }
-}  // namespace
+using cfp_test::any_number;
+using cfp_test::real;
 
 TEST_CASE("properties of chi-squared", "[properties]") {
   rc::prop("survival is in [0, 1] and density finite and >= 0 for any bits", [] {

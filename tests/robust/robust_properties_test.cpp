@@ -15,7 +15,7 @@ using cfp::Random;
 
 namespace {
 
-constexpr cfp::PinholeCamera<double> camera{535.4, 539.2, 320.1, 247.6};
+constexpr cfp::PinholeCamera<double> pinhole{535.4, 539.2, 320.1, 247.6};
 
 cfp_test::TwoViewScene<double> two_views(Random& random) {
   cfp_test::TwoViewOptions options;
@@ -32,13 +32,13 @@ cfp::FundamentalResult<double> solve(const std::vector<std::array<double, 2>>& p
   cfp::FundamentalRansacOptions options;
   options.max_iterations = 200;
   cfp::FundamentalRansacWorkspace workspace;
-  return cfp::fundamental_ransac(pairs, camera, options, workspace, mask);
+  return cfp::fundamental_ransac(pairs, pinhole, options, workspace, mask);
 }
 
 cfp_test::AbsolutePoseScene<double> one_view(Random& random) {
   cfp_test::AbsolutePoseOptions options;
   options.points = 80, options.outlier_share = 0.25, options.noise_px = 0.3;
-  return cfp_test::make_absolute_pose_scene<double>(random, camera, options);
+  return cfp_test::make_absolute_pose_scene<double>(random, pinhole, options);
 }
 
 cfp::PnpRansacResult<double> solve(const cfp_test::AbsolutePoseScene<double>& scene, std::vector<char>& mask) {
@@ -46,7 +46,7 @@ cfp::PnpRansacResult<double> solve(const cfp_test::AbsolutePoseScene<double>& sc
   cfp::PnpRansacWorkspace workspace;
   cfp::PnpRansacOptions options;
   options.max_iterations = 200;
-  return cfp::pnp_ransac(scene.world, scene.pixels, {}, camera, options, workspace, mask);
+  return cfp::pnp_ransac(scene.world, scene.pixels, {}, pinhole, options, workspace, mask);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <vector>
 
@@ -28,6 +29,19 @@ inline rc::Gen<double> any_double() {
        {2, rc::gen::element(0.0, -0.0, 1.0, -1.0, 1e300, -1e300, Limits::denorm_min(), (Limits::min)(), (Limits::max)(),
                             Limits::infinity(), -Limits::infinity(), Limits::quiet_NaN())}});
 }
+
+/// A number of any bit pattern whatever, NaN, infinities and denormals included.
+template <typename Scalar = double, typename Bits = std::uint64_t>
+Scalar any_number() {
+  const Bits bits = *rc::gen::arbitrary<Bits>();
+  Scalar value;
+  static_assert(sizeof(value) == sizeof(bits));
+  std::memcpy(&value, &bits, sizeof(bits));
+  return value;
+}
+
+/// A real number in [low, high] with 1/1000 of the interval as its grain, so that shrinking reads well.
+inline double real(double low, double high) { return low + (high - low) * *rc::gen::inRange(0, 1001) / 1000.0; }
 
 /// At least `least` distances in [0, 10] px, ties included, distinct enough that no sum is near a rounding edge.
 inline rc::Gen<std::vector<double>> distances(std::size_t least) {

@@ -2,12 +2,15 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 
 #include "cfp_testing/numbers.hpp"
 
 namespace cfp_test {
 
 using cfp_testing::hostile_numbers;
+
+constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
 
 /// |a - b| over the larger of the two magnitudes; 0 for equal numbers (also infinite ones).
 template <typename Scalar>

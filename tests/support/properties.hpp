@@ -9,7 +9,7 @@ namespace cfp_test {
 inline void check_all(std::initializer_list<cfp_testing::Property> properties) {
   for (const cfp_testing::Property& property : properties) {
     INFO(property.name << "; -1 is no failing run");
-    CHECK(cfp_testing::first_failure(property.runs, property.holds) == cfp_testing::none);
+    CHECK(cfp_testing::first_failure(property.runs, property.holds) == cfp_testing::no_failure);
   }
 }
 
