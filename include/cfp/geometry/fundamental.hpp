@@ -21,33 +21,39 @@ namespace cfp {
 namespace detail {
 inline namespace CFP_ISA {
 
-// Null space of the seven epipolar equations by elimination with complete pivoting (rows and columns), which stays
-// exact when any of the nine coefficients vanishes (pure translations do that). False when the rank is below seven.
+// Null space of the seven epipolar equations by elimination. Rows are exchanged, and columns, too, where all that is
+// left of one is small beside the coordinates, which are about 1: so it stays exact when any of the nine coefficients
+// vanishes (pure translations do that). False when the rank is below seven.
 template <typename T>
 [[nodiscard]] bool seven_point_null_space(T (&A)[7][9], Matrix3<T>& F1, Matrix3<T>& F2) noexcept {
   int column[9] = {0, 1, 2, 3, 4, 5, 6, 7, 8};
-  T first_pivot = 0;
+  T largest = 0;
   for (int k = 0; k < 7; ++k) {
     int pivot_row = k, pivot_col = k;
     T pivot = 0;
-    for (int r = k; r < 7; ++r) {
-      for (int c = k; c < 9; ++c) {
+    const auto search = [&](int c) {
+      for (int r = k; r < 7; ++r) {
         const T value = std::abs(A[r][c]);
-        if (value > pivot) pivot = value, pivot_row = r, pivot_col = c;
+        const bool larger = value > pivot;
+        pivot_row = larger ? r : pivot_row, pivot_col = larger ? c : pivot_col, pivot = larger ? value : pivot;
       }
+    };
+    search(k);
+    if (!(pivot > T(0.01))) {
+      for (int c = k + 1; c < 9; ++c) search(c);
     }
-    if (k == 0) first_pivot = pivot;
-    if (!(pivot > T(1e-12) * first_pivot)) return false;
+    largest = (std::max)(largest, pivot);
+    if (!(pivot > T(1e-12) * largest)) return false;
     if (pivot_row != k) std::swap(A[k], A[pivot_row]);
     if (pivot_col != k) {
       for (auto& row : A) std::swap(row[k], row[pivot_col]);
       std::swap(column[k], column[pivot_col]);
     }
     const T inverse = 1 / A[k][k];
-    for (int c = k + 1; c < 9; ++c) A[k][c] *= inverse;
+    for (int c = 0; c < 9; ++c) A[k][c] *= inverse;
     for (int r = k + 1; r < 7; ++r) {
       const T factor = A[r][k];
-      for (int c = k + 1; c < 9; ++c) A[r][c] -= factor * A[k][c];
+      for (int c = 0; c < 9; ++c) A[r][c] -= factor * A[k][c];
     }
   }
   for (int free = 0; free < 2; ++free) {
