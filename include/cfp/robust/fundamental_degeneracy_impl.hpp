@@ -86,7 +86,7 @@ struct DegeneracyCheck {
       const Matrix3<T> F = hat(cross(lines[0], lines[1])) * H;
       const T norm = F.norm();
       if (!(norm > T(1e-12) * H.norm()) || !is_finite(norm)) continue;
-      const double cost = msac_cost(thinned_columns(pairs), F / norm, fine.limit, best.cost);
+      const double cost = sampson_cost(thinned_columns(pairs), F / norm, fine.score_scale * fine.limit, best.cost);
       if (cost < best.cost) best = {F / norm, cost};
     }
     if (!is_finite(best.cost)) return;

@@ -1,7 +1,8 @@
 /// @file fundamental_ransac.hpp
-/// The fundamental matrix of pairs with mismatches: seeded LO-RANSAC over seven-point samples, MSAC score, robust
-/// non-linear refinement, and a refusal instead of a wrong F when a rotation, a plane or no motion explains the pairs.
-/// F maps a pixel of the previous image to its line in the current one, x_cur^T F x_prev = 0. Distances in pixels.
+/// The fundamental matrix of pairs with mismatches: seeded LO-RANSAC over seven-point samples, a score that
+/// rewards closeness, robust non-linear refinement, and a refusal instead of a wrong F when a rotation, a plane or no
+/// motion explains the pairs. F maps a pixel of the previous image to its line in the current one, x_cur^T F x_prev =
+/// 0. Distances in pixels.
 #pragma once
 
 #include <algorithm>
@@ -110,8 +111,8 @@ inline namespace CFP_ISA {
 }
 
 /// Robust F of pairs: `fundamental_ransac(PointPairs{previous, current}, options, workspace)`. Weights multiply the
-/// score, sum w min(d^2 / T^2, 1), and the refinement's loss, and steer the sampling; the inlier test sees the
-/// Sampson distance alone. inlier_mask: empty or one per pair, 1 = inlier. Works in double, scores in float.
+/// score, sum w d^2 / (d^2 + T^2 / 4), and the refinement's loss, and steer the sampling; the inlier test sees the
+/// Sampson distance d alone. inlier_mask: empty or one per pair, 1 = inlier. Works in double, scores in float.
 ///
 /// A homography that holds most inliers is looked for first: with parallax beside it the F is completed from both.
 /// There is no F, and `status` says why, unless more pairs lie near its lines than the best of all samples gathers by
@@ -121,8 +122,8 @@ inline namespace CFP_ISA {
 /// there. Where most pairs are mismatches a moving region may still be taken for parallax. The result is refined under
 /// a Geman-McClure loss of 2.25 standard deviations of the noise that the pairs themselves show, from several starts,
 /// as a short baseline gives the cost several minima. Cost per sample about 1 us plus 0.3 us per 200 pairs, and some
-/// 100 us at the end. Sources: Chum, Matas, Kittler: "Locally optimized RANSAC", DAGM 2003; Torr and Zisserman:
-/// "MLESAC", CVIU 2000, for the score; DEGENSAC (see fundamental_degeneracy_impl.hpp).
+/// 100 us at the end. Sources: Chum, Matas, Kittler: "Locally optimized RANSAC", DAGM 2003; Geman and McClure 1987
+/// for score and loss; DEGENSAC (see fundamental_degeneracy_impl.hpp).
 template <typename Scalar>
 [[nodiscard]] FundamentalResult<Scalar> fundamental_ransac(const PointPairs<Scalar>& pairs,
                                                            const FundamentalRansacOptions& options,

@@ -1,5 +1,5 @@
 /// @file fundamental_sampson_impl.hpp
-/// What fundamental_ransac.hpp computes of all its pairs at once under an F: MSAC score, Sampson distances, normal
+/// What fundamental_ransac.hpp computes of all its pairs at once under an F: score, Sampson distances, normal
 /// equations. Not an interface.
 #pragma once
 
@@ -44,27 +44,26 @@ struct SampsonPacket {
   }
 };
 
-// Sum over the pairs of w min(d^2 / limit, 1), d the Sampson distance of scaled pixels and limit its squared threshold.
-// Gives up with a value above `bound` as soon as the sum exceeds it.
+// Sum over the pairs of w d^2 / (d^2 + scale), d the Sampson distance of scaled pixels. Gives up with a value above
+// `bound` as soon as the sum exceeds it.
 template <typename T>
-[[nodiscard]] double msac_cost(const PairColumns<T>& in, const Matrix3<double>& F, double limit,
-                               double bound) noexcept {
+[[nodiscard]] double sampson_cost(const PairColumns<T>& in, const Matrix3<double>& F, double scale,
+                                  double bound) noexcept {
   using P = simd::Packet<T>;
   const Matrix3<T> f = F.template cast<T>();
-  const P most(static_cast<T>(limit)), tiny(T(1e-30));
-  const double stop = bound * limit;
+  const P spread(static_cast<T>(scale)), tiny(T(1e-30));
   double sum = 0;
   for (std::size_t block = 0; block < in.size; block += PairArrays::block) {
     P cost(T(0));
     for (std::size_t i = block; i < block + PairArrays::block; i += P::lanes) {
       const SampsonPacket<T> pair(in, i, f);
-      const P d2 = pair.e * pair.e / (pair.n2 + tiny);
-      cost = multiply_add(P::load(in.row[4] + i), select(d2 < most, d2, most), cost);
+      const P e2 = pair.e * pair.e;
+      cost = multiply_add(P::load(in.row[4] + i), e2 / multiply_add(spread, pair.n2, e2 + tiny), cost);
     }
     sum += static_cast<double>(reduce_add(cost));
-    if (!(sum < stop)) break;
+    if (!(sum < bound)) break;
   }
-  return sum / limit;
+  return sum;
 }
 
 // Squared Sampson distances of all pairs, scaled pixels, into `out` of the arrays' capacity; NaN where there is none,
@@ -80,7 +79,7 @@ void sampson_distances_sq(const PairColumns<T>& in, const Matrix3<T>& F, std::ve
 }
 
 // Normal equations over the nine entries (row-major) of F of sum w rho(d^2 / scale), and that sum; rho(x) = x / (1 +
-// x), the loss of Geman and McClure: bounded like MSAC's, but smooth, so that pairs near the threshold count by
+// x), the loss of Geman and McClure: bounded, but smooth, so that pairs near the threshold count by
 // degrees. With d = e / n and k = e / n^2, d(d)/dF_ij = (q_i p_j - k (l_i p_j [i < 2] + m_j q_i [j < 2])) / n. The
 // gradient is exact; H leaves out the k terms, a thousandth of the others for pairs that count, and so is made of 36
 // moments.

@@ -48,9 +48,11 @@ struct FundamentalSearch {
   Random random;
   T noise_variance = limit / T(3.84);  // of the Sampson distances of true pairs, as measured
 
-  // Scales of the refinement's loss: wide in the search, in squared thresholds; the final one in variances of the
-  // measured noise. 2.25 standard deviations lose least over three kinds of noise (cfp_fundamental_scale_study).
-  static constexpr T search_scale = 4, final_scale = T(2.25 * 2.25);
+  // Scales of the loss x / (1 + x): of the score and of the search, in squared thresholds; the final one in variances
+  // of the measured noise. The threshold is a tolerance, mostly far above the noise: under its truncated square many
+  // mismatches within it outdo the true pairs near the lines of the true F. 2.25 standard deviations lose least over
+  // three kinds of noise (cfp_fundamental_scale_study).
+  static constexpr T score_scale = T(1) / 4, search_scale = 1, final_scale = T(2.25 * 2.25);
 
   [[nodiscard]] std::size_t size() const noexcept { return pairs.size; }
   [[nodiscard]] span<const double> weights() const noexcept { return {pairs.row(4), pairs.size}; }
@@ -74,7 +76,7 @@ struct FundamentalSearch {
   }
 
   [[nodiscard]] double cost(const Model& F, double bound) const noexcept {
-    return msac_cost(fast_columns(pairs), F, limit, bound);
+    return sampson_cost(fast_columns(pairs), F, score_scale * limit, bound);
   }
 
   void optimize(Candidate& candidate) const noexcept {
@@ -114,7 +116,7 @@ struct FundamentalSearch {
         sample[j] = list[j];
       }
       solve(sample, [&](const Model& candidate) {
-        const double c = msac_cost(thinned_columns(pairs), candidate, limit, best[starts - 1].cost);
+        const double c = sampson_cost(thinned_columns(pairs), candidate, score_scale * limit, best[starts - 1].cost);
         if (!(c < best[starts - 1].cost)) return;
         best[starts - 1] = {candidate, c};
         if (c < best[0].cost) std::swap(best[0], best[starts - 1]);

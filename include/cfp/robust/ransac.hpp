@@ -131,7 +131,7 @@ class MinimalSampler {
   return needed < static_cast<double>(limit) ? (std::max)(static_cast<std::size_t>(needed), std::size_t(1)) : limit;
 }
 
-/// A model and its cost, the sum over the data of w min(d^2 / T^2, 1) with the distance d and the threshold T (MSAC).
+/// A model and its cost, the sum over the data of w rho(d), 0 <= rho <= 1, with the distance d.
 template <typename Model>
 struct RansacCandidate {
   Model model;
