@@ -46,10 +46,15 @@ struct AssignmentResult {
 /// which cfp_testing/assignment_gap.hpp proves the optimum.
 struct AssignmentWorkspace {
   std::vector<double> column_saving;  ///< b_j >= 0, one per column
-  std::vector<double> costs, distance;
+
+  struct Visit {
+    std::size_t row;
+    int column;
+    double distance, offset;
+  };
+  std::vector<double> costs, open_saving, distance;
   std::vector<int> row_of_column;
-  std::vector<std::size_t> row_before;
-  std::vector<char> is_closed;
+  std::vector<Visit> visits;
 };
 
 namespace detail {
@@ -78,54 +83,85 @@ template <typename Costs>
   return (std::min)(max_cost, most + static_cast<double>(n) * width);
 }
 
-inline void pair(std::size_t row, std::size_t column, AssignmentWorkspace& w, span<int> column_of_row) noexcept {
-  column_of_row[row] = static_cast<int>(column);
-  w.row_of_column[column] = static_cast<int>(row);
-}
+// One search over the workspace's costs. Notation: saving b_j >= 0 of a column, reduced cost c_ij + b_j, gate g. A row
+// of a pair always holds its column at its smallest reduced cost, which is at most g; a column without a row has saving
+// 0. Both hold at the start, without pairs.
+template <typename Workspace>
+struct AssignmentSearch {
+  using Visit = typename Workspace::Visit;
+  using View = Eigen::Map<const Eigen::ArrayXd>;
 
-// Dijkstra from a row without a pair to the nearest free column, or to the dummy of any row on the way, whose cost is
-// the gate; the pairs along the way change places. Notation: saving b_j >= 0 of a column, reduced cost c_ij + b_j. A
-// row of a pair always holds its column at its smallest reduced cost, which is at most the gate; a column without a row
-// has saving 0. Both hold at the start, without pairs.
-inline void augment(std::size_t row, double gate, AssignmentWorkspace& w, span<int> column_of_row) noexcept {
-  const std::size_t columns = w.column_saving.size();
-  const auto reduced = [&](std::size_t i, std::size_t j) { return w.costs[i * columns + j] + w.column_saving[j]; };
-  std::fill(w.distance.begin(), w.distance.end(), infinity);
-  std::fill(w.is_closed.begin(), w.is_closed.end(), char(0));
-  double offset = 0;                // of the row: its own distance, less the reduced cost of its pair
-  double length = 0, dummy = gate;  // the nearest dummy so far
-  std::size_t alone = row;          // and its row
-  int column = unassigned;
-  for (;;) {
-    std::size_t nearest = columns;
-    length = dummy;
-    for (std::size_t j = 0; j < columns; ++j) {
-      if (w.is_closed[j] != 0) continue;
-      const double through = reduced(row, j) + offset;
-      if (through < w.distance[j]) w.distance[j] = through, w.row_before[j] = row;
-      if (w.distance[j] < length) length = w.distance[j], nearest = j;
+  Workspace& w;
+  span<int> column_of_row;
+  double gate;
+  std::size_t columns = w.column_saving.size();
+
+  // The reduced cost of a pair, `offset` above the row's own distance.
+  [[nodiscard]] double through(const Visit& visit, std::size_t column) const noexcept {
+    return w.costs[visit.row * columns + column] + w.column_saving[column] + visit.offset;
+  }
+
+  // Distances of all open columns through one more row. Returns the smallest. The saving is infinite where closed.
+  [[nodiscard]] double relax(const Visit& visit) noexcept {
+    const auto n = static_cast<Eigen::Index>(columns);
+    const View cost(w.costs.data() + visit.row * columns, n), saving(w.open_saving.data(), n);
+    Eigen::Map<Eigen::ArrayXd> distance(w.distance.data(), n);
+    distance = (distance.min)(cost + saving + visit.offset);
+    return distance.minCoeff();
+  }
+
+  // A pair of the row and its cheapest column, if that is free. Before any search.
+  void take_cheapest(std::size_t row) noexcept {
+    const View cost(w.costs.data() + row * columns, static_cast<Eigen::Index>(columns));
+    const double least = cost.minCoeff();
+    const auto j = static_cast<std::size_t>(std::find(cost.begin(), cost.end(), least) - cost.begin());
+    if (least < infinity && w.row_of_column[j] == unassigned) pair(row, j);
+  }
+  void pair(std::size_t row, std::size_t column) noexcept {
+    column_of_row[row] = static_cast<int>(column);
+    w.row_of_column[column] = static_cast<int>(row);
+  }
+
+  // Dijkstra from a row without a pair to the nearest free column, or to the dummy of any row on the way.
+  void augment(std::size_t start) noexcept {
+    std::fill(w.distance.begin(), w.distance.end(), infinity);
+    std::copy(w.column_saving.begin(), w.column_saving.end(), w.open_saving.begin());
+    w.visits[0] = {start, unassigned, 0, 0};
+    std::size_t visits = 1, alone = 0;  // alone: the visit whose dummy is the nearest so far
+    for (double dummy = gate;;) {
+      const double least = relax(w.visits[visits - 1]);
+      if (dummy <= least) {
+        column_of_row[w.visits[alone].row] = unassigned;
+        return finish(w.visits[alone].column, alone, visits, dummy);
+      }
+      const auto j =
+          static_cast<std::size_t>(std::find(w.distance.begin(), w.distance.end(), least) - w.distance.begin());
+      const int row = w.row_of_column[j];
+      if (row == unassigned) return finish(static_cast<int>(j), visits, visits, least);
+      w.open_saving[j] = w.distance[j] = infinity;
+      Visit next{static_cast<std::size_t>(row), static_cast<int>(j), least, 0};
+      next.offset = least - through(next, j);
+      if (gate + next.offset < dummy) dummy = gate + next.offset, alone = visits;
+      w.visits[visits++] = next;
     }
-    if (nearest == columns) {
-      column = column_of_row[alone];
-      column_of_row[alone] = unassigned;
-      break;
+  }
+
+  // Swaps the pairs along the shortest path, of this length, that ends in `column`. The row before a column is the one
+  // that gave it its distance, visited before the column closed: among the first `end` visits.
+  void finish(int column, std::size_t end, std::size_t visits, double length) noexcept {
+    while (column != unassigned) {
+      const auto j = static_cast<std::size_t>(column);
+      const auto nearer = [&](const Visit& a, const Visit& b) { return through(a, j) < through(b, j); };
+      end = static_cast<std::size_t>(
+          std::min_element(w.visits.begin(), w.visits.begin() + std::ptrdiff_t(end), nearer) - w.visits.begin());
+      const Visit& before = w.visits[end];
+      pair(before.row, j);
+      column = before.column;
     }
-    column = static_cast<int>(nearest);
-    if (w.row_of_column[nearest] == unassigned) break;
-    w.is_closed[nearest] = 1;
-    row = static_cast<std::size_t>(w.row_of_column[nearest]);
-    offset = length - reduced(row, nearest);
-    if (gate + offset < dummy) dummy = gate + offset, alone = row;
+    for (std::size_t k = 1; k < visits; ++k)
+      w.column_saving[std::size_t(w.visits[k].column)] += (std::max)(length - w.visits[k].distance, 0.0);
   }
-  for (std::size_t j = 0; j < columns; ++j) {
-    if (w.is_closed[j] != 0) w.column_saving[j] += (std::max)(length - w.distance[j], 0.0);
-  }
-  while (column != unassigned) {
-    const auto j = static_cast<std::size_t>(column);
-    column = column_of_row[w.row_before[j]];
-    pair(w.row_before[j], j, w, column_of_row);
-  }
-}
+};
 
 }  // namespace CFP_ISA
 }  // namespace detail
@@ -158,20 +194,15 @@ AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_co
   for (std::size_t k = 0; k < workspace.costs.size(); ++k)
     workspace.costs[k] = detail::allowed_cost(costs.values[k], max_cost);
   workspace.distance.resize(costs.cols);
-  workspace.row_before.resize(costs.cols);
-  workspace.is_closed.resize(costs.cols);
+  workspace.open_saving.resize(costs.cols);
   workspace.row_of_column.assign(costs.cols, unassigned);
+  workspace.visits.resize(costs.rows);  // a search visits every row once at most
   const Eigen::Map<const Eigen::ArrayXd> allowed(workspace.costs.data(), Eigen::Index(workspace.costs.size()));
   const double gate = detail::effective_gate(allowed, max_cost, (std::min)(costs.rows, costs.cols));
-  for (std::size_t i = 0; i < costs.rows && costs.cols > 0; ++i) {  // its cheapest column to each row, if it is free
-    const double* const row = workspace.costs.data() + i * costs.cols;
-    const double* const least = std::min_element(row, row + costs.cols);
-    const auto j = static_cast<std::size_t>(least - row);
-    if (*least < detail::infinity && workspace.row_of_column[j] == unassigned)
-      detail::pair(i, j, workspace, column_of_row);
-  }
-  for (std::size_t i = 0; i < costs.rows; ++i) {
-    if (column_of_row[i] == unassigned) detail::augment(i, gate, workspace, column_of_row);
+  detail::AssignmentSearch<AssignmentWorkspace> search{workspace, column_of_row, gate};
+  for (std::size_t i = 0; i < costs.rows && costs.cols > 0; ++i) search.take_cheapest(i);
+  for (std::size_t i = 0; i < costs.rows && costs.cols > 0; ++i) {
+    if (column_of_row[i] == unassigned) search.augment(i);
   }
   for (std::size_t i = 0; i < costs.rows; ++i) {
     if (column_of_row[i] == unassigned) continue;
