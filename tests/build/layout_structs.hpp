@@ -177,7 +177,6 @@
   CFP_LAYOUT(cfp::PoseAssessment, rotation_sigma_rad) \
   CFP_LAYOUT(cfp::PoseStep<float>, dt_s) \
   CFP_LAYOUT(cfp::PoseStep<double>, dt_s) \
-  CFP_LAYOUT(cfp::FrameIntervalOptions, shortest_s) \
   CFP_LAYOUT_OPAQUE(cfp::FrameInterval) \
   CFP_LAYOUT(cfp::FrameMemory<float>, descriptor_bytes) \
   CFP_LAYOUT(cfp::FrameMemory<double>, descriptor_bytes) \

@@ -154,7 +154,7 @@ struct DegeneracyCheck {
     }
     const bool few = explained <= T(0.4) * search.total_weight();
     sample_homographies(columns, 12, drawn_outside);
-    for (const float w : weights) seen += w;
+    for (const float w : weights) seen += static_cast<T>(w);
     // One that explains most of what F does out there would hold a third of the pairs, and a dozen samples show half.
     if (few || transfer_cost(columns, H, transfer_limit()) <= 0.85 * seen) {
       sample_homographies(columns, 38, drawn_outside);
