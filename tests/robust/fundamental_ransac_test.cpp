@@ -38,6 +38,22 @@ TwoViewOptions noisy(std::size_t pairs, double outlier_share) {
   return options;
 }
 
+/// Makes the first `count` pairs those of somebody this deep in front of the camera, whose image moves by `step` beside
+/// the camera's motion.
+void put_walker(std::size_t count, double depth_m, const cfp::Vector2<double>& step, cfp::Random& random,
+                cfp_test::TwoViewScene<double>& scene) {
+  const double left = random.uniform(0, 500);
+  for (std::size_t i = 0; i < count; ++i) {
+    scene.prev[i] = {left + random.uniform(0, 130), random.uniform(60, 440)};
+    cfp::Vector3<double> ray;
+    REQUIRE(scene.camera.unproject({scene.prev[i][0], scene.prev[i][1]}, ray));
+    cfp::Vector2<double> now(0, 0);
+    REQUIRE(scene.camera.project(scene.T_cur_prev * cfp::Vector3<double>(depth_m * ray), now));
+    scene.cur[i] = {now.x() + step.x(), now.y() + step.y()};
+    scene.is_inlier[i] = 0;
+  }
+}
+
 struct Labelled {
   std::vector<std::array<double, 2>> prev, cur;
   std::vector<char> label;
@@ -419,15 +435,7 @@ TEST_CASE("A walker with more pairs than the room is no parallax", "[robust]") {
     options.translation_m = 0;
     options.rotation_rad = 0.035;
     auto scene = make_two_view_scene<double>(random, options);
-    const double left = random.uniform(0, 500);
-    for (std::size_t i = 0; i < 90; ++i) {
-      scene.prev[i] = {left + random.uniform(0, 130), random.uniform(60, 440)};
-      cfp::Vector3<double> ray;
-      REQUIRE(scene.camera.unproject({scene.prev[i][0], scene.prev[i][1]}, ray));
-      cfp::Vector2<double> now(0, 0);
-      REQUIRE(scene.camera.project(scene.T_cur_prev.rotation * ray, now));
-      scene.cur[i] = {now.x() + 5, now.y() + 3};
-    }
+    put_walker(90, 1, {5, 3}, random, scene);
     const auto result = fundamental_ransac(PointPairs{scene.prev, scene.cur}, FundamentalRansacOptions{}, workspace);
     found += result.found() ? 1 : 0;
   }
@@ -444,16 +452,7 @@ TEST_CASE("Pairs of a walker and mismatches within the threshold do not bend an 
     TwoViewOptions options = noisy(300, 0.2);
     options.noise_px = 0, options.translation_m = 0.02;
     auto scene = make_two_view_scene<double>(random, options);
-    const double left = random.uniform(0, 500);
-    for (std::size_t i = 0; i < 60; ++i) {
-      scene.prev[i] = {left + random.uniform(0, 130), random.uniform(60, 440)};
-      cfp::Vector3<double> ray;
-      REQUIRE(scene.camera.unproject({scene.prev[i][0], scene.prev[i][1]}, ray));
-      cfp::Vector2<double> now(0, 0);
-      REQUIRE(scene.camera.project(scene.T_cur_prev * cfp::Vector3<double>(2 * ray), now));
-      scene.cur[i] = {now.x() + 4, now.y() + 4};
-      scene.is_inlier[i] = 0;
-    }
+    put_walker(60, 2, {4, 4}, random, scene);
     const auto result = fundamental_ransac(PointPairs{scene.prev, scene.cur}, FundamentalRansacOptions{}, workspace);
     if (!result.found()) continue;
     bent += cfp_test::median_sampson_of_truth<double>(scene, result.F) > 0.05 ? 1 : 0;

@@ -49,7 +49,7 @@ template <typename T>
       for (auto& row : A) std::swap(row[k], row[pivot_col]);
       std::swap(column[k], column[pivot_col]);
     }
-    const T inverse = 1 / A[k][k];
+    const T inverse = 1 / A[k][k];  // over whole rows: a fixed length vectorises
     for (int c = 0; c < 9; ++c) A[k][c] *= inverse;
     for (int r = k + 1; r < 7; ++r) {
       const T factor = A[r][k];

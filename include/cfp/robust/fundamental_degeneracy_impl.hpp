@@ -28,7 +28,7 @@ struct DegeneracyCheck {
 
   // Transfer distances have two degrees of freedom and the noise of both images: 95 % of chi-squared is there at 3
   // times the squared threshold that holds 95 % of the Sampson distances.
-  [[nodiscard]] T transfer_limit() const noexcept { return 3 * (std::max)(search.limit, search.noise_limit()); }
+  [[nodiscard]] T transfer_limit() const noexcept { return 3 * search.wide_limit(); }
   [[nodiscard]] T transfer_noise_limit() const noexcept { return 3 * search.noise_limit(); }
 
   [[nodiscard]] std::uint32_t drawn() noexcept {

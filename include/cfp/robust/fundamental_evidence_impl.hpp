@@ -57,7 +57,7 @@ struct FundamentalEvidence {
   // mismatches, too. Source: Moisan and Stival, "A probabilistic criterion to detect rigid point matches between two
   // images and estimate the fundamental matrix", IJCV 2004.
   [[nodiscard]] bool stands_out() const noexcept {
-    const T limit = (std::max)(search.limit, search.noise_limit());
+    const T limit = search.wide_limit();
     T near = 0, all = 0, n = 0;
     for (std::size_t i = 0; i < pairs.size; ++i) {
       n += pairs.row(5)[i];
@@ -71,7 +71,7 @@ struct FundamentalEvidence {
   // The gains of the F whose distances were measured last. Returns how many distinct pairs F explains.
   T compare(const Matrix3<T>& H) noexcept {
     const T variance = 2 * search.noise_variance + T(1e-4) * pairs.factor * pairs.factor, s2 = 2 * variance;
-    const T limit = (std::max)(search.limit, search.noise_limit());
+    const T limit = search.wide_limit();
     T distinct = 0;
     for_each([&](std::size_t i) {
       const T d2 = (std::min)(transfer_sq(pairs, H, i), T(100)) / s2, a2 = 1 + 2 * search.distances_sq[i] / s2;

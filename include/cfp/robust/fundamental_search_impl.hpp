@@ -60,6 +60,7 @@ struct FundamentalSearch {
 
   // Squared Sampson distance that 95 % of the true pairs stay below.
   [[nodiscard]] T noise_limit() const noexcept { return T(3.84) * noise_variance; }
+  [[nodiscard]] T wide_limit() const noexcept { return (std::max)(limit, noise_limit()); }
 
   template <typename Visit>
   void solve(const Sample& sample, Visit&& visit) const {
