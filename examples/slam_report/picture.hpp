@@ -88,9 +88,9 @@ inline std::string summary_picture(const std::vector<RunRecord>& runs, std::size
       size +
       " role=\"img\" aria-label=\"Trajectories of the variants and the truth\" font-family=\"system-ui,'Segoe "
       "UI',Roboto,sans-serif\">\n<style>" +
-      plot_style() +
-      "text{font-size:12px}.words{font-size:15px;fill:var(--ink)}.quiet{fill:var(--soft)}</style>\n<rect " + size +
-      " rx=\"8\" style=\"fill:var(--card)\"/>\n" + placed(views[0].plot, margin);
+      plot_style() + "text{font-size:12px}.words{font-size:15px;" + in_colour("fill", "ink") + "}.quiet{" +
+      in_colour("fill", "soft") + "}</style>\n<rect " + size + " rx=\"8\" style=\"" + in_colour("fill", "card") +
+      "\"/>\n" + placed(views[0].plot, margin);
   const std::size_t used = out.size() + words.size() + 1000;
   if (const AnnotatedFrame* picture = telling_picture(all, largest_bytes > used ? largest_bytes - used : 0)) {
     out += "<image x=\"" + number(right, 0) + "\" y=\"" + number(margin + (content - frame_height) / 2, 0) +

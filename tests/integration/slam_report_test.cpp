@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iterator>
 #include <limits>
+#include <regex>
 
 #include "support/catch.hpp"
 #include "support/fake_runs.hpp"
@@ -190,6 +191,16 @@ TEST_CASE("Runs are grouped by sequence, and seeds of one variant get their own 
   for (std::size_t a = 0; a < series_styles.size(); ++a) {
     for (std::size_t b = 0; b < a; ++b) CHECK(series[a].style != series[b].style);
   }
+}
+
+TEST_CASE("The summary picture names a colour for viewers that know no CSS variables", "[slam]") {
+  const auto picture = summary_picture(cfp_test::fake_variants("walking_xyz"));
+  const std::regex variable("(fill|stroke):var"), named("(fill|stroke):#[0-9a-f]+;\\1:var");
+  const auto matches = [&](const std::regex& what) {
+    return std::distance(std::sregex_iterator(picture.begin(), picture.end(), what), std::sregex_iterator());
+  };
+  CHECK(matches(variable) > 5);
+  CHECK(matches(named) == matches(variable));
 }
 
 TEST_CASE("The report is written whole or not at all", "[slam]") {
