@@ -152,3 +152,16 @@ TEST_CASE("Where people fill the view, what lies behind them tells the camera's 
     }
   }
 }
+
+TEST_CASE("A person who fills the view of a camera without depths is unknown, not at rest", "[frame]") {
+  cfp_test::DynamicSceneOptions crowded;
+  crowded.people = 1;
+  crowded.points_per_person = 300;
+  crowded.wall_points = 25;
+  FrameRun<double> run(make_dynamic_scene<double>(crowded, 1));
+  run.scene.boxes = {{-100, -100, 900, 700}};
+  const cfp::FrameReport report = run.coarse({}, run.frame(), run.scene.camera);
+  CHECK(report.flow_model == cfp::FlowModelKind::none);
+  CHECK(report.flow_support == cfp::FlowSupport::none);
+  CHECK(report.unknown_objects == 1);
+}

@@ -73,12 +73,15 @@ TEST_CASE("Without a model no noise is measured", "[frame]") {
   CHECK(turning.sigma_px == 0);
 }
 
-TEST_CASE("Too few pairs outside the boxes: all support the model, and no noise is measured", "[frame]") {
+TEST_CASE("Too few pairs outside the boxes, and no depths: no model, for what is judged is no judge", "[frame]") {
   Room room(motion(0.1, 0.02), 0.2, 6);
   for (const std::size_t outside : {30U, 29U}) {
     for (std::size_t i = 0; i < room.outside.size(); ++i) room.outside[i] = i < outside ? 1 : 0;
     const cfp::FlowModel<double> model = room.model();
-    CHECK(model.support == (outside == 30 ? cfp::FlowSupport::outside_pairs : cfp::FlowSupport::all_pairs));
-    CHECK((model.sigma_px > 0) == (outside == 30));
+    const bool enough = outside == 30;
+    CHECK(model.kind == (enough ? cfp::FlowModelKind::fundamental : cfp::FlowModelKind::none));
+    CHECK(model.support == (enough ? cfp::FlowSupport::outside_pairs : cfp::FlowSupport::none));
+    CHECK(model.status == (enough ? cfp::RansacStatus::ok : cfp::RansacStatus::not_enough_data));
+    CHECK((model.sigma_px > 0) == enough);
   }
 }

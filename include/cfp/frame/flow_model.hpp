@@ -18,8 +18,7 @@ namespace cfp {
 
 struct FlowModelOptions {
   /// Pairs outside all boxes alone support the model when there are at least this many; else those behind what is in
-  /// the boxes do, too, and where that is too few for a two-view model, all pairs (>= 8). People may fill the view, and
-  /// then their own pairs would otherwise choose the model.
+  /// the boxes do, too, and a two-view model wants as many of both (>= 8): what is judged is no judge.
   std::size_t min_outside_pairs = 30;
   /// A camera that turns without moving, or stands still, has no fundamental matrix, but maps every static point by one
   /// homography; true: objects are judged by the distance from that (both coordinates count, not only the one across a
@@ -40,11 +39,10 @@ enum class FlowModelKind : std::uint8_t {
 };
 
 enum class FlowSupport : std::uint8_t {
-  none,              ///< no model was estimated
-  caller,            ///< the caller's motion or fundamental matrix
-  outside_pairs,     ///< the pairs outside all boxes
-  background_pairs,  ///< too few of those: those behind what is in the boxes, too
-  all_pairs          ///< too few of either: all pairs
+  none,             ///< no model was estimated
+  caller,           ///< the caller's motion or fundamental matrix
+  outside_pairs,    ///< the pairs outside all boxes
+  background_pairs  ///< too few of those: those behind what is in the boxes, too
 };
 
 template <typename Scalar>
@@ -68,21 +66,20 @@ struct FlowModelWorkspace {
 namespace detail {
 inline namespace CFP_ISA {
 
-/// The fundamental matrix, or homography, of the pairs marked in `outside` when there are enough, else of all.
+/// The fundamental matrix, or homography, of the pairs marked in `outside`; none of too few.
 template <typename Scalar>
 FlowModel<Scalar> estimate_two_view_model(const FlowPairs<Scalar>& flow, span<const char> outside,
                                           const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
                                           FlowModelWorkspace<Scalar>& workspace) {
-  const auto inside = static_cast<std::size_t>(std::count(outside.begin(), outside.end(), char(0)));
-  const bool enough = outside.size() - inside >= options.min_outside_pairs;
-  workspace.weights.clear();
-  for (const char mark : outside) workspace.weights.push_back(enough && mark == 0 ? Scalar(0) : Scalar(1));
+  const auto found = static_cast<std::size_t>(std::count(outside.begin(), outside.end(), char(1)));
+  if (found < options.min_outside_pairs) return {};
+  workspace.weights.assign(outside.begin(), outside.end());
   const FundamentalResult<Scalar> estimate = fundamental_ransac(
       PointPairs<Scalar>{flow.previous, flow.current, workspace.weights}, camera, options.ransac, workspace.ransac);
 
   FlowModel<Scalar> model;
   model.status = estimate.status;
-  model.support = enough ? FlowSupport::outside_pairs : FlowSupport::all_pairs;
+  model.support = FlowSupport::outside_pairs;
   const bool rotation = estimate.status == RansacStatus::no_motion || estimate.status == RansacStatus::pure_rotation;
   if (estimate.found()) {
     model.kind = FlowModelKind::fundamental;
@@ -141,9 +138,8 @@ void flow_distances(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flo
 }
 
 /// What the pairs of the undistorted image are judged by, from those that `outside` marks as on no object: the
-/// camera's motion if enough of them have a depth and agree, else the two-view model, for which all pairs serve where
-/// too few lie outside. The camera is that of the undistorted image. sigma_px is measured where enough pairs lie
-/// outside.
+/// camera's motion if enough of them have a depth and agree, else the two-view model. The camera is that of the
+/// undistorted image.
 template <typename Scalar>
 FlowModel<Scalar> estimate_flow_model(const FlowPairs<Scalar>& flow, span<const char> outside,
                                       const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
