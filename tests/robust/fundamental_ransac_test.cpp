@@ -444,7 +444,8 @@ TEST_CASE("A walker with more pairs than the room is no parallax", "[robust]") {
 
 TEST_CASE("Pairs of a walker and mismatches within the threshold do not bend an F that others fit exactly",
           "[robust]") {
-  // Two in three obey F. With a truncated square of 1 px for the score 16 of the 60 were a compromise with the others.
+  // Two in three obey F. With a truncated square of 1 px for the score 16 of the 60 were a compromise with the others,
+  // with the compromise's own noise to choose by 8.
   FundamentalRansacWorkspace workspace;
   cfp::Random random(52, "walker and room");
   int bent = 0;
@@ -457,7 +458,7 @@ TEST_CASE("Pairs of a walker and mismatches within the threshold do not bend an 
     if (!result.found()) continue;
     bent += cfp_test::median_sampson_of_truth<double>(scene, result.F) > 0.05 ? 1 : 0;
   }
-  CHECK(bent <= 12);
+  CHECK(bent <= 6);
 }
 
 TEST_CASE("A person who moves before a camera at rest or turning gives no F", "[robust]") {

@@ -84,11 +84,9 @@ inline namespace CFP_ISA {
 ///
 /// A step is judged by its gain = (cost before - cost after) / (predicted decrease); NaN is refused. Accepted (gain
 /// above 1e-3): the damping shrinks by max(1/3, 1 - (2 gain - 1)^3), and does not grow for gain >= 1/2; below
-/// rejected_damping it falls to min_damping at once. Refused: it grows 2, 4, 8, … times. A step of which even twice the
-/// promise leaves the cost above `bound` counts as one without promise, which ends the loop.
+/// rejected_damping it falls to min_damping at once. Refused: it grows 2, 4, 8, … times.
 template <typename Problem>
-LeastSquaresResult minimize_least_squares(Problem& problem, const LevenbergMarquardtOptions& options,
-                                          double bound = std::numeric_limits<double>::infinity()) {
+LeastSquaresResult minimize_least_squares(Problem& problem, const LevenbergMarquardtOptions& options) {
   LeastSquaresResult result;
   double cost = problem.linearize();
   result.status = SolverStatus::not_finite;
@@ -102,8 +100,7 @@ LeastSquaresResult minimize_least_squares(Problem& problem, const LevenbergMarqu
   double damping = clamped(options.initial_damping), growth = 2;
   while (result.iterations < options.max_iterations) {
     ++result.iterations;
-    double promised = problem.propose(damping);
-    if (cost - 2 * promised > bound) promised = 0;
+    const double promised = problem.propose(damping);
     if (is_finite(promised)) {
       // A small promise says something about the minimum only where the damping is small, too.
       const bool damped = damping > (std::max)(options.initial_damping, options.rejected_damping);

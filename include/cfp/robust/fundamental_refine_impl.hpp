@@ -78,14 +78,13 @@ struct SampsonModel {
   }
 };
 
-// Refines F (scaled pixels) until a step promises or brings less than `tolerance` of the cost, for at most
-// `max_steps`, or until even twice the promise would leave the cost above `bound`. Returns the cost of F, which never
-// rises.
+// Refines F (scaled pixels) until a step promises or brings less than `tolerance` of the cost, or for `max_steps`.
+// Returns the cost of F, which never rises.
 template <typename T>
 double refine_fundamental(const PairColumns<T>& pairs, double scale, int max_steps, double tolerance,
-                          FactoredF<double>& F, double bound = std::numeric_limits<double>::infinity()) noexcept {
+                          FactoredF<double>& F) noexcept {
   SampsonModel<T> model{pairs, scale};
-  return refine<7>(model, max_steps, tolerance, F, bound);
+  return refine<7>(model, max_steps, tolerance, F);
 }
 
 }  // namespace CFP_ISA

@@ -47,12 +47,13 @@ struct FundamentalSearch {
   std::vector<T>& distances_sq;      // Sampson, of the F that was tested or measured last
   Random random;
   T noise_variance = limit / T(3.84);  // of the Sampson distances of true pairs, as measured
+  T near_pairs = 0;                    // by weight, within 2.5 standard deviations of it
 
-  // Scales of the loss x / (1 + x): of the score and of the search, in squared thresholds; the final one in variances
-  // of the measured noise. The threshold is a tolerance, mostly far above the noise: under its truncated square many
-  // mismatches within it outdo the true pairs near the lines of the true F. 2.25 standard deviations lose least over
-  // three kinds of noise (cfp_fundamental_scale_study).
-  static constexpr T score_scale = T(1) / 4, search_scale = 1, final_scale = T(2.25 * 2.25);
+  // Scales of the loss x / (1 + x): of the score, of the score of inner samples and of the search, in squared
+  // thresholds; the final one in variances of the measured noise. The threshold is a tolerance, mostly far above the
+  // noise: under its truncated square many mismatches within it outdo the true pairs near the lines of the true F. 2.25
+  // standard deviations lose least over three kinds of noise (cfp_fundamental_scale_study).
+  static constexpr T score_scale = T(1) / 4, inner_scale = T(1) / 16, search_scale = 1, final_scale = T(2.25 * 2.25);
 
   [[nodiscard]] std::size_t size() const noexcept { return pairs.size; }
   [[nodiscard]] span<const double> weights() const noexcept { return {pairs.row(4), pairs.size}; }
@@ -101,11 +102,12 @@ struct FundamentalSearch {
   }
 
   // A short baseline gives the cost several minima, often within a hundredth of each other, and chance decides into
-  // which of them the first good sample leads. Samples of F's own inliers are nearly all good: the best of them are
-  // refined, too, and the lowest cost under the measured noise wins. What it brings: cfp_fundamental_scale_study. F is
-  // the one whose noise was measured last.
+  // which of them the first good sample leads; or it leads to an F between two motions, within the threshold of both.
+  // Samples of F's own inliers are mostly good: the best of them are refined, too, each under its own noise, and the
+  // one that chance explains least wins. What it brings: cfp_fundamental_scale_study. F is the one whose noise was
+  // measured last.
   void explore(FactoredF<T>& F) noexcept {
-    constexpr int samples = 16, starts = 2;
+    constexpr int samples = 20, starts = 2;
     Candidate best[starts];
     collect_inliers();
     const std::uint32_t n = static_cast<std::uint32_t>(list.size());
@@ -117,21 +119,37 @@ struct FundamentalSearch {
         sample[j] = list[j];
       }
       solve(sample, [&](const Model& candidate) {
-        const double c = sampson_cost(thinned_columns(pairs), candidate, score_scale * limit, best[starts - 1].cost);
+        const double c = sampson_cost(thinned_columns(pairs), candidate, inner_scale * limit, best[starts - 1].cost);
         if (!(c < best[starts - 1].cost)) return;
         best[starts - 1] = {candidate, c};
         if (c < best[0].cost) std::swap(best[0], best[starts - 1]);
       });
     }
-    const double scale = final_scale * noise_variance;
-    double lowest = refine_fundamental(fast_columns(pairs), scale, 2, 1e-3, F);
+    const T widest = search_scale * wide_limit();
+    const auto refined_nats = [&](FactoredF<T>& of) {
+      measure_noise(of.matrix());
+      refine_fundamental(thinned_columns(pairs), (std::min)(widest, final_scale * noise_variance), 2, 1e-3, of);
+      measure_noise(of.matrix());
+      return nats();
+    };
+    T most = refined_nats(F);
     for (const Candidate& start : best) {
       if (!is_finite(start.cost)) break;
       FactoredF<T> other(start.model);
-      refine_fundamental(thinned_columns(pairs), search_scale * limit, 2, 1e-3, other);
-      const double c = refine_fundamental(fast_columns(pairs), scale, 2, 1e-3, other, lowest);
-      if (c < lowest) lowest = c, F = other;
+      const T other_nats = refined_nats(other);
+      if (other_nats > most) most = other_nats, F = other;
     }
+  }
+
+  // Minus the logarithm of the number of F that chance lets have so many of the pairs so near as the one whose noise
+  // was measured last: weighs few pairs and little noise against many and more. A mismatch lies anywhere within some
+  // tenth of the image. Source: Moisan and Stival, "A probabilistic criterion to detect rigid point matches between two
+  // images and estimate the fundamental matrix", IJCV 2004.
+  [[nodiscard]] T nats() const noexcept {
+    const T n = static_cast<T>(size()), k = near_pairs, reach = T(0.25);
+    if (!(k > 7)) return -std::numeric_limits<T>::infinity();
+    const T subsets = k * std::log(n / k) + (n > k ? (n - k) * std::log(n / (n - k)) : T(0));
+    return (k - 7) * std::log(reach / (T(2.5) * std::sqrt(noise_variance))) - subsets - 7 * std::log((k - 3) / T(3.38));
   }
 
   // More rounds where the search ran out of samples: its F may be a poor one, which inner samples mend step by step.
@@ -157,20 +175,26 @@ struct FundamentalSearch {
   // threshold, and a wider cut tells by how much. Floor: 0.01 px. The refinement needs it for its loss, and whether a
   // homography suffices must not be judged by a threshold above the parallax of a video.
   void measure_noise() noexcept {
+    using P = simd::Packet<T>;
+    const P zero(T(0));
     const T floor = T(1e-4) * pairs.factor * pairs.factor;
     T cut = limit;
     for (int width = 0; width < 3; ++width, cut *= 4) {
       noise_variance = cut / T(3.84);
       for (int step = 0; step < 10; ++step) {
-        const T farthest = (std::min)(cut, T(6.25) * noise_variance);
-        T sum = 0, weight = 0;
-        for (std::size_t i = 0; i < pairs.size; ++i) {
-          if (!(distances_sq[i] <= farthest)) continue;
-          sum += weights()[i] * distances_sq[i];
-          weight += weights()[i];
+        const P farthest((std::min)(cut, T(6.25) * noise_variance));
+        P sum = zero, weight = zero;
+        for (std::size_t i = 0; i < pairs.size; i += P::lanes) {
+          const P d2 = P::load(distances_sq.data() + i), w = P::load(pairs.row(4) + i);
+          const auto near = d2 <= farthest;
+          sum += select(near, w * d2, zero);
+          weight += select(near, w, zero);
         }
-        if (!(weight > 0)) break;
-        const T next = (std::max)(sum / weight / T(0.911), floor);
+        const T near = reduce_add(weight);
+        near_pairs = near / total_weight() * static_cast<T>(size());
+        if (!(near > 0)) break;
+        const T freedom = near_pairs / (std::max)(near_pairs - 7, T(1));  // F follows seven of their distances
+        const T next = (std::max)(freedom * reduce_add(sum) / near / T(0.911), floor);
         const bool settled = std::abs(next - noise_variance) < T(5e-3) * next;
         noise_variance = next;
         if (settled) break;

@@ -54,11 +54,10 @@ void finish(RansacColumns<Rows>& columns) noexcept {
                  [](double x) { return static_cast<float>(x); });
 }
 
-// Takes at most max_steps that each lower the model's cost by more than `tolerance` of it, and may bring it below
-// `bound`. Returns the cost, infinite when it is not finite at the start.
+// Takes at most max_steps that each lower the model's cost by more than `tolerance` of it. Returns the cost, infinite
+// when it is not finite at the start.
 template <int N, typename Model, typename State>
-double refine(Model& model, int max_steps, double tolerance, State& state,
-              double bound = std::numeric_limits<double>::infinity()) {
+double refine(Model& model, int max_steps, double tolerance, State& state) {
   LevenbergMarquardtOptions options;
   options.max_iterations = max_steps;
   options.initial_damping = 1e-6;
@@ -68,7 +67,7 @@ double refine(Model& model, int max_steps, double tolerance, State& state,
   options.min_relative_decrease = tolerance;
   options.min_absolute_decrease = 0;
   DenseLeastSquares<N, State, Model> problem(model, state);
-  const LeastSquaresResult result = minimize_least_squares(problem, options, bound);
+  const LeastSquaresResult result = minimize_least_squares(problem, options);
   state = problem.state();
   return result.status == SolverStatus::not_finite ? std::numeric_limits<double>::infinity() : result.final_cost;
 }
