@@ -70,11 +70,14 @@ double median_interval(const Poses& poses, const std::vector<std::size_t>& order
   return error_statistics(scratch).median;
 }
 
-inline double angle_deg(const Matrix3<double>& R) noexcept { return so3_log(R).norm() * 180 / pi<double>; }
+template <typename Matrix>  // so that an evaluation that is not called is not compiled
+double angle_deg(const Matrix& R) noexcept {
+  return so3_log<double>(R).norm() * 180 / pi<double>;
+}
 
 /// The length; the largest double where it overflows.
 inline double finite_norm(const Vector3<double>& v) noexcept {
-  const double length = v.stableNorm();
+  const double length = std::hypot(v[0], v[1], v[2]);
   return is_finite(length) ? length : (std::numeric_limits<double>::max)();
 }
 

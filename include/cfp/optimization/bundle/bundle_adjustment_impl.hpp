@@ -81,9 +81,10 @@ void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& work
     workspace.state.points[j] = problem.points[to_index(index.caller_point[j])];
 }
 
-/// The steps applied; fixed poses are copied.
-inline void move(const BundleIndex& index, const BundleState& state, const BundleSchur& schur,
-                 BundleState& next) noexcept {
+/// The steps applied; fixed poses are copied. State: BundleState; a template, so that it is compiled where it is
+/// called.
+template <typename State>
+void move(const BundleIndex& index, const State& state, const BundleSchur& schur, State& next) noexcept {
   std::copy(state.poses.begin(), state.poses.end(), next.poses.begin());
   for (std::size_t k = 0; k < index.free_poses; ++k) {
     const Eigen::Map<const Vector6<double>> xi(schur.pose_steps.data() + 6 * k);
