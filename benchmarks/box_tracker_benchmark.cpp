@@ -64,14 +64,12 @@ void cfp_split(benchmark::State& state) {
   });
 }
 
-template <typename Scalar>
 void cfp_dense_ekf(benchmark::State& state) {
   const cfp::BoxMotionOptions options;
-  cfp_test::DenseBoxFilter<Scalar> filter(cfp::make_box_filter(cfp::Box<Scalar>{260, 120, 340, 360}, options));
-  run(state, [&](const cfp::Box<double>& b) {
-    const cfp::Box<Scalar> seen{Scalar(b.x1), Scalar(b.y1), Scalar(b.x2), Scalar(b.y2)};
-    if (!filter.predict(Scalar(dt), options) || !filter.correct(seen, options)) state.SkipWithError("not finite");
-    return static_cast<double>(filter.state.mean[0] - std::exp(filter.state.mean[2]) / 2);
+  cfp_test::DenseBoxFilter filter(cfp::make_box_filter(cfp::Box<double>{260, 120, 340, 360}, options));
+  run(state, [&](const cfp::Box<double>& seen) {
+    if (!filter.predict(dt, options) || !filter.correct(seen, options)) state.SkipWithError("not finite");
+    return filter.state.mean[0] - std::exp(filter.state.mean[2]) / 2;
   });
 }
 
@@ -160,8 +158,7 @@ void cfp_frame(benchmark::State& state) {
 
 BENCHMARK(cfp_split<double>);
 BENCHMARK(cfp_split<float>);
-BENCHMARK(cfp_dense_ekf<double>);
-BENCHMARK(cfp_dense_ekf<float>);
+BENCHMARK(cfp_dense_ekf);
 #ifdef CFP_HAVE_OPENCV
 BENCHMARK(cv_kalman_8x4);
 #endif

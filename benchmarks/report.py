@@ -21,7 +21,7 @@ WORKLOADS = [
     *[("clustering", f"DBSCAN, n = {n}", f"cfp_dbscan<float>/{n}", peer, f"{row}/{n}", 1, 1)
       for n in (200, 1000, 5000) for peer, row in (("naive O(n²)", "naive"), ("nanoflann", "nanoflann_dbscan"), ("scikit-learn", "sklearn"))],
     *[("box_tracker", "box predicted and updated", "cfp_split<double>", peer, row, 1, 1)
-      for peer, row in (("cv::KalmanFilter", "cv_kalman_8x4"), ("dlib", "dlib_kalman_8x4"), ("dense EKF", "cfp_dense_ekf<double>"))],
+      for peer, row in (("cv::KalmanFilter", "cv_kalman_8x4"), ("dlib", "dlib_kalman_8x4"), ("dense EKF", "cfp_dense_ekf"))],
     *[("assignment", f"assignment, {n} x {n}, {kind}", f"cfp_most_pairs/rows:{n}/cols:{n}/{a}", peer, f"{row}/rows:{n}/cols:{n}/{a}", 1, 1)
       for n in (5, 10, 50, 200) for a, kind in ((BOXES, "boxes"), (UNIFORM, "uniform")) for peer, row in (("dlib", "dlib_max_cost"), ("scipy", "scipy"))],
     *[("math", f"chi-squared {what}, k = {k}", f"BM_chi_squared_{row}_cfp{scalar}/{k}", "Boost.Math", f"BM_chi_squared_{row}_boost/{k}", 1, 1)

@@ -17,17 +17,14 @@ namespace {
 using cfp_test::DenseBoxFilter;
 
 template <typename Scalar>
-void require_equal(const cfp::BoxFilter<Scalar>& split, const DenseBoxFilter<Scalar>& dense, double tolerance) {
-  const DenseBoxFilter<Scalar> other(split);
+void require_equal(const cfp::BoxFilter<Scalar>& split, const DenseBoxFilter& dense, double tolerance) {
+  const DenseBoxFilter other(split);
   for (int i = 0; i < 8; ++i) {
-    const double scale = 1 + std::abs(static_cast<double>(dense.state.mean[i]));
-    REQUIRE_THAT(static_cast<double>(other.state.mean[i]),
-                 WithinAbs(static_cast<double>(dense.state.mean[i]), tolerance * scale));
+    const double scale = 1 + std::abs(dense.state.mean[i]);
+    REQUIRE_THAT(other.state.mean[i], WithinAbs(dense.state.mean[i], tolerance * scale));
     for (int j = 0; j < 8; ++j) {
-      const double size = std::sqrt(static_cast<double>(dense.state.covariance(i, i)) *
-                                    static_cast<double>(dense.state.covariance(j, j)));
-      REQUIRE_THAT(static_cast<double>(other.state.covariance(i, j)),
-                   WithinAbs(static_cast<double>(dense.state.covariance(i, j)), tolerance * size + 1e-12));
+      const double size = std::sqrt(dense.state.covariance(i, i) * dense.state.covariance(j, j));
+      REQUIRE_THAT(other.state.covariance(i, j), WithinAbs(dense.state.covariance(i, j), tolerance * size + 1e-12));
     }
   }
 }
@@ -49,18 +46,18 @@ TEMPLATE_TEST_CASE("Four two-state filters are the eight-state EKF on edges", "[
       return cfp::Box<TestType>{TestType(b.x1), TestType(b.y1), TestType(b.x2), TestType(b.y2)};
     };
     cfp::BoxFilter<TestType> split = cfp::make_box_filter(cast(start), options);
-    DenseBoxFilter<TestType> dense(split);
+    DenseBoxFilter dense(split);
     for (int k = 0; k < 40; ++k) {
       const TestType dt = TestType(random.uniform(0.01, 0.1));
       cfp::predict_box(split, dt, options);
-      REQUIRE(dense.predict(dt, options));
+      REQUIRE(dense.predict(static_cast<double>(dt), options));
       require_equal(split, dense, tolerance);
       if (random.uniform() < 0.3) continue;
       const double s = 0.05 * start.width();
       const cfp::Box<double> seen{start.x1 + 3 * k + s * random.normal(), start.y1 + s * random.normal(),
                                   start.x2 + 3 * k + s * random.normal(), start.y2 + s * random.normal()};
       cfp::correct_box(split, cast(seen), options);
-      REQUIRE(dense.correct(cast(seen), options));
+      REQUIRE(dense.correct(seen, options));
       require_equal(split, dense, tolerance);
     }
   }

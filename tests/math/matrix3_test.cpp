@@ -1,8 +1,8 @@
 #include "cfp/math/matrix3.hpp"
 
 #include <algorithm>
+#include <functional>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/SVD>
 
@@ -69,8 +69,9 @@ TEST_CASE("Orthogonalised columns of a symmetric matrix are its eigenvectors, la
     }
     Matrix9 A = M, V = Matrix9::Identity();
     cfp::detail::orthogonalize_columns(A, V);
-    const Eigen::SelfAdjointEigenSolver<Matrix9> expected(M);
-    for (int k = 0; k < 9; ++k) CHECK_THAT(A.col(k).norm(), WithinAbs(expected.eigenvalues()[8 - k], 1e-12));
+    const Eigen::Matrix<double, 9, 1> values = A.colwise().norm();
+    CHECK(std::is_sorted(values.begin(), values.end(), std::greater<>()));
+    CHECK((A - V * values.asDiagonal()).norm() < 1e-12);
     CHECK((M * V - A).norm() < 1e-12);
     CHECK((V.transpose() * V - Matrix9::Identity()).norm() < 1e-13);
   }
