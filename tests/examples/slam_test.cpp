@@ -1,5 +1,6 @@
 #include "../../examples/slam/loop/run.hpp"
 
+#include <cstdlib>
 #include <opencv2/imgcodecs.hpp>
 #include <unordered_map>
 
@@ -20,20 +21,37 @@ namespace {
 
 constexpr std::size_t frames = 48;
 
-/// A small walking sequence, rendered once for all tests.
-const std::filesystem::path& rendered() {
-  static const cfp_test::TemporaryFolder folder;
-  static const bool written = [] {
-    synthetic::SequenceOptions options;
-    options.scenario = synthetic::Scenario::walking;
-    options.motion = synthetic::Motion::xyz;
-    options.frames = static_cast<int>(frames);
-    options.camera = synthetic::SequenceOptions::default_camera(320);
-    synthetic::write_sequence(synthetic::Sequence(options), folder.path, 2, [](int) {});
-    return true;
-  }();
-  REQUIRE(written);
-  return folder.path;
+/// A recording that many tests read. Each test is a process of ctest's, which has the recordings made before all of
+/// them; a program that is run by hand makes its own.
+std::filesystem::path recording(const char* name, const synthetic::SequenceOptions& options) {
+  static const cfp_test::TemporaryFolder own;
+  const char* shared = std::getenv("CFP_TEST_RECORDINGS");
+  const std::filesystem::path folder = (shared ? std::filesystem::path(shared) : own.path) / name;
+  if (!std::filesystem::exists(folder)) {
+    std::filesystem::create_directories(folder);
+    synthetic::write_sequence(synthetic::Sequence(options), folder, 2, [](int) {});
+  }
+  return folder;
+}
+
+/// A small walking sequence.
+std::filesystem::path rendered() {
+  synthetic::SequenceOptions options;
+  options.scenario = synthetic::Scenario::walking;
+  options.motion = synthetic::Motion::xyz;
+  options.frames = static_cast<int>(frames);
+  options.camera = synthetic::SequenceOptions::default_camera(320);
+  return recording("walking", options);
+}
+
+/// A room without people.
+std::filesystem::path empty_room() {
+  synthetic::SequenceOptions options;
+  options.motion = synthetic::Motion::halfsphere;
+  options.frames = 120;
+  options.people = 0;
+  options.camera = synthetic::SequenceOptions::default_camera(320);
+  return recording("empty_room", options);
 }
 
 using cfp_examples::FileDetector;
@@ -66,6 +84,14 @@ cfp_test::TemporaryFolder& changed(cfp_test::TemporaryFolder& folder, const Chan
 }
 
 }  // namespace
+
+TEST_CASE("The recordings that the other tests read", "[.recordings]") {
+  const char* shared = std::getenv("CFP_TEST_RECORDINGS");
+  REQUIRE(shared);
+  std::filesystem::remove_all(shared);
+  CHECK(Sequence(rendered()).size() == frames);
+  CHECK(Sequence(empty_room()).size() == 120);
+}
 
 TEST_CASE("A sequence with walking people: every frame is tracked, to a centimetre", "[slam]") {
   RunRecord r = run(rendered());
@@ -218,23 +244,7 @@ TEST_CASE("The fine stage after a relocalisation rests on the inliers of the pos
 
 namespace {
 
-/// 120 frames of an empty room.
-const std::filesystem::path& empty_room() {
-  static const cfp_test::TemporaryFolder folder;
-  static const bool written = [] {
-    synthetic::SequenceOptions options;
-    options.motion = synthetic::Motion::halfsphere;
-    options.frames = 120;
-    options.people = 0;
-    options.camera = synthetic::SequenceOptions::default_camera(320);
-    synthetic::write_sequence(synthetic::Sequence(options), folder.path, 2, [](int) {});
-    return true;
-  }();
-  REQUIRE(written);
-  return folder.path;
-}
-
-/// That room under a stress.
+/// The empty room under a stress.
 StressResult under(const Stress& stress, std::vector<FrameRecord>& records, Options options = {}) {
   const Sequence sequence(empty_room());
   NoDetector none;
@@ -320,31 +330,33 @@ TEST_CASE("A new map of what covers the view is given up when that goes, and no 
 }
 
 TEST_CASE("A camera that goes there and back needs no larger map the longer it does", "[slam]") {
+  struct MapSizes final : Observer {
+    std::vector<double> keyframes, points;  // after each frame
+    void decided(const cfp::StaticProbability<Camera>&, const Frame&, const Map& map) override {
+      keyframes.push_back(static_cast<double>(map.alive_keyframes.size()));
+      points.push_back(static_cast<double>(map.alive_points()));
+    }
+  } sizes;
   const Sequence sequence(empty_room());
-  RunResult results[2];
-  for (const std::size_t passes : {2U, 6U}) {
-    FrameSource source(sequence);
-    source.size = passes * 120;
-    source.load = [&](std::size_t k) {
-      cfp_examples::SequenceFrame frame = sequence.load(k / 120 % 2 == 0 ? k % 120 : 119 - k % 120);
-      frame.time_s = static_cast<double>(k) / 30;
-      return frame;
-    };
-    NoDetector none;
-    Observer nobody;
-    Options options;
-    options.threads = false;
-    results[passes == 6] = run_slam(source, none, options, nobody);
-  }
-  const RunResult &brief = results[0], &lengthy = results[1];
-  CAPTURE(brief.keyframes, lengthy.keyframes, brief.map_points, lengthy.map_points);
-  REQUIRE(lengthy.trajectory.size() == 720);
-  CHECK(double(lengthy.keyframes) < 1.5 * double(brief.keyframes));
-  CHECK(double(lengthy.map_points) < 1.3 * double(brief.map_points));
+  FrameSource source(sequence);
+  source.size = 720;
+  source.load = [&](std::size_t k) {
+    cfp_examples::SequenceFrame frame = sequence.load(k / 120 % 2 == 0 ? k % 120 : 119 - k % 120);
+    frame.time_s = static_cast<double>(k) / 30;
+    return frame;
+  };
+  NoDetector none;
+  Options options;
+  options.threads = false;
+  const RunResult result = run_slam(source, none, options, sizes);
+  REQUIRE(sizes.points.size() == 720);
+  CAPTURE(sizes.keyframes[239], sizes.keyframes[719], sizes.points[239], sizes.points[719]);
+  CHECK(sizes.keyframes[719] < 1.5 * sizes.keyframes[239]);
+  CHECK(sizes.points[719] < 1.3 * sizes.points[239]);
+  REQUIRE(result.trajectory.size() == 720);
   for (std::size_t k = 0; k < 720; ++k) {  // where it is does not change with the pass
-    const std::size_t same = k % 240;
-    CHECK((lengthy.trajectory[k].T_world_cam.translation - lengthy.trajectory[same].T_world_cam.translation).norm() <
-          0.02);
+    const auto center = [&](std::size_t frame) { return result.trajectory[frame].T_world_cam.translation; };
+    CHECK((center(k) - center(k % 240)).norm() < 0.02);
   }
 }
 

@@ -5,7 +5,7 @@
 
 #include "cfp/core/random.hpp"
 #include "support/catch.hpp"
-#include "support/frame_engines.hpp"
+#include "support/engines.hpp"
 
 namespace {
 

@@ -6,7 +6,7 @@
 #include "cfp/frame/static_probability.hpp"
 #include "cfp_testing/generators.hpp"
 #include "cfp_testing/people.hpp"
-#include "support/frame_engines.hpp"
+#include "support/engines.hpp"
 #include "support/properties.hpp"
 
 using cfp::Random;

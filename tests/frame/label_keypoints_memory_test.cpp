@@ -7,6 +7,7 @@
 #include "cfp/core/random.hpp"
 #include "cfp/frame/static_probability.hpp"
 #include "support/catch.hpp"
+#include "support/engines.hpp"
 
 namespace {
 

@@ -9,6 +9,7 @@
 #include "cfp/core/random.hpp"
 #include "cfp/optimization/pose/pose_refinement.hpp"
 #include "support/catch.hpp"
+#include "support/engines.hpp"
 
 using cfp::PoseHealth;
 

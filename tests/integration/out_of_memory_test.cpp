@@ -14,6 +14,7 @@
 #include "support/ba_scene.hpp"
 #include "support/catch.hpp"
 #include "support/dynamic_scene.hpp"
+#include "support/engines.hpp"
 #include "support/pose_scene.hpp"
 #include "support/two_view_scene.hpp"
 

@@ -8,6 +8,7 @@
 #include "cfp/optimization/robust_loss.hpp"
 #include "cfp_testing/generators.hpp"
 #include "support/ba_scene.hpp"
+#include "support/engines.hpp"
 #include "support/pose_scene.hpp"
 #include "support/properties.hpp"
 

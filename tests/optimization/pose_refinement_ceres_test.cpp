@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "support/catch.hpp"
+#include "support/engines.hpp"
 #include "support/pose_ceres.hpp"
 
 namespace {

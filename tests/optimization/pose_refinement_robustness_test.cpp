@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "support/catch.hpp"
+#include "support/engines.hpp"
 #include "support/pose_scene.hpp"
 
 namespace {

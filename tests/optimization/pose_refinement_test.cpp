@@ -8,6 +8,7 @@
 
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
+#include "support/engines.hpp"
 #include "support/pose_scene.hpp"
 
 namespace {

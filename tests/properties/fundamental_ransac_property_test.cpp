@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "support/catch.hpp"
+#include "support/engines.hpp"
 
 #include <rapidcheck/catch.h>
 

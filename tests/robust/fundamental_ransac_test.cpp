@@ -15,6 +15,7 @@
 #include "support/catch.hpp"
 #include "support/data.hpp"
 #include "support/dynamic_scene.hpp"
+#include "support/engines.hpp"
 #include "support/two_view_scene.hpp"
 
 using cfp::fundamental_ransac;

@@ -10,6 +10,7 @@
 #include "support/absolute_pose_scene.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
+#include "support/engines.hpp"
 #include "support/numeric_gradient.hpp"
 
 using cfp::PinholeCamera;

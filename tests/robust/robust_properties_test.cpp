@@ -8,6 +8,7 @@
 #include "cfp/robust/ransac.hpp"
 #include "cfp_testing/generators.hpp"
 #include "support/absolute_pose_scene.hpp"
+#include "support/engines.hpp"
 #include "support/properties.hpp"
 #include "support/two_view_scene.hpp"
 

@@ -9,7 +9,7 @@
 
 #include "cfp/frame/static_probability.hpp"
 #include "support/dynamic_scene.hpp"
-#include "support/frame_engines.hpp"
+#include "support/engines.hpp"
 
 namespace cfp_test {
 

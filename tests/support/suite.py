@@ -15,7 +15,7 @@ ROOMS = "core simd math geometry detection clustering probability robust optimiz
 PRECOMPILED = ["support/catch.hpp", *(f"<{h}>" for h in "Eigen/Core algorithm array cmath functional limits string vector".split())]
 
 ENGINES = {  # what the tests of a room instantiate alike, compiled once, and the flag that leaves it to that
-    "frame": (TESTS / "support/frame_engines.cpp", ["-DCFP_TEST_FRAME_ENGINES"]),
+    "frame": (TESTS / "support/engines.cpp", ["-DCFP_TEST_ENGINES_LINKED"]),
     "interop": (ROOT / "examples/integration/orb_slam/engines.cc", []),
 }
 

@@ -13,6 +13,7 @@
 #include "support/absolute_pose_scene.hpp"
 #include "support/catch.hpp"
 #include "support/dynamic_scene.hpp"
+#include "support/engines.hpp"
 #include "support/pose_scene.hpp"
 #include "support/threads.hpp"
 #include "support/two_view_scene.hpp"

@@ -1,0 +1,2 @@
+#define CFP_TEST_INSTANCE template
+#include "support/engines.hpp"

@@ -1,2 +1,0 @@
-#define CFP_TEST_INSTANCE template
-#include "support/frame_engines.hpp"
