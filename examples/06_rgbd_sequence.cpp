@@ -28,6 +28,8 @@
 #include "support/variant.hpp"
 #include "support/write_picture.hpp"
 
+extern template class cfp::StaticProbability<cfp::PinholeCamera<float>>;  // in integration/engines.cc
+
 namespace {
 
 /// What is known of one image.

@@ -5,6 +5,8 @@
 #include "../orb_slam/static_weights.hpp"
 #include "host.hpp"
 
+extern template class cfp::StaticProbability<cfp::PinholeCamera<float>>;  // compiled in engines.cc alone
+
 // [glue]
 struct Miniature {
   using Frame = ::Frame;

@@ -5,6 +5,8 @@
 
 #include "cfp/frame/static_probability.hpp"
 
+extern template class cfp::StaticProbability<cfp::PinholeCamera<float>>;  // compiled in engines.cc alone
+
 // [glue]
 struct cfp_weights {
   cfp_weights(const cfp::PinholeCamera<float>& camera, const cfp::FrameOptions& options)

@@ -8,6 +8,8 @@
 #include "cfp/frame/static_probability.hpp"
 #include "host.hpp"
 
+extern template class cfp::StaticProbability<cfp::PinholeCamera<float>>;  // compiled in engines.cc alone
+
 // [glue]
 class static_weights {
  public:

@@ -16,6 +16,9 @@
 #include "observer.hpp"
 #include "options.hpp"
 
+extern template cfp::BundleResult cfp::adjust_bundle(const BundleProblem<PinholeCamera<double>, float>&,
+                                                     const BundleOptions&, BundleWorkspace&, span<double>);
+
 namespace cfp_slam {
 
 class LocalBundle {

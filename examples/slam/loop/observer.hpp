@@ -5,6 +5,9 @@
 #include "map.hpp"
 #include "record.hpp"
 
+// Compiled in run.cpp alone, as all that takes long is.
+extern template class cfp::StaticProbability<cfp_slam::Camera>;
+
 namespace cfp_slam {
 
 class Observer {

@@ -14,6 +14,10 @@
 #include "last_frame_matching.hpp"
 #include "options.hpp"
 
+extern template cfp::PoseResult cfp::refine_pose(const PoseObservations<double>&, const PinholeCamera<double>&,
+                                                 const SE3<double>&, const PoseOptions&, PoseWorkspace<double>&,
+                                                 span<char>);
+
 namespace cfp_slam {
 
 struct BelievedPose {

@@ -13,6 +13,10 @@
 #include "cfp/robust/pnp_ransac.hpp"
 #include "matching.hpp"
 
+extern template cfp::PnpRansacResult<float> cfp::pnp_ransac(PointSpan<float, 3>, PointSpan<float, 2>, span<const float>,
+                                                            const PinholeCamera<float>&, const PnpRansacOptions&,
+                                                            PnpRansacWorkspace&, span<char>);
+
 namespace cfp_slam {
 
 class Relocalization {

@@ -6,6 +6,19 @@
 #include "front_end.hpp"
 #include "tracking.hpp"
 
+namespace cfp {
+
+template class StaticProbability<cfp_slam::Camera>;
+template PoseResult refine_pose(const PoseObservations<double>&, const PinholeCamera<double>&, const SE3<double>&,
+                                const PoseOptions&, PoseWorkspace<double>&, span<char>);
+template PnpRansacResult<float> pnp_ransac(PointSpan<float, 3>, PointSpan<float, 2>, span<const float>,
+                                           const PinholeCamera<float>&, const PnpRansacOptions&, PnpRansacWorkspace&,
+                                           span<char>);
+template BundleResult adjust_bundle(const BundleProblem<PinholeCamera<double>, float>&, const BundleOptions&,
+                                    BundleWorkspace&, span<double>);
+
+}  // namespace cfp
+
 namespace cfp_slam {
 
 Options fitted(Options options, const FrameSource& source, const cfp_examples::Detector& detector) {
