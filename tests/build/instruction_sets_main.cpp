@@ -1,9 +1,10 @@
 // One program of units compiled with different vector flags, run on the same inputs: results differ by rounding only,
-// and those of the baseline unit are the bits it gives in a program without the others. CFP_ALONE: that program.
+// and those of the baseline unit are the bits it gives in a program without the others. CFP_OTHERS: the other units,
+// each as X(flags); not defined in the program without.
 //   cfp_build_baseline_alone FILE   writes the baseline's results;   cfp_build_mixed FILE   compares.
 #include <cmath>
 #include <cstdio>
-#include <cstring>
+#include <string>
 
 #include "instruction_sets.hpp"
 
@@ -12,10 +13,10 @@ using cfp_isa_test::Inputs;
 using cfp_isa_test::Result;
 
 std::vector<Result> baseline(const AllInputs&);
-#ifndef CFP_ALONE
-std::vector<Result> scalar(const AllInputs&);
-std::vector<Result> avx2(const AllInputs&);
-std::vector<Result> avx512(const AllInputs&);
+#ifdef CFP_OTHERS
+#define X(flags) std::vector<Result> flags(const AllInputs&);
+CFP_OTHERS
+#undef X
 #endif
 
 namespace {
@@ -94,26 +95,32 @@ AllInputs make_all_inputs() {
   return different == 0 && !results.empty();
 }
 
+[[maybe_unused]] bool machine_has(const std::string& flags) {
+  if (flags == "avx2") return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+  if (flags == "avx512")
+    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+           __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl");
+  return true;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   if (argc != 2) return 2;
   const AllInputs in = make_all_inputs();
   const std::vector<Result> base = baseline(in);
-#ifdef CFP_ALONE
-  return write(base, argv[1]);
-#else
+#ifdef CFP_OTHERS
   std::vector<double> values;
   for (const Result& r : base) values.push_back(r.value);
   bool good = agree("baseline beside the others", base, read(argv[1]), 0);
-  good = agree("scalar", scalar(in), values, 1) && good;
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
-    good = agree("avx2", avx2(in), values, 1) && good;
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&
-      __builtin_cpu_supports("avx512vl"))
-    good = agree("avx512", avx512(in), values, 1) && good;
+#define X(flags) \
+  if (machine_has(#flags)) good = agree(#flags, flags(in), values, 1) && good;
+  CFP_OTHERS
+#undef X
   // Last, so that a unit's leavings would be seen.
   good = agree("baseline after the others", baseline(in), values, 0) && good;
   return good ? 0 : 1;
+#else
+  return write(base, argv[1]);
 #endif
 }
