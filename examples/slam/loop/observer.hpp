@@ -5,7 +5,7 @@
 #include "map.hpp"
 #include "record.hpp"
 
-// Compiled in run.cpp alone, as all that takes long is.
+// Compiled in integration/orb_slam/engines.cc alone.
 extern template class cfp::StaticProbability<cfp_slam::Camera>;
 
 namespace cfp_slam {

@@ -8,7 +8,6 @@
 
 namespace cfp {
 
-template class StaticProbability<cfp_slam::Camera>;
 template PoseResult refine_pose(const PoseObservations<double>&, const PinholeCamera<double>&, const SE3<double>&,
                                 const PoseOptions&, PoseWorkspace<double>&, span<char>);
 template PnpRansacResult<float> pnp_ransac(PointSpan<float, 3>, PointSpan<float, 2>, span<const float>,
