@@ -71,9 +71,10 @@ template <typename Scalar>
 FlowModel<Scalar> estimate_two_view_model(const FlowPairs<Scalar>& flow, span<const char> outside,
                                           const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
                                           FlowModelWorkspace<Scalar>& workspace) {
-  const auto found = static_cast<std::size_t>(std::count(outside.begin(), outside.end(), char(1)));
-  if (found < options.min_outside_pairs) return {};
-  workspace.weights.assign(outside.begin(), outside.end());
+  const auto inside = static_cast<std::size_t>(std::count(outside.begin(), outside.end(), char(0)));
+  if (outside.size() - inside < options.min_outside_pairs) return {};
+  workspace.weights.clear();
+  for (const char mark : outside) workspace.weights.push_back(mark == 0 ? Scalar(0) : Scalar(1));
   const FundamentalResult<Scalar> estimate = fundamental_ransac(
       PointPairs<Scalar>{flow.previous, flow.current, workspace.weights}, camera, options.ransac, workspace.ransac);
 

@@ -143,8 +143,9 @@ struct FundamentalSearch {
 
   // Minus the logarithm of the number of F that chance lets have so many of the pairs so near as the one whose noise
   // was measured last: weighs few pairs and little noise against many and more. A mismatch lies anywhere within some
-  // tenth of the image. Source: Moisan and Stival, "A probabilistic criterion to detect rigid point matches between two
-  // images and estimate the fundamental matrix", IJCV 2004.
+  // tenth of the image. C(n, k) by its entropy, C(k, 7) as (k - 3)^7 / 7!, of which 3.38 is the seventh root. Source:
+  // Moisan and Stival, "A probabilistic criterion to detect rigid point matches between two images and estimate the
+  // fundamental matrix", IJCV 2004.
   [[nodiscard]] T nats() const noexcept {
     const T n = static_cast<T>(size()), k = near_pairs, reach = T(0.25);
     if (!(k > 7)) return -std::numeric_limits<T>::infinity();
