@@ -188,7 +188,7 @@ TEST_CASE("The measured noise is the truncated variance of all pairs, by their w
 TEST_CASE("The noise of an F that was fitted to few pairs is not underestimated", "[robust]") {
   cfp::Random random(47, "noise of few");
   double variance = 0;
-  constexpr int trials = 100;
+  constexpr int trials = 400;
   for (int trial = 0; trial < trials; ++trial) {
     cfp_test::TwoViewOptions options;
     options.pairs = 20, options.noise_px = 0.5;
@@ -204,7 +204,9 @@ TEST_CASE("The noise of an F that was fitted to few pairs is not underestimated"
     search.measure_noise(F.matrix());
     variance += search.noise_variance / px_sq / trials;
   }
-  CHECK(variance == Approx(0.25).epsilon(0.1));  // 0.16 without the seven that F follows
+  CAPTURE(variance);  // 0.27, give or take 0.006; 0.16 without the seven that F follows
+  CHECK(variance > 0.24);
+  CHECK(variance < 0.3);
 }
 
 TEST_CASE("A pair that a homography maps to infinity costs as much as any mismatch", "[robust]") {
