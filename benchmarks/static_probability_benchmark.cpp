@@ -15,12 +15,12 @@
 
 #include <Eigen/Geometry>
 
-#include "cfp/core/random.hpp"
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/reprojection.hpp"
 #include "cfp/probability/distance_sigmoid.hpp"
 #include "cfp/probability/object.hpp"
 #include "cfp/probability/second_stage_probability.hpp"
+#include "support/matches.hpp"
 
 #ifdef CFP_HAVE_BOOST
 #include <boost/math/distributions/chi_squared.hpp>
@@ -30,46 +30,17 @@ namespace {
 
 using cfp::span;
 
-template <typename Scalar>
-struct Matches {
-  std::vector<cfp::Vector2<Scalar>> prev, cur;
-  std::vector<Scalar> depth;
-};
+using cfp_benchmark::camera;
+using cfp_benchmark::Matches;
+using cfp_benchmark::pose;
 
-const cfp::PinholeCamera<double> camera{535.4, 539.2, 320.1, 247.6};
 constexpr std::size_t pose_inliers = 300;
 constexpr double object_probability_of_frame = 0.95;  // low dynamic: the branch of the combination with more arithmetic
 
-cfp::SE3<double> pose() {
-  cfp::Vector6<double> xi;
-  xi << 0.05, -0.02, 0.03, 0.01, -0.02, 0.005;
-  return cfp::se3_exp(xi);
-}
-
-template <typename Scalar>
-cfp::PinholeCamera<Scalar> camera_as() {
-  return {Scalar(camera.fx), Scalar(camera.fy), Scalar(camera.cx), Scalar(camera.cy)};
-}
-
-/// Sets of n matches that are off by 1 px of noise: 2^14 matches together, or 4 sets.
+/// 2^14 matches together, or 4 sets.
 template <typename Scalar>
 std::vector<Matches<Scalar>> make_matches(std::size_t n) {
-  std::vector<Matches<Scalar>> all((std::max)(std::size_t(4), (std::size_t(1) << 14U) / n));
-  cfp::Random random(1, "matches");
-  for (Matches<Scalar>& matches : all) {
-    while (matches.prev.size() < n) {
-      const cfp::Vector2<double> pixel(random.uniform(0, 640), random.uniform(0, 480));
-      const double depth = random.uniform(0.6, 6);
-      cfp::Vector3<double> ray = cfp::Vector3<double>::Zero();
-      cfp::Vector2<double> seen = cfp::Vector2<double>::Zero();
-      if (!camera.unproject(pixel, ray) || !camera.project(pose() * cfp::Vector3<double>(ray * depth), seen)) continue;
-      seen += cfp::Vector2<double>(random.normal(), random.normal());
-      matches.prev.push_back(pixel.cast<Scalar>());
-      matches.cur.push_back(seen.cast<Scalar>());
-      matches.depth.push_back(static_cast<Scalar>(depth));
-    }
-  }
-  return all;
+  return cfp_benchmark::make_matches<Scalar>((std::max)(std::size_t(4), (std::size_t(1) << 14U) / n), n);
 }
 
 template <typename Scalar>
@@ -82,7 +53,7 @@ template <bool combined, typename Scalar>
 void stage_two(const Matches<Scalar>& in, const cfp::SE3<Scalar>& T, const cfp::Matrix3<Scalar>& F,
                Buffers<Scalar>& b) {
   const cfp::ConstraintOptions options;
-  cfp::reprojection_distances(in.prev, in.depth, in.cur, T, camera_as<Scalar>(), b.projection);
+  cfp::reprojection_distances(in.prev, in.depth, in.cur, T, camera.cast<Scalar>(), b.projection);
   cfp::epipolar_distances(F, in.prev, in.cur, b.epipolar);
   const auto by_projection = cfp::fit_constraint(b.projection, options, b.scratch);
   const auto by_line = cfp::fit_constraint(b.epipolar, options, b.scratch);

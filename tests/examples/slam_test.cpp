@@ -404,6 +404,20 @@ TEST_CASE("Poses of a new map by what moved away before it was joined are taken 
   CHECK(result.poses - result.right < 3);  // a keyframe that saw board and room may stay
 }
 
+namespace {
+
+/// Of the rendered recording, every frame.
+std::vector<FrameRecord> records_with(cfp_examples::Detector& detector) {
+  StressObserver observer;
+  Options options;
+  options.threads = false;
+  run_slam(Sequence(rendered()), detector, options, observer);
+  REQUIRE(observer.records.size() == frames);
+  return observer.records;
+}
+
+}  // namespace
+
 TEST_CASE("A detector that falls silent is noticed, and what it knew is carried on", "[slam]") {
   struct Silent final : cfp_examples::Detector {
     Silent() : Detector("silent", {"person"}) {}
@@ -414,15 +428,11 @@ TEST_CASE("A detector that falls silent is noticed, and what it knew is carried 
     }
     int frame_ = 0;
   } detector;
-  StressObserver observer;
-  Options options;
-  options.threads = false;
-  run_slam(Sequence(rendered()), detector, options, observer);
-  REQUIRE(observer.records.size() == frames);
+  const std::vector<FrameRecord> records = records_with(detector);
   for (std::size_t k = 0; k < frames; ++k) {
     CAPTURE(k);
-    CHECK((observer.records[k].note.find("detector silent") != std::string::npos) == (k >= 22));
-    CHECK(observer.records[k].boxes.size() == 1);  // six frames without its being noticed
+    CHECK((records[k].note.find("detector silent") != std::string::npos) == (k >= 22));
+    CHECK(records[k].boxes.size() == 1);  // six frames without its being noticed
   }
 }
 
@@ -478,14 +488,10 @@ TEST_CASE("A detector that has nothing left to see is not called silent", "[slam
     }
     int frame_ = 0;
   } detector;
-  StressObserver observer;
-  Options options;
-  options.threads = false;
-  run_slam(Sequence(rendered()), detector, options, observer);
-  REQUIRE(observer.records.size() == frames);
+  const std::vector<FrameRecord> records = records_with(detector);
   for (std::size_t k = 30; k < frames; ++k) {
     CAPTURE(k);
-    CHECK(observer.records[k].note.empty());
+    CHECK(records[k].note.empty());
   }
 }
 

@@ -28,14 +28,33 @@ struct AbsolutePoseScene {
   std::vector<char> is_inlier;
 };
 
+/// A rotation of up to 3 rad about any axis.
+inline cfp::Matrix3<double> random_rotation(cfp::Random& random) {
+  const cfp::Vector3<double> axis =
+      cfp::Vector3<double>(random.normal(), random.normal(), random.normal()).normalized();
+  return cfp::so3_exp<double>(random.uniform(0, 3) * axis);
+}
+
+/// Adds the map point x as seen at u: with noise, or a mismatch, or not at all where that would be too near.
+template <typename Scalar>
+void observe(cfp::Random& random, const AbsolutePoseOptions& options, const cfp::Vector3<double>& x,
+             const cfp::Vector2<double>& u, AbsolutePoseScene<Scalar>& scene) {
+  const bool inlier = random.uniform() >= options.outlier_share;
+  cfp::Vector2<double> measured = u + options.noise_px * cfp::Vector2<double>(random.normal(), random.normal());
+  if (!inlier) measured = cfp::Vector2<double>(random.uniform(0, 640), random.uniform(0, 480));
+  if (!inlier && (measured - u).norm() < options.outlier_min_px) return;
+  scene.world.push_back({static_cast<Scalar>(x.x()), static_cast<Scalar>(x.y()), static_cast<Scalar>(x.z())});
+  scene.pixels.push_back({static_cast<Scalar>(measured.x()), static_cast<Scalar>(measured.y())});
+  scene.weights.push_back(static_cast<Scalar>(inlier ? random.uniform(0.5, 1) : random.uniform(0, 0.5)));
+  scene.is_inlier.push_back(inlier ? 1 : 0);
+}
+
 template <typename Scalar, typename Camera>
 AbsolutePoseScene<Scalar> make_absolute_pose_scene(cfp::Random& random, const Camera& camera,
                                                    const AbsolutePoseOptions& options) {
   using CameraScalar = typename Camera::ScalarType;
   AbsolutePoseScene<Scalar> scene;
-  const cfp::Vector3<double> axis =
-      cfp::Vector3<double>(random.normal(), random.normal(), random.normal()).normalized();
-  scene.T_cam_world.rotation = cfp::so3_exp<double>(random.uniform(0, 3) * axis);
+  scene.T_cam_world.rotation = random_rotation(random);
   scene.T_cam_world.translation = cfp::Vector3<double>(random.normal(), random.normal(), random.normal());
   const cfp::SE3<double> T_world_cam = scene.T_cam_world.inverse();
   while (scene.world.size() < options.points) {
@@ -43,14 +62,7 @@ AbsolutePoseScene<Scalar> make_absolute_pose_scene(cfp::Random& random, const Ca
     cfp::Vector3<CameraScalar> ray(0, 0, 1);
     if (!camera.unproject(u.cast<CameraScalar>(), ray)) continue;
     const cfp::Vector3<double> x = T_world_cam * (random.uniform(0.6, 5) * ray.template cast<double>());
-    const bool inlier = random.uniform() >= options.outlier_share;
-    cfp::Vector2<double> measured = u + options.noise_px * cfp::Vector2<double>(random.normal(), random.normal());
-    if (!inlier) measured = cfp::Vector2<double>(random.uniform(0, 640), random.uniform(0, 480));
-    if (!inlier && (measured - u).norm() < options.outlier_min_px) continue;
-    scene.world.push_back({static_cast<Scalar>(x.x()), static_cast<Scalar>(x.y()), static_cast<Scalar>(x.z())});
-    scene.pixels.push_back({static_cast<Scalar>(measured.x()), static_cast<Scalar>(measured.y())});
-    scene.weights.push_back(static_cast<Scalar>(inlier ? random.uniform(0.5, 1) : random.uniform(0, 0.5)));
-    scene.is_inlier.push_back(inlier ? 1 : 0);
+    observe(random, options, x, u, scene);
   }
   return scene;
 }
@@ -60,22 +72,13 @@ template <typename Scalar, typename Camera>
 AbsolutePoseScene<Scalar> make_long_lens_scene(cfp::Random& random, const Camera& camera,
                                                const AbsolutePoseOptions& options) {
   AbsolutePoseScene<Scalar> scene;
-  const cfp::Vector3<double> axis =
-      cfp::Vector3<double>(random.normal(), random.normal(), random.normal()).normalized();
-  scene.T_cam_world.rotation = cfp::so3_exp<double>(random.uniform(0, 3) * axis);
+  scene.T_cam_world.rotation = random_rotation(random);
   scene.T_cam_world.translation = cfp::Vector3<double>(random.uniform(-0.2, 0.2), random.uniform(-0.2, 0.2), 20);
   while (scene.world.size() < options.points) {
     const cfp::Vector3<double> x(random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1));
     cfp::Vector2<double> u(0, 0);
     if (!camera.project(scene.T_cam_world * x, u)) continue;
-    const bool inlier = random.uniform() >= options.outlier_share;
-    cfp::Vector2<double> measured = u + options.noise_px * cfp::Vector2<double>(random.normal(), random.normal());
-    if (!inlier) measured = cfp::Vector2<double>(random.uniform(0, 640), random.uniform(0, 480));
-    if (!inlier && (measured - u).norm() < options.outlier_min_px) continue;
-    scene.world.push_back({static_cast<Scalar>(x.x()), static_cast<Scalar>(x.y()), static_cast<Scalar>(x.z())});
-    scene.pixels.push_back({static_cast<Scalar>(measured.x()), static_cast<Scalar>(measured.y())});
-    scene.weights.push_back(static_cast<Scalar>(inlier ? random.uniform(0.5, 1) : random.uniform(0, 0.5)));
-    scene.is_inlier.push_back(inlier ? 1 : 0);
+    observe(random, options, x, u, scene);
   }
   return scene;
 }
