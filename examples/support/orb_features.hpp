@@ -1,7 +1,6 @@
 // ORB keypoints spread over the image. OpenCV's detector keeps the strongest corners of the whole image, which crowd on
 // a few textured things (often the people's clothes); here every cell of every level of the pyramid gives its best
-// corners in turn, where a cell has fewer than its share the threshold falls, and most go to what is outside of all
-// boxes.
+// corners in turn, where a cell has fewer than its share the threshold falls, and most go to the room.
 #pragma once
 
 #include <algorithm>
@@ -15,8 +14,6 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "cfp/geometry/box.hpp"
-
 namespace cfp_examples {
 
 using OrbDescriptor = std::array<std::uint64_t, 4>;  // 256 bits
@@ -28,7 +25,7 @@ struct FeatureOptions {
   int fast_threshold = 12;    // grey levels, and
   int lowest_threshold = 5;   // in cells where that finds too little
   int cell = 40;              // pixels, at the level's own scale
-  double room_share = 0.6;    // of the keypoints, outside of the boxes, if there are so many
+  double room_share = 0.6;    // of the keypoints, where the mask says room, if there are so many
 };
 
 // Standard deviation of a keypoint's position in pixels, per level: the corner is found on that level's grid.
@@ -45,8 +42,8 @@ class FeatureExtractor {
     for (const float scale : level_sigmas(options)) levels_.push_back({int(levels_.size()), double(scale)});
   }
 
-  // boxes: where people may be.
-  void operator()(const cv::Mat& gray, const std::vector<cfp::Box<float>>& boxes, std::vector<cv::KeyPoint>& keypoints,
+  // room: 8-bit, of the image's size, 0 where people may be (room_mask); empty: nowhere.
+  void operator()(const cv::Mat& gray, const cv::Mat& room, std::vector<cv::KeyPoint>& keypoints,
                   std::vector<OrbDescriptor>& descriptors) {
     keypoints.clear();
     descriptors.clear();
@@ -67,7 +64,7 @@ class FeatureExtractor {
       const double share = level.weight * std::min(1.0, options_.count / corners);
       wanted += share;
       of_room += options_.room_share * share;
-      of_room -= double(select(level, boxes, wanted, of_room));
+      of_room -= double(select(level, room, wanted, of_room));
       wanted -= double(selected_.size());
       describe(level, keypoints, descriptors);
     }
@@ -124,12 +121,11 @@ class FeatureExtractor {
 
   // The best corner of each cell, then the second best of each, and so on; people get what the room leaves. Returns how
   // many the room got.
-  std::ptrdiff_t select(Level& level, const std::vector<cfp::Box<float>>& boxes, double wanted, double of_room) {
+  std::ptrdiff_t select(Level& level, const cv::Mat& room, double wanted, double of_room) {
     std::vector<cv::KeyPoint>& corners = level.corners;
     const auto scale = static_cast<float>(level.scale);
     const auto is_room = [&](const cv::KeyPoint& k) {
-      return std::none_of(boxes.begin(), boxes.end(),
-                          [&](const auto& b) { return cfp::contains(b, k.pt.x * scale, k.pt.y * scale); });
+      return room.empty() || room.at<unsigned char>(cv::Point(k.pt * scale)) != 0;
     };
     std::stable_sort(corners.begin(), corners.end(),
                      [](const cv::KeyPoint& a, const cv::KeyPoint& b) { return a.response > b.response; });
@@ -141,17 +137,17 @@ class FeatureExtractor {
       rounds_[round].push_back(k);
     }
     const auto total = static_cast<std::size_t>(std::lround(std::min(wanted, double(corners.size()))));
-    const auto room = double(std::count_if(corners.begin(), corners.end(), is_room));
-    auto for_people = std::lround(double(total) - std::clamp(of_room, 0.0, std::min(room, double(total))));
+    const auto in_room = double(std::count_if(corners.begin(), corners.end(), is_room));
+    auto for_people = std::lround(double(total) - std::clamp(of_room, 0.0, std::min(in_room, double(total))));
     std::ptrdiff_t chosen_of_room = 0;
     selected_.clear();
     for (const auto& round : rounds_) {
       for (const cv::KeyPoint& k : round) {
         if (selected_.size() == total) return chosen_of_room;
-        const bool in_room = is_room(k);
-        if (!in_room && for_people-- <= 0) continue;
+        const bool of_people = !is_room(k);
+        if (of_people && for_people-- <= 0) continue;
         selected_.push_back(k);
-        chosen_of_room += in_room ? 1 : 0;
+        chosen_of_room += of_people ? 0 : 1;
       }
     }
     return chosen_of_room;

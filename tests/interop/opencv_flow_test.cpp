@@ -62,6 +62,7 @@ TEST_CASE("Pairs follow the image, over several frames", "[flow]") {
 TEST_CASE("The defaults of the flow", "[flow]") {
   const cfp::OpticalFlowOptions o;
   CHECK((o.corners == 500 && o.corner_distance == 6 && o.corner_quality == 0.01 && o.keypoints_per_box == 100));
+  CHECK(o.room_share == 0.6);
   CHECK((o.keypoints_outside == 0 && o.window == 11 && o.levels == 4 && o.iterations == 20 && o.precision == 0.02));
 }
 
@@ -137,6 +138,33 @@ TEST_CASE("Corners keep their distance; without a pyramid they are found at full
     CHECK((smallest >= 5.99 && smallest < 9));
     CHECK(odd == (levels == 1));
   }
+}
+
+TEST_CASE("Where the room is known it gets its share of the corners, however weak they are", "[flow]") {
+  cv::Mat image = texture(), middle = cv::Mat(image.size(), CV_8U, cv::Scalar(255));
+  const cv::Rect person(60, 0, 280, 300);
+  middle(person) = 0;
+  cv::Mat(0.4 * image).copyTo(image, middle);
+  const auto corners = [&](const cv::Mat& room, int most) {
+    cfp::OpticalFlowOptions options;
+    options.corners = most;
+    cfp::OpticalFlowTracker tracker(options);
+    tracker.track(image, {}, {});
+    tracker.track(image, {}, {}, room);
+    return tracker.previous();
+  };
+  const auto outside = [&](const std::vector<cv::Point2f>& points) {
+    return std::count_if(points.begin(), points.end(), [&](const auto& p) { return !person.contains(cv::Point(p)); });
+  };
+  const auto strongest = corners({}, 100), shared = corners(middle, 100);
+  CHECK(outside(strongest) < 30);
+  CHECK((shared.size() == 100 && outside(shared) == 60));
+  // Where the room has too few, the others get what is left; a mask of another size is none.
+  const auto all = corners({}, 5000);
+  const int most = static_cast<int>(all.size()) - 20;
+  CHECK((corners(middle, most).size() == all.size() - 20 && outside(corners(middle, most)) == outside(all)));
+  CHECK(corners(middle(cv::Rect(0, 0, 200, 300)), 100) == strongest);
+  CHECK(corners(cv::Mat(image.size(), CV_8U, cv::Scalar(0)), 100) == strongest);
 }
 
 TEST_CASE("Nothing to track, broken boxes and changed sizes make no pairs and no fuss", "[flow]") {

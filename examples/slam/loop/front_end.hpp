@@ -11,6 +11,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "../../detection/detector_types.hpp"
+#include "../../support/room_mask.hpp"
 #include "../../support/sequence.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/interop/opencv.hpp"
@@ -52,7 +53,8 @@ class FrontEnd {
     if (options_.use_flow())
       flow = std::async(launch, [&] {
         const Part part(observer_, Module::flow);
-        flow_.track(gray, last_keypoints_, last_boxes_);
+        cfp_examples::room_mask(gray.size(), last_depth_, metres_per_unit_, last_people_, flow_room_);
+        flow_.track(gray, last_keypoints_, last_boxes_, flow_room_);
       });
     {
       const Part part(observer_, Module::features);
@@ -72,15 +74,20 @@ class FrontEnd {
   }
 
   // The boxes of the frame just made, as the tracker has them: the next call's flow starts in them, and its keypoints
-  // are taken outside of them as far as possible.
+  // are taken outside of them and behind what is in them as far as possible.
   void set_boxes(const std::vector<BoxRecord>& boxes) {
     last_boxes_.clear();
-    for (const BoxRecord& box : boxes) last_boxes_.push_back(box.box);
+    last_people_.clear();
+    for (const BoxRecord& box : boxes) {
+      last_boxes_.push_back(box.box);
+      last_people_.push_back({box.box, box.depth_m});
+    }
   }
 
  private:
   void extract(const cv::Mat& gray, const cv::Mat& depth, Frame& frame) {
-    extract_(gray, last_boxes_, frame.keypoints, frame.descriptors);
+    cfp_examples::room_mask(gray.size(), depth, metres_per_unit_, last_people_, room_);
+    extract_(gray, room_, frame.keypoints, frame.descriptors);
     const auto pixels = cfp::undistorted(camera_, cfp::view(frame.keypoints), frame.pixels);
     frame.depths_m.resize(frame.size());
     cfp::sample_depth(depth, cfp::view(frame.keypoints), metres_per_unit_, frame.depths_m);
@@ -101,6 +108,8 @@ class FrontEnd {
   std::vector<cv::KeyPoint> last_keypoints_;
   cv::Mat last_depth_;
   std::vector<cfp::Box<float>> last_boxes_;
+  std::vector<cfp_examples::BoxedPerson> last_people_;
+  cv::Mat room_, flow_room_;  // of this image, of the last
 };
 
 }  // namespace cfp_slam

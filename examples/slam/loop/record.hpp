@@ -56,6 +56,7 @@ struct BoxRecord {
   double object_probability = 0;
   bool object_known = false;  // false: O is the value for "unknown"
   std::size_t flow_pairs = 0;
+  float depth_m = 0;  // of the object; 0: unknown
 };
 
 struct FrameRecord {

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <utility>
 #include <vector>
 
@@ -25,6 +26,7 @@ struct OpticalFlowOptions {
   int corners = 500;  ///< at most, over the whole image, found at half resolution: they carry the camera's motion
   double corner_distance = 6;    ///< between two of them, px
   double corner_quality = 0.01;  ///< least strength of a corner, as a share of the strongest one's
+  double room_share = 0.6;       ///< of the corners, where `track` is told that the room is seen, if there are so many
   int keypoints_per_box = 100;   ///< at most, besides, in each box, one per cell of a grid
   int keypoints_outside = 0;     ///< at most, outside all boxes, likewise
   int window = 11;               ///< side of the patch that is tracked, px
@@ -42,8 +44,10 @@ class OpticalFlowTracker {
 
   /// Makes the pairs between the image of the last call and this one (8-bit grey; none after the first call, or when
   /// the size has changed). keypoints and boxes are those of the previous image, which is where tracking starts;
-  /// improper boxes hold nothing.
-  void track(const cv::Mat& gray, const std::vector<cv::KeyPoint>& keypoints, span<const Box<float>> boxes) {
+  /// improper boxes hold nothing. room: 8-bit, 0 where the previous image shows what may move, people in boxes but not
+  /// what is seen behind them; empty, or of another size than the image: unknown.
+  void track(const cv::Mat& gray, const std::vector<cv::KeyPoint>& keypoints, span<const Box<float>> boxes,
+             const cv::Mat& room = {}) {
     std::swap(previous_pyramid_, pyramid_);
     const bool first = gray.empty() || previous_pyramid_.empty() || previous_pyramid_[0].size() != gray.size();
     from_.clear();
@@ -55,6 +59,7 @@ class OpticalFlowTracker {
                                                 cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);
     if (first) return;
     choose(keypoints, boxes, gray.size());
+    find_corners(room);
     if (from_.empty()) return;
 
     const cv::TermCriteria stop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, options_.iterations,
@@ -117,16 +122,28 @@ class OpticalFlowTracker {
     for (const cv::KeyPoint* k : strongest_) {
       if (k != nullptr) from_.push_back(k->pt);
     }
-    find_corners();
   }
 
-  void find_corners() {
+  // The strongest, of which the room has its share. Near people have many strong corners and the room around them few,
+  // but it is these that tell the camera's motion.
+  void find_corners(const cv::Mat& room) {
     if (options_.corners <= 0) return;
     const bool half = previous_pyramid_.size() > 2;  // images and derivatives take turns
     const float scale = half ? 2 : 1;
-    cv::goodFeaturesToTrack(previous_pyramid_[half ? 2 : 0], corners_, options_.corners, options_.corner_quality,
-                            options_.corner_distance / double(scale));
-    for (const cv::Point2f& corner : corners_) from_.push_back(scale * corner);
+    const bool known = room.type() == CV_8U && room.size() == previous_pyramid_[0].size();
+    cv::goodFeaturesToTrack(previous_pyramid_[half ? 2 : 0], corners_, known ? 0 : options_.corners,
+                            options_.corner_quality, options_.corner_distance / double(scale));
+    for (cv::Point2f& corner : corners_) corner *= scale;
+    const auto is_room = [&](const cv::Point2f& corner) { return known && room.at<uchar>(cv::Point(corner)) != 0; };
+    const auto in_room = std::count_if(corners_.begin(), corners_.end(), is_room);
+    auto left = static_cast<std::ptrdiff_t>(options_.corners);
+    auto for_others = left - std::min<std::ptrdiff_t>(std::lround(options_.room_share * options_.corners), in_room);
+    for (const cv::Point2f& corner : corners_) {
+      if (left == 0) break;
+      if (!is_room(corner) && for_others-- <= 0) continue;
+      from_.push_back(corner);
+      --left;
+    }
   }
 
   struct Region {
