@@ -31,7 +31,7 @@ TEST_CASE("The defaults of the flow and of objects", "[core]") {
   const cfp::CoarseOptions& o = frame.coarse;
   CHECK((o.use_object_probability && o.use_depth_foreground && o.soft_background && o.flow_radius_px == 10));
   const cfp::FlowModelOptions& flow = o.flow;
-  CHECK((flow.min_outside_pairs == 30 && flow.use_rotation_homography && flow.use_depth));
+  CHECK((flow.min_outside_pairs == 30 && flow.margin == 0.1 && flow.use_rotation_homography && flow.use_depth));
   CHECK((flow.motion.min_pairs == 12 && flow.motion.min_inlier_share == 0.5));
   CHECK((flow.motion.min_sigma_px == 0.05 && flow.motion.max_sigma_px == 1));
   CHECK((o.object.score == cfp::ObjectScore::survival && o.object.degrees_of_freedom == 2));

@@ -153,6 +153,38 @@ TEST_CASE("Where people fill the view, what lies behind them tells the camera's 
   }
 }
 
+TEST_CASE("What a box leaves out of its person does not outvote what lies behind the person in the box", "[frame]") {
+  for (const double person_motion_m : {0.0, 0.003}) {
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      CAPTURE(person_motion_m, seed);
+      cfp::Random random(seed, "close person");
+      DynamicScene<double> scene;
+      scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.002, 0.001, 0.001, 0.001, -0.002, 0.001));
+      const auto add = [&](double x, double y, double depth, double shift) {
+        cfp::Vector3<double> ray;
+        cfp::Vector2<double> pixel;
+        (void)scene.camera.unproject(cfp::Vector2<double>(x, y), ray);
+        (void)scene.camera.project(scene.T_cur_prev * (ray * depth) + cfp::Vector3<double>(shift, 0, 0), pixel);
+        scene.previous_keypoints.push_back({x, y});
+        scene.keypoints.push_back({pixel.x() + 0.1 * random.normal(), pixel.y() + 0.1 * random.normal()});
+        scene.depths.push_back(depth);
+        scene.match.push_back(cfp::no_match);
+      };
+      for (int k = 0; k < 500; ++k)
+        add(random.uniform(200, 440), random.uniform(75, 470), random.uniform(0.65, 0.75), person_motion_m);
+      for (int k = 0; k < 150; ++k) add(random.uniform(80, 560), random.uniform(120, 470), random.uniform(2, 7), 0);
+      scene.boxes = {{70, 110, 570, 480}};  // without the top of the head
+      FrameRun<double> run(scene);
+      cfp::Frame<double> frame = run.frame();
+      frame.flow.previous_depths = scene.depths;
+      const cfp::FrameReport report = run.coarse({}, frame, scene.camera);
+      CHECK(report.flow_model == cfp::FlowModelKind::motion);
+      CHECK(report.flow_support == cfp::FlowSupport::background_pairs);
+      CHECK((run.state.objects[0].static_probability > 0.5) == (person_motion_m == 0));
+    }
+  }
+}
+
 TEST_CASE("A person who fills the view of a camera without depths is unknown, not at rest", "[frame]") {
   cfp_test::DynamicSceneOptions crowded;
   crowded.people = 1;

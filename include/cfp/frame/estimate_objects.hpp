@@ -63,8 +63,22 @@ ForegroundResult separate_members(const TrackedBox<Scalar>& box, const PointSpan
   return depth_foreground(in, options.coarse.foreground, scratch.foreground, scratch.mask);
 }
 
+/// Labels invalid the pairs just outside of a box that may be on its object all the same: those not behind it.
+template <typename Scalar>
+void label_margin(const Box<Scalar>& box, const ForegroundResult& separated, const FlowPairs<Scalar>& flow,
+                  double margin, span<KeypointLabel> labels) noexcept {
+  const Scalar dx = Scalar(margin) * box.width(), dy = Scalar(margin) * box.height();
+  const Box<Scalar> wide{box.x1 - dx, box.y1 - dy, box.x2 + dx, box.y2 + dy};
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    if (labels[i] != KeypointLabel::outside || !contains(wide, flow.current(i, 0), flow.current(i, 1))) continue;
+    const Scalar z = flow.previous_depths[i];
+    const bool behind = separated.status == ForegroundStatus::ok && z > Scalar(separated.far_m) && is_valid_depth(z);
+    if (!behind) labels[i] = KeypointLabel::invalid;
+  }
+}
+
 /// Sets scratch.pair_label: per box and flow pair, how the pair stands to the object of that box. Where the object is
-/// told from its background by depth, so are the pairs.
+/// told from its background by depth, so are the pairs, and those just outside of the box may be invalid.
 template <typename Scalar>
 void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
@@ -79,31 +93,33 @@ void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameS
         scratch.members.push_back(static_cast<std::int32_t>(i));
     }
     const bool by_depth = options.coarse.use_depth_foreground && is_non_rigid(box.class_id, options);
-    separate_members(box, flow.current, by_depth ? flow.previous_depths : span<const Scalar>(), options, state);
+    const span<const Scalar> depths = by_depth ? flow.previous_depths : span<const Scalar>();
+    const ForegroundResult separated = separate_members(box, flow.current, depths, options, state);
     for (std::size_t m = 0; m < scratch.members.size(); ++m)
       scratch.pair_label[b * n + static_cast<std::size_t>(scratch.members[m])] =
           scratch.mask[m] != 0 ? KeypointLabel::foreground : KeypointLabel::background;
+    const bool exact = !frame.labels.empty() && !box.compensated();
+    if (!depths.empty() && !exact)
+      label_margin(box.box, separated, flow, options.coarse.flow.margin, {scratch.pair_label.data() + b * n, n});
   }
 }
 
-/// Marks in scratch.outside the flow pairs that lie on no object: outside all boxes or, where too few do, behind what
-/// is in them as well.
+/// Marks in scratch.outside the flow pairs that lie on no object: outside all boxes, and behind what is in them.
 template <typename Scalar>
 [[nodiscard]] FlowSupport mark_outside(std::size_t pairs, const FlowModelOptions& options,
                                        FrameScratch<Scalar>& scratch) {
-  for (const FlowSupport support : {FlowSupport::outside_pairs, FlowSupport::background_pairs}) {
-    scratch.outside.assign(pairs, char(1));
-    for (std::size_t box = 0; box < scratch.pair_label.size(); box += pairs) {
-      for (std::size_t i = 0; i < pairs; ++i) {
-        const KeypointLabel label = scratch.pair_label[box + i];
-        const bool behind = label == KeypointLabel::background && support == FlowSupport::background_pairs;
-        if (label != KeypointLabel::outside && !behind) scratch.outside[i] = char(0);
-      }
+  scratch.outside.assign(pairs, char(1));
+  std::size_t outside_boxes = 0;
+  for (std::size_t i = 0; i < pairs; ++i) {
+    bool outside = true;
+    for (std::size_t of_box = i; of_box < scratch.pair_label.size(); of_box += pairs) {
+      const KeypointLabel label = scratch.pair_label[of_box];
+      outside = outside && label == KeypointLabel::outside;
+      if (label == KeypointLabel::foreground || label == KeypointLabel::invalid) scratch.outside[i] = char(0);
     }
-    const auto found = std::count(scratch.outside.begin(), scratch.outside.end(), char(1));
-    if (static_cast<std::size_t>(found) >= options.min_outside_pairs) return support;
+    outside_boxes += outside ? 1U : 0U;
   }
-  return FlowSupport::background_pairs;
+  return outside_boxes >= options.min_outside_pairs ? FlowSupport::outside_pairs : FlowSupport::background_pairs;
 }
 
 }  // namespace CFP_ISA

@@ -17,9 +17,12 @@
 namespace cfp {
 
 struct FlowModelOptions {
-  /// Pairs outside all boxes alone support the model when there are at least this many; else those behind what is in
-  /// the boxes do, too, and a two-view model wants as many of both (>= 8): what is judged is no judge.
+  /// Pairs outside all boxes and, where depths tell, behind what is in them support the model: what is judged is no
+  /// judge. A two-view model wants at least this many (>= 8).
   std::size_t min_outside_pairs = 30;
+  /// Pairs so near to a box, as a share of its size, support nothing unless their depth tells that they are behind its
+  /// object: boxes seldom hold all of a person. Where objects are told from their background by depth; >= 0.
+  double margin = 0.1;
   /// A camera that turns without moving, or stands still, has no fundamental matrix, but maps every static point by one
   /// homography; true: objects are judged by the distance from that (both coordinates count, not only the one across a
   /// line). false: they are unknown. Not in the paper, whose F is then arbitrary.
@@ -41,8 +44,8 @@ enum class FlowModelKind : std::uint8_t {
 enum class FlowSupport : std::uint8_t {
   none,             ///< no model was estimated
   caller,           ///< the caller's motion or fundamental matrix
-  outside_pairs,    ///< the pairs outside all boxes
-  background_pairs  ///< too few of those: those behind what is in the boxes, too
+  outside_pairs,    ///< the pairs on no object, of which min_outside_pairs or more are outside all boxes
+  background_pairs  ///< the same, but fewer are outside: it rests on what lies behind the objects in the boxes
 };
 
 template <typename Scalar>
@@ -52,7 +55,7 @@ struct FlowModel {
   RansacStatus status = RansacStatus::not_enough_data;  ///< of the estimate; ok with the caller's matrix
   Matrix3<Scalar> matrix = Matrix3<Scalar>::Zero();     ///< F or H, previous to current
   SE3<Scalar> T_cur_prev;                               ///< of kind motion
-  Scalar sigma_px = Scalar(0);  ///< noise of one coordinate, measured on the pairs outside all boxes; 0: not measured
+  Scalar sigma_px = Scalar(0);  ///< noise of one coordinate, measured on the pairs on no object; 0: not measured
 };
 
 /// Scratch memory, reused: after a call, calls of at most the same sizes allocate nothing.
@@ -116,6 +119,7 @@ inline namespace CFP_ISA {
 
 [[nodiscard]] inline OptionPath invalid_field(const FlowModelOptions& o) noexcept {
   if (o.min_outside_pairs < 8) return "min_outside_pairs";
+  if (!detail::non_negative(o.margin)) return "margin";
   if (const OptionPath field = nested("motion", invalid_field(o.motion))) return field;
   return nested("ransac", invalid_field(o.ransac));
 }
