@@ -306,8 +306,8 @@ void print(const char* method, const Counts& counts) {
 
 /// What cells have in common: the lines at the end.
 struct Summary {
-  int cells = 0, above = 0, surely = 0, surely_told = 0, tellable = 0, refusing = 0;
-  double wrong = 0, lost = 0, lost_tellable = 0;
+  int cells = 0, above = 0, surely = 0, surely_told = 0, known = 0, refusing = 0;
+  double wrong = 0, lost = 0, lost_known = 0;
 
   /// Whether k of n or more would come of 1 % with less than 5 %.
   static bool surely_above(int k, int n) {
@@ -324,12 +324,12 @@ struct Summary {
     surely += surely_above(ours.wrong, ours.total) ? 1 : 0;
     surely_told += surely_above(ours.told, ours.total) ? 1 : 0;
     if (floor.errors.empty() || !(magsac.median() <= 2 * (std::max)(floor.median(), 0.01))) return;
-    ++tellable, lost_tellable += part * ours.lost, refusing += part * ours.lost > 5 ? 1 : 0;
+    ++known, lost_known += part * ours.lost, refusing += part * ours.lost > 5 ? 1 : 0;
   }
   void print(const char* name) const {
     std::printf("%-16s %4d  %6.2f %6d %6d %6d  %6.1f", name, cells, wrong / cells, above, surely, surely_told,
                 lost / cells);
-    if (tellable > 0) std::printf("  %6d %6.1f %6d", tellable, lost_tellable / tellable, refusing);
+    if (known > 0) std::printf("  %6d %6.1f %6d", known, lost_known / known, refusing);
     std::printf("\n");
   }
 };

@@ -49,11 +49,11 @@ struct FundamentalSearch {
   T noise_variance = limit / T(3.84);  // of the Sampson distances of true pairs, as measured
   T near_pairs = 0;                    // by weight, within 2.5 standard deviations of it
 
-  // Scales of the loss x / (1 + x): of the score, of the score of inner samples and of the search, in squared
-  // thresholds; the final one in variances of the measured noise. The threshold is a tolerance, mostly far above the
-  // noise: under its truncated square many mismatches within it outdo the true pairs near the lines of the true F. 2.25
-  // standard deviations lose least over three kinds of noise (cfp_fundamental_scale_study).
-  static constexpr T score_scale = T(1) / 4, inner_scale = T(1) / 16, search_scale = 1, final_scale = T(2.25 * 2.25);
+  // Scales of the loss x / (1 + x): of the score and of the score of inner samples, in squared thresholds; the final
+  // one in variances of the measured noise. The threshold is a tolerance, mostly far above the noise: under its
+  // truncated square many mismatches within it outdo the true pairs near the lines of the true F. 2.25 standard
+  // deviations lose least over three kinds of noise (cfp_fundamental_scale_study).
+  static constexpr T score_scale = T(1) / 4, inner_scale = T(1) / 16, final_scale = T(2.25 * 2.25);
 
   [[nodiscard]] std::size_t size() const noexcept { return pairs.size; }
   [[nodiscard]] span<const double> weights() const noexcept { return {pairs.row(4), pairs.size}; }
@@ -83,7 +83,7 @@ struct FundamentalSearch {
 
   void optimize(Candidate& candidate) const noexcept {
     FactoredF<T> refined(candidate.model);
-    refine_fundamental(thinned_columns(pairs), search_scale * limit, 3, 1e-3, refined);
+    refine_fundamental(thinned_columns(pairs), limit, 3, 1e-3, refined);
     const double refined_cost = cost(refined.matrix(), candidate.cost);
     if (refined_cost < candidate.cost) candidate = {refined.matrix(), refined_cost};
   }
@@ -125,9 +125,8 @@ struct FundamentalSearch {
         if (c < best[0].cost) std::swap(best[0], best[starts - 1]);
       });
     }
-    const T widest = search_scale * wide_limit();
+    const T widest = wide_limit();
     const auto refined_nats = [&](FactoredF<T>& of) {
-      measure_noise(of.matrix());
       refine_fundamental(thinned_columns(pairs), (std::min)(widest, final_scale * noise_variance), 2, 1e-3, of);
       measure_noise(of.matrix());
       return nats();
@@ -136,6 +135,7 @@ struct FundamentalSearch {
     for (const Candidate& start : best) {
       if (!is_finite(start.cost)) break;
       FactoredF<T> other(start.model);
+      measure_noise(other.matrix());
       const T other_nats = refined_nats(other);
       if (other_nats > most) most = other_nats, F = other;
     }
