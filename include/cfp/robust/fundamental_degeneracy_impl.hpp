@@ -93,7 +93,9 @@ struct DegeneracyCheck {
     best.cost = fine.cost(best.model, std::numeric_limits<double>::infinity());
     fine.optimize(best);
     candidate.cost = fine.cost(candidate.model, std::numeric_limits<double>::infinity());
-    if (best.cost < candidate.cost) candidate = best;
+    if (!(best.cost < candidate.cost)) return;
+    candidate = best;
+    search.measure_noise(best.model);
   }
 
   // Whether the F whose noise was measured last is one: its lines explain more than chance does, without any part of

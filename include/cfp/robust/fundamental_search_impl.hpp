@@ -153,10 +153,10 @@ struct FundamentalSearch {
     return (k - 7) * std::log(reach / (T(2.5) * std::sqrt(noise_variance))) - subsets - 7 * std::log((k - 3) / T(3.38));
   }
 
-  // More rounds where the search ran out of samples: its F may be a poor one, which inner samples mend step by step.
+  // More rounds where the search ran out of samples: its F may be a poor one, which inner samples mend step by step. F
+  // is the one whose noise was measured last, before and after.
   void polish(Model& F, int rounds) noexcept {
     FactoredF<T> factored(F);
-    measure_noise(factored.matrix());
     for (int round = 0; round < rounds; ++round) {
       explore(factored);
       measure_noise(factored.matrix());
