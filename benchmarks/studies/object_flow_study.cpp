@@ -2,10 +2,11 @@
 // time? The usual way (1000 corners over the whole image, 22x22, five levels, no check) against keypoints of the
 // previous frame on pyramids that are kept. On rendered sequences with labels: time on one core for flow and for F and
 // O, and how well O tells moving people from still ones (AUC; a box is moving when at least half, still when at most 2
-// % of its person pixels move). Supports cfp::OpticalFlowOptions.
-//   cfp_object_flow_study [--smoke | --frames N | TUM_FOLDER...]   instead of rendering, folders of cfp_synthetic; one
-//   without
-// labels, with a detections.txt, gives times and mean O alone (as "partly")
+// % of its person pixels move). Supports cfp::OpticalFlowOptions, and edge_px of cfp::sample_depth: rendered depth fits
+// its image to the pixel, so --depth spoils it as sensors do: of the frame before, shifted by 6 and 3 px, or what is
+// near widened by 6 px, as stereo matching does.
+//   cfp_object_flow_study [--depth late|shifted|widened] [--smoke | --frames N | TUM_FOLDER...]   instead of rendering,
+// folders of cfp_synthetic; one without labels, with a detections.txt, gives times and mean O alone (as "partly")
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -48,6 +49,7 @@ struct Image {
 struct Candidate {
   std::string name;
   std::function<void(const cv::Mat& previous, const Image& before, const Image& now, Pairs& pairs)> track;
+  double edge_px = 0;
   std::vector<double> flow_ms{}, object_ms{}, total_ms{};
   std::vector<float> score{};
   std::vector<char> is_static{};
@@ -141,6 +143,10 @@ std::vector<Candidate> candidates() {
   all.push_back(tracker("  3 levels", with([](auto& o) { o.levels = 3; })));
   all.push_back(tracker("  10 iterations", with([](auto& o) { o.iterations = 10; })));
   all.push_back(tracker("  tracked back as well", {}, true));
+  for (const double edge_px : {3.0, 5.0, 8.0}) {
+    all.push_back(tracker("  no depth " + std::to_string(int(edge_px)) + " px from edges", {}));
+    all.back().edge_px = edge_px;
+  }
   return all;
 }
 
@@ -171,7 +177,7 @@ void judge(std::vector<Candidate>& all, const std::vector<Image>& images, const 
       cfp::Frame<float> frame;
       std::vector<float> depths_m(pairs.first.size());
       const Image& before = images[k - 1];
-      cfp::sample_depth(before.depth, cfp::view(pairs.first), before.metres_per_unit, depths_m);
+      cfp::sample_depth(before.depth, cfp::view(pairs.first), before.metres_per_unit, depths_m, c.edge_px);
       frame.flow = {cfp::view(pairs.first), cfp::view(pairs.second), depths_m};
       cfp::begin_frame(frame, state);
       for (const Person& person : images[k].people) {
@@ -209,6 +215,21 @@ void judge(std::vector<Candidate>& all, const std::vector<Image>& images, const 
   }
 }
 
+// The depth image as another sensor would have it.
+cv::Mat spoiled(const cv::Mat& depth, const std::string& how, cv::Mat& last) {
+  cv::Mat out = depth.clone();
+  if (how == "late" && last.size() == depth.size()) out = last;
+  if (how == "shifted")
+    cv::warpAffine(depth, out, cv::Mat(cv::Matx23d(1, 0, 6, 0, 1, 3)), depth.size(), cv::INTER_NEAREST);
+  if (how == "widened") {
+    out.setTo(65535, depth == 0);
+    cv::erode(out, out, cv::Mat::ones(13, 13, CV_8U));
+    out.setTo(0, out == 65535);
+  }
+  last = depth.clone();
+  return out;
+}
+
 void finish(Image& image, const cv::Mat& bgr, cv::ORB& orb) {
   cv::cvtColor(bgr, image.gray, cv::COLOR_BGR2GRAY);
   orb.detect(image.gray, image.keypoints);
@@ -238,12 +259,15 @@ void print(const std::vector<Candidate>& all) {
 
 int main(int argc, char** argv) {
   std::vector<std::string> folders;
+  std::string depth_is;
   int frames = 60;
   bool smoke = false;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
     if (word == "--smoke") {
       smoke = true;
+    } else if (word == "--depth" && i + 1 < argc) {
+      depth_is = argv[++i];
     } else if (word == "--frames" && i + 1 < argc) {
       frames = std::max(2, std::atoi(argv[++i]));
     } else {
@@ -254,11 +278,13 @@ int main(int argc, char** argv) {
   const cv::Ptr<cv::ORB> orb = cv::ORB::create(1000, 1.2F, 8, 15, 0, 2, cv::ORB::HARRIS_SCORE, 31, 10);
   std::vector<Candidate> all = candidates();
   std::vector<Image> images;
+  cv::Mat last_depth;
   const auto add = [&](const cv::Mat& bgr, const cv::Mat& depth, double units_per_metre, const cv::Mat& labels,
                        const std::vector<cfp::Box<float>>& boxes) {
     Image image;
     finish(image, bgr, *orb);
-    image.depth = depth.clone();
+    if (images.empty()) last_depth.release();
+    image.depth = spoiled(depth, depth_is, last_depth);
     image.metres_per_unit = 1 / units_per_metre;
     for (const auto& box : boxes) image.people.push_back({box, moving_share(labels, box)});
     images.push_back(std::move(image));

@@ -22,6 +22,7 @@ void for_each_option(Options& o, const Visit& visit) {
   cfp::FrameOptions& p = o.probability;
   visit("keypoint_sigma_px", o.keypoint_sigma_px);
   visit("baseline_fx", o.baseline_fx);
+  visit("flow_edge_px", o.flow_edge_px);
   visit("unproven_share", o.unproven_share);
   visit("min_known_share", o.min_known_share);
   visit("features.room_share", o.features.room_share);

@@ -50,6 +50,27 @@ TEST_CASE("Depth is sampled at the nearest pixel, in metres", "[interop]") {
   }
 }
 
+TEST_CASE("At the edge of a surface a depth is left out when asked for, on a slanted plane it is kept", "[interop]") {
+  // A floor and a wall whose 1 / z is linear in the image, and before them a post between columns 30 and 39.
+  cv::Mat depth(60, 80, CV_32F);
+  for (int row = 0; row < 60; ++row) {
+    for (int column = 0; column < 80; ++column)
+      depth.at<float>(row, column) = 1 / (0.2F + 0.004F * float(column) + (row >= 40 ? 0.05F * float(row - 40) : 0));
+  }
+  depth(cv::Rect(30, 0, 10, 30)) = 1.5F;
+  depth(cv::Rect(60, 0, 5, 60)) = 0.0F;
+  const std::vector<cv::Point2f> edges{{28, 10}, {31, 10}, {38, 20}, {42, 20}, {35, 28}, {35, 32}, {20, 39}};
+  const std::vector<cv::Point2f> surfaces{{20, 20}, {20, 50}, {75, 52}, {24, 10}, {46, 10}, {58, 10}, {1, 1}, {79, 59}};
+  std::vector<float> at_edges(edges.size()), on_surfaces(surfaces.size()), all(surfaces.size());
+  CHECK(cfp::sample_depth(depth, cfp::view(edges), 1, at_edges, 5) == cfp::Status::not_enough_data);
+  for (const float metres : at_edges) CHECK(metres == -1.0F);
+  CHECK(cfp::sample_depth(depth, cfp::view(surfaces), 1, on_surfaces, 5) == cfp::Status::ok);
+  CHECK(cfp::sample_depth(depth, cfp::view(surfaces), 1, all) == cfp::Status::ok);
+  CHECK(on_surfaces == all);
+  CHECK(cfp::sample_depth(depth, cfp::view(edges), 1, at_edges) == cfp::Status::ok);
+  for (const float metres : at_edges) CHECK(metres > 0);
+}
+
 TEST_CASE("Hostile depth and pixels give -1", "[interop]") {
   constexpr float inf = std::numeric_limits<float>::infinity(), nan = std::numeric_limits<float>::quiet_NaN();
   const cv::Mat depth = (cv::Mat_<float>(1, 6) << nan, inf, -inf, -2.0F, 0.0F, 1e-45F);

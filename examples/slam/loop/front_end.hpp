@@ -65,7 +65,8 @@ class FrontEnd {
       result.flow_from = flow_.previous();
       result.flow_to = flow_.current();
       result.flow_depths_m.resize(result.flow_from.size());
-      cfp::sample_depth(last_depth_, cfp::view(result.flow_from), metres_per_unit_, result.flow_depths_m);
+      cfp::sample_depth(last_depth_, cfp::view(result.flow_from), metres_per_unit_, result.flow_depths_m,
+                        options_.flow_edge_px);
     }
     if (detection.valid()) detection.get();
     last_keypoints_ = result.frame.keypoints;

@@ -42,6 +42,7 @@ struct Options {
   cfp::FrameOptions probability;  // before the variant switches parts of it off
   cfp_examples::FeatureOptions features;
   cfp::OpticalFlowOptions flow;
+  double flow_edge_px = 0;  // so near to the edge of a surface, the depth of a flow pair is not believed; 0: it is
   cfp::PoseOptions pose;
   MappingOptions mapping;
   LocalBundleOptions bundle;

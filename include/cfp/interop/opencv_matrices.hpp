@@ -3,6 +3,7 @@
 /// none of its libraries, as opencv.hpp, which includes it.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <limits>
@@ -48,6 +49,28 @@ inline namespace CFP_ISA {
   return matrix.type() == CV_32FC1 ? read_as(float()) : read_as(double());
 }
 
+// Metres at the nearest pixel, -1: none.
+[[nodiscard]] inline float depth_at(const cv::Mat& depth, double x, double y, double metres_per_unit) noexcept {
+  // Compared before the conversion to int: NaN and values beyond int take the failing branch.
+  const double column = x + 0.5, row = y + 0.5;
+  if (!(column >= 0 && column < depth.cols && row >= 0 && row < depth.rows)) return -1.0F;
+  const double metres = metres_per_unit * element(depth, static_cast<int>(row), static_cast<int>(column));
+  const bool valid = metres > 0 && metres <= static_cast<double>((std::numeric_limits<float>::max)());
+  return valid && static_cast<float>(metres) > 0 ? static_cast<float>(metres) : -1.0F;
+}
+
+// Whether the depths to both sides are no plane's with this one: over a plane, 1 / z is linear in the image.
+[[nodiscard]] inline bool is_depth_edge(const cv::Mat& depth, double x, double y, double metres_per_unit, float metres,
+                                        double edge_px) noexcept {
+  constexpr double direction[4][2] = {{1, 0}, {0, 1}, {0.7071, 0.7071}, {0.7071, -0.7071}};
+  for (const double(&d)[2] : direction) {
+    const float before = depth_at(depth, x - edge_px * d[0], y - edge_px * d[1], metres_per_unit);
+    const float after = depth_at(depth, x + edge_px * d[0], y + edge_px * d[1], metres_per_unit);
+    if (before > 0 && after > 0 && std::abs(metres / before + metres / after - 2) > 0.05F) return true;
+  }
+  return false;
+}
+
 }  // namespace CFP_ISA
 }  // namespace detail
 
@@ -56,11 +79,14 @@ inline namespace CFP_ISA {
 /// Depth in metres at each pixel, from a single-channel CV_16U, CV_32F or CV_64F image whose values times
 /// `metres_per_unit` are metres (TUM RGB-D: 1.0 / 5000; millimetres: 0.001; metres: 1). The nearest pixel is read,
 /// pixel centres at integer coordinates; ORB-SLAM2 cuts the fraction off instead. -1, ORB-SLAM2's mark for "none", for
-/// a pixel outside the image and for depth that is zero, negative or not finite. depth_m.size() == pixels.size().
-/// invalid_input, and -1 everywhere: no image, another type, or metres_per_unit not positive and finite.
-/// not_enough_data: no pixel has depth. Allocates nothing.
+/// a pixel outside the image and for depth that is zero, negative or not finite. `edge_px` > 0: -1 also at the edge of
+/// a surface, where the depth may be the other surface's, as colour and depth differ in time and place and stereo
+/// widens what is near: where the depths `edge_px` to either side, along the rows, the columns or a diagonal, are off
+/// from a plane through all three by more than 5 %. For the depths of Frame::flow (benchmarks/studies/
+/// object_flow_study.cpp). depth_m.size() == pixels.size(). invalid_input, and -1 everywhere: no image, another type,
+/// or metres_per_unit not positive and finite. not_enough_data: no pixel has depth. Allocates nothing.
 inline Status sample_depth(const cv::Mat& depth, const PointSpan<float, 2>& pixels, double metres_per_unit,
-                           span<float> depth_m) noexcept {
+                           span<float> depth_m, double edge_px = 0) noexcept {
   CFP_ASSERT(depth_m.size() == pixels.size());
   for (float& metres : depth_m) metres = -1.0F;
   if (!detail::is_real_matrix(depth) && !(detail::is_matrix(depth) && depth.type() == CV_16UC1))
@@ -68,13 +94,12 @@ inline Status sample_depth(const cv::Mat& depth, const PointSpan<float, 2>& pixe
   if (!(metres_per_unit > 0 && is_finite(metres_per_unit))) return Status::invalid_input;
   Status status = Status::not_enough_data;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    // Compared before the conversion to int: NaN and values beyond int take the failing branch.
-    const double column = static_cast<double>(pixels(i, 0)) + 0.5, row = static_cast<double>(pixels(i, 1)) + 0.5;
-    if (!(column >= 0 && column < depth.cols && row >= 0 && row < depth.rows)) continue;
-    const double metres = metres_per_unit * detail::element(depth, static_cast<int>(row), static_cast<int>(column));
-    if (!(metres > 0 && metres <= static_cast<double>((std::numeric_limits<float>::max)()))) continue;
-    depth_m[i] = static_cast<float>(metres);
-    if (depth_m[i] > 0) status = Status::ok;
+    const double x = static_cast<double>(pixels(i, 0)), y = static_cast<double>(pixels(i, 1));
+    const float metres = detail::depth_at(depth, x, y, metres_per_unit);
+    if (!(metres > 0) || (edge_px > 0 && detail::is_depth_edge(depth, x, y, metres_per_unit, metres, edge_px)))
+      continue;
+    depth_m[i] = metres;
+    status = Status::ok;
   }
   return status;
 }
