@@ -268,6 +268,10 @@ int main(int argc, char** argv) {
       smoke = true;
     } else if (word == "--depth" && i + 1 < argc) {
       depth_is = argv[++i];
+      if (depth_is != "late" && depth_is != "shifted" && depth_is != "widened") {
+        std::fprintf(stderr, "--depth: late, shifted or widened, not '%s'\n", depth_is.c_str());
+        return 2;
+      }
     } else if (word == "--frames" && i + 1 < argc) {
       frames = std::max(2, std::atoi(argv[++i]));
     } else {
