@@ -24,9 +24,7 @@ inline void room_mask(cv::Size size, const cv::Mat& depth, double metres_per_uni
   mask.setTo(255);
   cv::Mat behind;
   for (const BoxedPerson& person : people) {
-    const float dx = 0.1F * person.box.width(), dy = 0.1F * person.box.height();
-    const cfp::Box<float> wide{person.box.x1 - dx, person.box.y1 - dy, person.box.x2 + dx, person.box.y2 + dy};
-    const cfp::Box<float> box = cfp::clip(wide, float(size.width), float(size.height));
+    const cfp::Box<float> box = cfp::clip(cfp::widened(person.box, 0.1F), float(size.width), float(size.height));
     if (!cfp::is_proper(box)) continue;
     const cv::Rect part = cv::Rect(cv::Point(int(box.x1), int(box.y1)), cv::Point(int(box.x2) + 1, int(box.y2) + 1)) &
                           cv::Rect(cv::Point(), size);

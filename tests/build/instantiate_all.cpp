@@ -68,6 +68,7 @@ static void instantiate_geometry() noexcept {
   use(&cfp::intersection<Scalar>);
   use(&cfp::iou<Scalar>);
   use(&cfp::clip<Scalar>);
+  use(&cfp::widened<Scalar>);
   use(&cfp::has_distance<Scalar>);
   use(&cfp::epipolar_line<Scalar>);
   use(&cfp::epipolar_distance<Scalar>);

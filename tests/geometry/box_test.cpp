@@ -53,6 +53,8 @@ TEMPLATE_TEST_CASE("boxes: area, border, intersection and clip by hand", "[geome
   CHECK(cfp::iou(box, Box<TestType>{30, 20, 40, 60}) == 0);  // a common border has no area
   const Box<TestType> clipped = cfp::clip(Box<TestType>{-5, 10, 700, 500}, TestType(640), TestType(480));
   CHECK((clipped.x1 == 0 && clipped.y1 == 10 && clipped.x2 == 640 && clipped.y2 == 480));
+  const Box<TestType> wide = cfp::widened(Box<TestType>{10, 20, 30, 60}, TestType(0.25));
+  CHECK((wide.x1 == 5 && wide.y1 == 10 && wide.x2 == 35 && wide.y2 == 70));
   CHECK_FALSE(cfp::is_proper(cfp::clip(Box<TestType>{-50, 10, -1, 500}, TestType(640), TestType(480))));
   CHECK_FALSE(cfp::is_proper(cfp::clip(box, std::numeric_limits<TestType>::quiet_NaN(), TestType(480))));
   CHECK_FALSE(cfp::is_proper(cfp::clip(box, TestType(0), TestType(480))));

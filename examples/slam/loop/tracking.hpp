@@ -193,11 +193,9 @@ class Tracking {
     for (std::size_t b = 0; b < state.boxes.size(); ++b) {
       const auto& box = state.boxes[b];
       const auto& object = state.objects[b];
-      const auto& depths = state.current.object_depths;
-      const auto depth = std::find_if(depths.begin(), depths.end(), [&](const auto& d) { return d.id == box.id; });
       record.boxes.push_back({box.id, box.box, box.compensated(), object.static_probability,
                               object.status == cfp::Status::ok, object.pairs,
-                              depth == depths.end() ? 0 : depth->depth_m});
+                              cfp::object_depth(state.current, box.id)});
     }
   }
 

@@ -57,9 +57,7 @@ ForegroundResult separate_members(const TrackedBox<Scalar>& box, const PointSpan
     scratch.points.push_back({pixels(i, 0), pixels(i, 1)});
   }
   ForegroundInput<Scalar> in{scratch.depths, scratch.points, box.box};
-  const auto& objects = state.previous.object_depths;
-  const auto found = std::find_if(objects.begin(), objects.end(), [&](const auto& o) { return o.id == box.id; });
-  if (state.previous.known && found != objects.end()) in.previous_depth_m = found->depth_m;
+  if (state.previous.known) in.previous_depth_m = object_depth(state.previous, box.id);
   return depth_foreground(in, options.coarse.foreground, scratch.foreground, scratch.mask);
 }
 
@@ -67,8 +65,7 @@ ForegroundResult separate_members(const TrackedBox<Scalar>& box, const PointSpan
 template <typename Scalar>
 void label_margin(const Box<Scalar>& box, const ForegroundResult& separated, const FlowPairs<Scalar>& flow,
                   double margin, span<KeypointLabel> labels) noexcept {
-  const Scalar dx = Scalar(margin) * box.width(), dy = Scalar(margin) * box.height();
-  const Box<Scalar> wide{box.x1 - dx, box.y1 - dy, box.x2 + dx, box.y2 + dy};
+  const Box<Scalar> wide = widened(box, Scalar(margin));
   for (std::size_t i = 0; i < labels.size(); ++i) {
     if (labels[i] != KeypointLabel::outside || !contains(wide, flow.current(i, 0), flow.current(i, 1))) continue;
     const Scalar z = flow.previous_depths[i];

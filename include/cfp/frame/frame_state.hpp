@@ -116,6 +116,14 @@ struct FrameState {
 
 inline namespace CFP_ISA {
 
+/// Where the object of a track stood in a frame, m; 0: unknown.
+template <typename Scalar>
+[[nodiscard]] Scalar object_depth(const FrameMemory<Scalar>& frame, std::int64_t id) noexcept {
+  const auto& objects = frame.object_depths;
+  const auto found = std::find_if(objects.begin(), objects.end(), [id](const auto& o) { return o.id == id; });
+  return found == objects.end() ? Scalar(0) : found->depth_m;
+}
+
 /// The first step: what was the current frame becomes the previous one, and the new frame is copied in; no keypoint is
 /// in a box yet. So nothing has to be done for a frame whose pose failed or threw.
 template <typename Scalar>

@@ -64,5 +64,12 @@ template <typename Scalar>
   return intersection(box, Box<Scalar>{Scalar(0), Scalar(0), image_width, image_height});
 }
 
+/// The box with `share` of its size more on each side.
+template <typename Scalar>
+[[nodiscard]] constexpr Box<Scalar> widened(const Box<Scalar>& box, non_deduced<Scalar> share) noexcept {
+  const Scalar dx = share * box.width(), dy = share * box.height();
+  return {box.x1 - dx, box.y1 - dy, box.x2 + dx, box.y2 + dy};
+}
+
 }  // namespace CFP_ISA
 }  // namespace cfp
