@@ -26,7 +26,7 @@ struct Checked {
         search{loaded(), pairs.factor * pairs.factor, list, distances_sq, cfp::Random(1)},
         check{search, scratch} {
     distances_sq.assign(pairs.capacity, 0.0);
-    scratch.assign(2 * pairs.capacity, 0.0);
+    scratch.assign(4 * pairs.capacity, 0.0);
     search.collect_inliers();
   }
   Checked(const Checked&) = delete;

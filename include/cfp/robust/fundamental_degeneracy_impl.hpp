@@ -21,7 +21,7 @@ inline namespace CFP_ISA {
 template <typename T>
 struct DegeneracyCheck {
   FundamentalSearch<T>& search;
-  std::vector<T>& scratch;  // of twice the arrays' capacity
+  std::vector<T>& scratch;  // of four times the arrays' capacity
   const PairArrays& pairs = search.pairs;
   Matrix3<T> H = scaled_homography(Matrix3<T>::Identity());
   bool dominant = false;  // H explains half of the pairs
@@ -105,28 +105,28 @@ struct DegeneracyCheck {
     FundamentalEvidence<T> evidence{search, scratch};
     if (!evidence.stands_out()) return false;
     evidence.stride = (std::max)(pairs.size / PairArrays::enough, std::size_t(1));
-    evidence.compare(H);
-    const bool person_possible = find_homography_beside(evidence.judge().window);
-    const auto suffices = [&](T factor) {
-      const auto stands = [&](const Matrix3<T>& other) {
-        const T distinct = evidence.compare(other);
-        const typename FundamentalEvidence<T>::Verdict v = evidence.judge();
-        return distinct >= least && v.all > 11 * factor && (!person_possible || v.outside > 4 * factor);
-      };
-      if (!stands(scaled_homography(Matrix3<T>::Identity())) || !stands(H)) return false;
-      return !evidence.rests_on_lines(factor);
+    typename FundamentalEvidence<T>::Verdict with_H = evidence.judge(H);
+    const bool person_possible = find_homography_beside(with_H.window);
+    if (person_possible) with_H = evidence.judge(H);
+    const auto stands = [&](const typename FundamentalEvidence<T>::Verdict& v, T factor) {
+      return v.distinct >= least && v.all > 11 * factor && (!person_possible || v.outside > 4 * factor);
     };
+    const auto suffices = [&](T factor) {
+      return stands(with_H, factor) && !evidence.rests_on_lines(factor) &&
+             stands(evidence.judge(scaled_homography(Matrix3<T>::Identity())), factor);
+    };
+    if (evidence.stride == 1) return suffices(1);
     // Some of the pairs are enough where they say it clearly.
-    if (evidence.stride > 1 && suffices(3)) return true;
+    if (suffices(3)) return true;
     evidence.stride = 1;
+    with_H = evidence.judge(H);
     return suffices(1);
   }
 
   // Whether it is two lines of points that speak for the F whose noise was measured last.
   [[nodiscard]] bool rests_on_lines() noexcept {
     FundamentalEvidence<T> evidence{search, scratch};
-    evidence.compare(scaled_homography(Matrix3<T>::Identity()));
-    return evidence.judge().all > 11 && evidence.rests_on_lines(1);
+    return evidence.judge(scaled_homography(Matrix3<T>::Identity())).all > 11 && evidence.rests_on_lines(1);
   }
 
   // Looks for the homography of the pairs outside the window of a person, who bends H towards F. H becomes that one,
@@ -135,11 +135,11 @@ struct DegeneracyCheck {
   [[nodiscard]] bool find_homography_beside(std::size_t window) noexcept {
     if (search.list.size() < 4) return true;
     const Matrix3<T> before = H;
-    const auto inside = [&](std::size_t i) { return FundamentalEvidence<T>::in_window(pairs, i, window); };
+    const auto inside = [&](std::size_t i) { return FundamentalEvidence<T>::in_window(pairs.row(0)[i], window); };
     PairColumns<float> columns = thinned_columns(pairs);
     std::array<float, PairArrays::enough> weights = {};
     for (std::size_t k = 0; k < columns.size; ++k)
-      weights[k] = inside(pairs.size > columns.size ? k * pairs.size / columns.size : k) ? 0.0F : columns.row[4][k];
+      weights[k] = inside(thinned_index(pairs, k)) ? 0.0F : columns.row[4][k];
     columns.row[4] = weights.data();
     const auto drawn_outside = [&] {
       std::uint32_t i = drawn();

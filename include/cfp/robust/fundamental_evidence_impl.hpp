@@ -3,13 +3,13 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <vector>
 
 #include "cfp/math/matrix3.hpp"
 #include "cfp/robust/fundamental_search_impl.hpp"
 #include "cfp/robust/homography_impl.hpp"
+#include "cfp/simd/packet.hpp"
 
 namespace cfp::detail {
 inline namespace CFP_ISA {
@@ -28,29 +28,41 @@ struct FundamentalEvidence {
   static constexpr T share[shares] = {T(0), T(0.1), T(0.3), T(0.6), T(0.9)};
 
   const FundamentalSearch<T>& search;
-  std::vector<T>& gains;   // weight times (ratio - 1), and then the range of every pair
-  std::size_t stride = 1;  // every so manieth pair is looked at
+  std::vector<T>& scratch;  // of four times the arrays' capacity
+  std::size_t stride = 1;   // every so manieth pair is looked at
   const PairArrays& pairs = search.pairs;
+  // Of the pairs looked at: the previous point, weight times (ratio - 1), and the range.
+  T* const x = scratch.data();
+  T* const y = x + pairs.capacity;
+  T* const gain = y + pairs.capacity;
+  T* const range = gain + pairs.capacity;
+  std::size_t count = 0;
 
   struct Verdict {
+    T distinct;          // distinct pairs that F explains
     T all, outside;      // evidence of all pairs, and least of those outside a window that may hold a moving person
     std::size_t window;  // first strip of that window
   };
 
-  [[nodiscard]] static std::size_t strip_of(const PairArrays& pairs, std::size_t i) noexcept {
-    return static_cast<std::size_t>((std::min)((std::max)((pairs.row(0)[i] + 2.5) / 5, 0.0), 0.999) * strips);
-  }
-  [[nodiscard]] static bool in_window(const PairArrays& pairs, std::size_t i, std::size_t window) noexcept {
-    return strip_of(pairs, i) - window < person;
-  }
-  [[nodiscard]] std::size_t range_of(std::size_t i) const noexcept {
-    return static_cast<std::size_t>(gains[i + pairs.capacity]);
-  }
+  // The logarithm of a product, taken before it leaves the range of numbers.
+  struct LogProduct {
+    T log = 0, rest = 1;
 
-  template <typename Visit>
-  void for_each(Visit&& visit) const noexcept {
-    for (std::size_t i = 0; i < pairs.size; i += stride) visit(i);
+    void multiply(T factor) noexcept {
+      rest *= factor;
+      if (rest > T(1e-100) && rest < T(1e100)) return;
+      log += std::log(rest);
+      rest = 1;
+    }
+    [[nodiscard]] T value() const noexcept { return log + std::log(rest); }
+  };
+
+  // By the previous x.
+  [[nodiscard]] static std::size_t strip_of(T x) noexcept {
+    return static_cast<std::size_t>((std::min)((std::max)(T(0.2) * x + T(0.5), T(0)), T(0.999)) * strips);
   }
+  [[nodiscard]] static bool in_window(T x, std::size_t window) noexcept { return strip_of(x) - window < person; }
+  [[nodiscard]] std::size_t range_of(std::size_t k) const noexcept { return static_cast<std::size_t>(range[k]); }
 
   // Whether more pairs lie near their lines than the pairs up to three times as far let chance put there: the binomial
   // tail of that has to outdo the number of seven-point samples, C(n, 7), as the best of all their F fits some
@@ -68,52 +80,17 @@ struct FundamentalEvidence {
     return 3 * near > all && nats(near, T(1) / 3) + nats(all - near, T(2) / 3) > 7 * std::log((n - 3) / T(3.38));
   }
 
-  // The gains of the F whose distances were measured last. Returns how many distinct pairs F explains.
-  T compare(const Matrix3<T>& H) noexcept {
-    const T variance = 2 * search.noise_variance + T(1e-4) * pairs.factor * pairs.factor, s2 = 2 * variance;
-    const T limit = search.wide_limit();
-    T distinct = 0;
-    for_each([&](std::size_t i) {
-      const T d2 = (std::min)(transfer_sq(pairs, H, i), T(100)) / s2, a2 = 1 + 2 * search.distances_sq[i] / s2;
-      const T ratio = (1 + d2) * std::sqrt(1 + d2) / ((1 + d2 / 2) * a2 * a2);
-      std::size_t range = 0;
-      for (T edge = 6; range + 1 < ranges && d2 > edge; edge *= 4) ++range;
-      gains[i] = pairs.row(5)[i] * (ratio >= 0 ? ratio - 1 : T(-1));
-      gains[i + pairs.capacity] = static_cast<T>(range);
-      if (search.distances_sq[i] <= limit) distinct += pairs.row(5)[i] / pairs.weights()[i];
-    });
-    return distinct * static_cast<T>(stride);
-  }
-
-  [[nodiscard]] Verdict judge() const noexcept {
-    T sums[ranges][shares] = {}, products[ranges][shares];
-    for (auto& row : products) std::fill(row, row + shares, T(1));
-    for_each([&](std::size_t i) {
-      const std::size_t range = range_of(i);
-      for (std::size_t k = 1; k < shares; ++k) {
-        T& product = products[range][k];
-        product *= 1 + share[k] * gains[i];
-        if (product > T(1e-100) && product < T(1e100)) continue;
-        sums[range][k] += std::log(product);
-        product = 1;
-      }
-    });
-    T all = 0, best[ranges];
-    for (std::size_t range = 0; range < ranges; ++range) {
-      T* const sum = sums[range];
-      for (std::size_t k = 1; k < shares; ++k) sum[k] += std::log(products[range][k]);
-      const T* const most = std::max_element(sum, sum + shares);
-      best[range] = share[most - sum];
-      T mean = 0;
-      for (std::size_t k = 0; k < shares; ++k) mean += std::exp(sum[k] - *most) / shares;
-      all += *most + std::log(mean);
-    }
-    std::array<T, strips> nats{};
-    for_each([&](std::size_t i) { nats[strip_of(pairs, i)] += std::log(1 + best[range_of(i)] * gains[i]); });
-    Verdict out{all, all, 0};
+  // Of the F whose distances were measured last against H.
+  [[nodiscard]] Verdict judge(const Matrix3<T>& H) noexcept {
+    const T distinct = compare(H);
+    T best[ranges];
+    const T all = nats(best);
+    LogProduct products[strips];
+    for (std::size_t k = 0; k < count; ++k) products[strip_of(x[k])].multiply(1 + best[range_of(k)] * gain[k]);
+    Verdict out{distinct, all, all, 0};
     for (std::size_t first = 0; first + person <= strips; ++first) {
       T rest = all;
-      for (std::size_t k = first; k < first + person; ++k) rest -= nats[k];
+      for (std::size_t k = first; k < first + person; ++k) rest -= products[k].value();
       if (rest < out.outside) out.outside = rest, out.window = first;
     }
     return out;
@@ -123,32 +100,74 @@ struct FundamentalEvidence {
   [[nodiscard]] bool rests_on_lines(T factor) noexcept {
     drop_line();
     drop_line();
-    return !(judge().all > 5 * factor);
+    T best[ranges];
+    return !(nats(best) > 5 * factor);
+  }
+
+ private:
+  // Fills the arrays; returns how many distinct pairs F explains.
+  T compare(const Matrix3<T>& H) noexcept {
+    const T variance = 2 * search.noise_variance + T(1e-4) * pairs.factor * pairs.factor, per_s2 = 1 / (2 * variance);
+    const T limit = search.wide_limit();
+    T distinct = 0;
+    count = 0;
+    for (std::size_t i = 0; i < pairs.size; i += stride, ++count) {
+      const T d2 = (std::min)(transfer_sq(pairs, H, i), T(100)) * per_s2, a2 = 1 + 2 * search.distances_sq[i] * per_s2;
+      const T ratio = (1 + d2) * std::sqrt(1 + d2) / ((1 + d2 / 2) * a2 * a2);
+      x[count] = pairs.row(0)[i], y[count] = pairs.row(1)[i];
+      gain[count] = pairs.row(5)[i] * (ratio >= 0 ? ratio - 1 : T(-1));
+      range[count] = 0;
+      T edge = 6;
+      for (std::size_t r = 1; r < ranges; ++r, edge *= 4) range[count] += d2 > edge ? T(1) : T(0);
+      if (search.distances_sq[i] <= limit) distinct += pairs.row(5)[i] / pairs.weights()[i];
+    }
+    std::fill(gain + count, gain + (count + pairs.block - 1) / pairs.block * pairs.block, T(0));
+    return distinct * static_cast<T>(stride);
+  }
+
+  // The evidence, and the share in each range that it speaks for.
+  T nats(T (&best)[ranges]) const noexcept {
+    LogProduct products[ranges][shares];
+    for (std::size_t k = 0; k < count; ++k) {
+      for (std::size_t s = 1; s < shares; ++s) products[range_of(k)][s].multiply(1 + share[s] * gain[k]);
+    }
+    T all = 0;
+    for (std::size_t r = 0; r < ranges; ++r) {
+      T logs[shares], mean = 0;
+      for (std::size_t s = 0; s < shares; ++s) logs[s] = products[r][s].value();
+      const T* const most = std::max_element(logs, logs + shares);
+      best[r] = share[most - logs];
+      for (const T log : logs) mean += std::exp(log - *most) / shares;
+      all += *most + std::log(mean);
+    }
+    return all;
   }
 
   // Takes away the pairs near the line of the previous image that carries most of the gains.
   void drop_line() noexcept {
-    const T width_sq = 64 * (std::max)(search.noise_variance, search.limit / T(3.84));
-    const auto holds = [&](const Vector3<T>& line, std::size_t i) {
-      const T e = line[0] * pairs.row(0)[i] + line[1] * pairs.row(1)[i] + line[2];
-      return e * e <= width_sq;
-    };
+    using P = simd::Packet<T>;
+    const P zero(T(0)), one(T(1)), width_sq(64 * (std::max)(search.noise_variance, search.limit / T(3.84)));
     Random random(pairs.size, "fundamental_evidence");
     const auto point = [&] {
-      const std::size_t n = (pairs.size - 1) / stride + 1;
-      return previous_point<T>(pairs, random.index(static_cast<std::uint32_t>(n)) * stride);
+      const std::size_t k = random.index(static_cast<std::uint32_t>(count));
+      return Vector3<T>(x[k], y[k], 1);
+    };
+    const auto near = [&](const Vector3<T>& line, std::size_t k) {
+      const P e = multiply_add(P(line[0]), P::load(x + k), multiply_add(P(line[1]), P::load(y + k), P(line[2])));
+      return e * e <= width_sq;
     };
     T most = 0;
     Vector3<T> best = Vector3<T>::Zero();
-    for (int k = 0; k < 16; ++k) {
+    for (int trial = 0; trial < 16; ++trial) {
       const Vector3<T> a = point(), across = cross(a, point()), line = across / across.template head<2>().norm();
-      T sum = 0;
-      for_each([&](std::size_t i) { sum += holds(line, i) ? (std::min)((std::max)(gains[i], T(0)), T(1)) : T(0); });
-      if (sum > most) most = sum, best = line;
+      P sum = zero;
+      for (std::size_t k = 0; k < count; k += P::lanes) {
+        const P g = P::load(gain + k);
+        sum += select(near(line, k), select(g < one, select(g > zero, g, zero), one), zero);
+      }
+      if (reduce_add(sum) > most) most = reduce_add(sum), best = line;
     }
-    for_each([&](std::size_t i) {
-      if (holds(best, i)) gains[i] = 0;
-    });
+    for (std::size_t k = 0; k < count; k += P::lanes) select(near(best, k), zero, P::load(gain + k)).store(gain + k);
   }
 };
 

@@ -28,7 +28,7 @@ struct PairArrays : RansacColumns<7> {
   PairScaling scaling;
   double factor = 0;           // 0: the points of an image coincide, nothing else is set
   double total_shared = 0;     // sum of the weights in the score
-  std::vector<float> thinned;  // evenly chosen ones of the pairs
+  std::vector<float> thinned;  // see thinned_columns
   CellCounts cells[2];
 };
 
@@ -51,9 +51,13 @@ template <typename T>
 [[nodiscard]] inline PairColumns<float> fast_columns(const PairArrays& pairs) noexcept {
   return pair_columns(pairs.fast.data(), pairs.capacity, pairs.size);
 }
+// Evenly chosen ones, or all where they are few; the number of the k-th of them.
 [[nodiscard]] inline PairColumns<float> thinned_columns(const PairArrays& pairs) noexcept {
   constexpr std::size_t enough = PairArrays::enough;
   return pairs.size > enough ? pair_columns(pairs.thinned.data(), enough, enough) : fast_columns(pairs);
+}
+[[nodiscard]] inline std::size_t thinned_index(const PairArrays& pairs, std::size_t k) noexcept {
+  return pairs.size > PairArrays::enough ? k * pairs.size / PairArrays::enough : k;
 }
 
 template <typename T>
@@ -119,7 +123,7 @@ void load_pairs(const PointPairs<Scalar>& input, double cell_px, PairArrays& pai
   share_weights(pairs, cell_px * pairs.factor);
   constexpr std::size_t enough = PairArrays::enough;
   for (std::size_t k = 0; k < 5 * enough && pairs.size > enough; ++k)
-    pairs.thinned[k] = pairs.fast_row(k / enough)[k % enough * pairs.size / enough];
+    pairs.thinned[k] = pairs.fast_row(k / enough)[thinned_index(pairs, k % enough)];
 }
 
 }  // namespace CFP_ISA

@@ -56,7 +56,7 @@ template <typename Scalar>
   if (!(pairs.factor > 0)) return result;
   workspace.list.reserve(pairs.size);
   workspace.distances_sq.resize(pairs.capacity);
-  workspace.scratch.resize(2 * pairs.capacity);
+  workspace.scratch.resize(4 * pairs.capacity);
   const double threshold = options.threshold_px * pairs.factor;
   FundamentalSearch<double> search{pairs, threshold * threshold, workspace.list, workspace.distances_sq,
                                    Random(options.seed, "fundamental_ransac")};
