@@ -244,8 +244,7 @@ void run(const std::filesystem::path& folder, const std::filesystem::path& out, 
 
   if (!std::filesystem::exists(folder / "groundtruth.txt")) return;
   const auto truth = cfp_examples::read_tum_trajectory(folder / "groundtruth.txt");
-  cfp::TrajectoryErrorWorkspace workspace;
-  const auto error = cfp::absolute_trajectory_error(truth, trajectory, cfp::AbsoluteErrorOptions{}, workspace);
+  const auto error = cfp::absolute_trajectory_error(truth, trajectory);
   std::printf(
       "%-10s ATE %.4f m RMSE, S.D. %.4f m, rigid alignment, %zu of %zu poses matched, largest gap %.2f s; %zu frames "
       "without a pose\n",

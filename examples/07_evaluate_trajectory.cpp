@@ -18,14 +18,13 @@ int main(int argc, char* argv[]) {
   try {
     const auto truth = cfp_examples::read_tum_trajectory(argv[1]),
                estimate = cfp_examples::read_tum_trajectory(argv[2]);
-    cfp::TrajectoryErrorWorkspace workspace;
     cfp::AbsoluteErrorOptions options;
     if (similarity) options.alignment = cfp::AlignmentMode::similarity;
-    const auto ate = cfp::absolute_trajectory_error(truth, estimate, options, workspace);
+    const auto ate = cfp::absolute_trajectory_error(truth, estimate, options);
     std::fputs(cfp_examples::describe(ate).c_str(), stdout);
     cfp::RelativeErrorOptions relative;
     if (similarity) relative.scale = ate.S_truth_estimate.scale;
-    const auto rpe = cfp::relative_pose_error(truth, estimate, relative, workspace);
+    const auto rpe = cfp::relative_pose_error(truth, estimate, relative);
     std::fputs(cfp_examples::describe(rpe).c_str(), stdout);
     return ate.status == cfp::Status::ok && rpe.status == cfp::Status::ok ? 0 : 1;
   } catch (const std::exception& error) {

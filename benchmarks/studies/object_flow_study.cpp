@@ -240,8 +240,7 @@ void print(const std::vector<Candidate>& all) {
               "flow", "F, O", "sum", "95 %", "ratio", "AUC", "still>", "moving>", "O still", "moving", "partly",
               "boxes", "unkn.", "F", "H", "none");
   for (const Candidate& c : all) {
-    cfp::CalibrationWorkspace workspace;
-    const auto auc = cfp::roc_auc(c.score, c.is_static, workspace);
+    const auto auc = cfp::roc_auc(c.score, c.is_static);
     const auto mean = [](double sum, std::size_t n) { return n > 0 ? sum / static_cast<double>(n) : 0.0; };
     std::printf(
         "%-36s %6.0f | %6.2f %6.2f %6.2f %6.2f %6.2f | %7.4f %7.3f %7.3f | %7.3f %7.3f | %7.3f %5zu %5zu | %4zu %4zu "

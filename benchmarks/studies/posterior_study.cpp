@@ -100,9 +100,8 @@ class Tracker {
   }
 
   Score score() {
-    cfp::CalibrationWorkspace workspace;
     Score s;
-    s.auc = cfp::roc_auc(scores_, cfp::span<const char>(is_static_), workspace).auc;
+    s.auc = cfp::roc_auc(scores_, cfp::span<const char>(is_static_)).auc;
     double still = 0, lost = 0, moving = 0, kept = 0;
     for (std::size_t i = 0; i < scores_.size(); ++i) {
       (is_static_[i] != 0 ? still : moving) += 1;
@@ -111,7 +110,7 @@ class Tracker {
     }
     s.static_lost = 100 * lost / std::max(still, 1.0);
     s.moving_kept = 100 * kept / std::max(moving, 1.0);
-    s.object_auc = cfp::roc_auc(objects_, cfp::span<const char>(object_is_static_), workspace).auc;
+    s.object_auc = cfp::roc_auc(objects_, cfp::span<const char>(object_is_static_)).auc;
     s.brier = brier_sum_ / std::max(brier_count_, 1.0);
     s.position_mm = 1000 * std::sqrt(error_sq_ / std::max(frames_, 1));
     return s;

@@ -95,8 +95,7 @@ inline std::string reliability_plot(const Series& series) {
   for (std::size_t k = 0; k < samples.size(); ++k) {
     const CalibrationSummary c = summarize(*samples[k]);
     if (c.samples == 0) continue;
-    cfp::CalibrationWorkspace workspace;
-    const auto result = cfp::evaluate_calibration(samples[k]->probability, samples[k]->is_static, workspace);
+    const auto result = cfp::evaluate_calibration(samples[k]->probability, samples[k]->is_static);
     const std::string colour = "c" + number(styles[k]);
     std::vector<double> x, y;
     for (const cfp::ReliabilityBin& bin : result.table) {

@@ -123,9 +123,7 @@ inline Positions positions_of(const RunRecord& run) {
 // The truth while the camera recorded: motion capture often runs longer.
 inline Positions truth_positions(const std::vector<cfp::StampedPose<double>>& truth, double start_s, double end_s) {
   Positions out;
-  std::vector<std::size_t> order;
-  cfp::time_order(truth, order);
-  for (const std::size_t i : order) {
+  for (const std::size_t i : cfp::time_order(truth)) {
     if (truth[i].time_s >= start_s - 0.05 && truth[i].time_s <= end_s + 0.05) out.add(truth[i].T_world_cam.translation);
   }
   return out;
@@ -135,13 +133,9 @@ inline Positions truth_positions(const std::vector<cfp::StampedPose<double>>& tr
 inline TimeSeries error_over_time(const RunRecord& run, double start_s) {
   TimeSeries out;
   if (!has_error(run.absolute)) return out;
-  const auto estimate = run.trajectory();
-  cfp::TrajectoryErrorWorkspace workspace;
-  cfp::AbsoluteErrorOptions options;
-  options.alignment = run.absolute.alignment;
-  if (!has_error(cfp::absolute_trajectory_error(run.truth, estimate, options, workspace))) return out;
-  std::vector<double> error(estimate.size(), not_known);
-  for (std::size_t k = 0; k < workspace.pose.size(); ++k) error[workspace.pose[k]] = workspace.translation_m[k];
+  std::vector<double> error(run.frames.size(), not_known);  // of its poses
+  const cfp::PoseErrors& errors = run.absolute.errors;
+  for (std::size_t k = 0; k < errors.pose.size(); ++k) error[errors.pose[k]] = errors.translation_m[k];
   std::size_t pose = 0;
   for (const RunFrame& frame : run.frames) {
     const bool posed = has_pose(frame);

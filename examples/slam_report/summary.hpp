@@ -49,8 +49,7 @@ inline std::array<const LabelledSamples*, 5> labelled(const RunRecord& run) {
 inline CalibrationSummary summarize(const LabelledSamples& samples) {
   CalibrationSummary out;
   if (samples.probability.size() != samples.is_static.size()) return out;
-  cfp::CalibrationWorkspace workspace;
-  const auto result = cfp::evaluate_calibration(samples.probability, samples.is_static, workspace);
+  const auto result = cfp::evaluate_calibration(samples.probability, samples.is_static);
   out.samples = result.used;
   if (result.used == 0) return out;
   out.static_fraction = result.static_fraction;

@@ -79,9 +79,8 @@ struct RunRecord {
 inline void evaluate(RunRecord& run) {
   if (run.truth.empty()) return;
   const std::vector<cfp::StampedPose<double>> estimate = run.trajectory();
-  cfp::TrajectoryErrorWorkspace workspace;
-  run.absolute = cfp::absolute_trajectory_error(run.truth, estimate, cfp::AbsoluteErrorOptions{}, workspace);
-  run.relative = cfp::relative_pose_error(run.truth, estimate, cfp::RelativeErrorOptions{}, workspace);
+  run.absolute = cfp::absolute_trajectory_error(run.truth, estimate);
+  run.relative = cfp::relative_pose_error(run.truth, estimate);
 }
 
 }  // namespace cfp_slam

@@ -179,10 +179,7 @@ class Sequence {
     for (const auto& image : list) others.push_back({image.time_s, {}});
     cfp::AssociationOptions options;
     options.max_difference_s = max_difference_s;
-    cfp::AssociationWorkspace workspace;
-    std::vector<cfp::TimeMatch> matches;
-    cfp::associate(colors, others, options, workspace, matches);
-    for (const cfp::TimeMatch& m : matches) frames_[m.first].*member = list[m.second];
+    for (const cfp::TimeMatch& m : cfp::associate(colors, others, options)) frames_[m.first].*member = list[m.second];
   }
 
   void read_true_boxes() {

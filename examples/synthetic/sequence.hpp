@@ -226,10 +226,8 @@ inline Recording read_recording(const std::filesystem::path& folder, double came
     for (const auto& image : images) stamps.push_back({image.time_s, {}});
     return stamps;
   };
-  cfp::AssociationWorkspace workspace;
-  std::vector<cfp::TimeMatch> with_depth, with_pose;
-  cfp::associate(stamped(colors), stamped(depths), {}, workspace, with_depth);
-  cfp::associate(stamped(colors), poses, {}, workspace, with_pose);
+  const auto with_depth = cfp::associate(stamped(colors), stamped(depths)),
+             with_pose = cfp::associate(stamped(colors), poses);
   for (std::size_t i = 0, j = 0; i < with_depth.size(); ++i) {
     while (j < with_pose.size() && colors[with_pose[j].first].time_s < colors[with_depth[i].first].time_s) ++j;
     if (j == with_pose.size() || with_pose[j].first != with_depth[i].first) continue;

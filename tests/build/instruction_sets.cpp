@@ -142,17 +142,13 @@ void bundles(const std::vector<cfp_test::BaScene>& scenes, Results& results) {
 /// Errors of the refined path, and a lens that bends.
 void judgement(const std::vector<cfp_test::BaScene>& scenes, Results& results) {
   const cfp::RadialTangentialCamera<double> lens{535.4, 539.2, 320.1, 247.6, 0.23, -0.78, -0.003, 0.001, 0.9};
-  cfp::TrajectoryErrorWorkspace workspace;
   for (const cfp_test::BaScene& scene : scenes) {
     std::vector<cfp::StampedPose<double>> truth, estimate;
     for (std::size_t i = 0; i < scene.poses.size(); ++i) {
       truth.push_back({static_cast<double>(i), scene.true_poses[i].inverse()});
       estimate.push_back({static_cast<double>(i), scene.poses[i].inverse()});
     }
-    results.add(
-        "trajectory error",
-        cfp::absolute_trajectory_error(truth, estimate, cfp::AbsoluteErrorOptions{}, workspace).translation_m.rmse,
-        1e-9);
+    results.add("trajectory error", cfp::absolute_trajectory_error(truth, estimate).translation_m.rmse, 1e-9);
     for (const auto& measured : scene.pixels) {
       cfp::Vector3<double> ray = cfp::Vector3<double>::Zero();
       results.add("ray of a pixel", lens.unproject(measured, ray) ? ray.x() : -1, 1e-9);

@@ -52,8 +52,6 @@
   CFP_LAYOUT_OPAQUE(cfp::BoxTracker<double>)                             \
   CFP_LAYOUT(cfp::Similarity, translation)                               \
   CFP_LAYOUT(cfp::AlignmentResult, status)                               \
-  CFP_LAYOUT(cfp::RankedLabel, is_static)                                \
-  CFP_LAYOUT(cfp::CalibrationWorkspace, ranked)                          \
   CFP_LAYOUT(cfp::AucResult, status)                                     \
   CFP_LAYOUT(cfp::ReliabilityBin, static_fraction)                       \
   CFP_LAYOUT(cfp::CalibrationResult<10>, table)                          \
@@ -62,13 +60,12 @@
   CFP_LAYOUT(cfp::StampedPose<double>, T_world_cam)                      \
   CFP_LAYOUT(cfp::AssociationOptions, offset_s)                          \
   CFP_LAYOUT(cfp::TimeMatch, second)                                     \
-  CFP_LAYOUT(cfp::AssociationWorkspace, second_taken)                            \
   CFP_LAYOUT(cfp::TrajectoryCoverage, largest_stamp_difference_s)        \
   CFP_LAYOUT(cfp::AbsoluteErrorOptions, expected_poses)                  \
+  CFP_LAYOUT(cfp::PoseErrors, rotation_deg)                              \
   CFP_LAYOUT(cfp::AbsoluteErrorResult, status)                           \
   CFP_LAYOUT(cfp::RelativeErrorOptions, expected_poses)                  \
   CFP_LAYOUT(cfp::RelativeErrorResult, status)                           \
-  CFP_LAYOUT(cfp::TrajectoryErrorWorkspace, used)                        \
   CFP_LAYOUT(cfp::Box<float>, y2)                                        \
   CFP_LAYOUT(cfp::Box<double>, y2)                                       \
   CFP_LAYOUT(cfp::PinholeCamera<float>, cy)                              \

@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "cfp/core/random.hpp"
-#include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
 
 namespace {
@@ -43,10 +42,9 @@ double auc_by_pairs(const Samples<Scalar>& s) {
 
 TEMPLATE_TEST_CASE("AUC equals the count over all pairs, ties included", "[evaluation]", float, double) {
   cfp::Random random(51, "auc");
-  cfp::CalibrationWorkspace workspace;
   for (int round = 0; round < 100; ++round) {
     const auto s = random_samples<TestType>(random, 20 + random.index(60), 1 + random.index(30));
-    const auto result = cfp::roc_auc(s.probability, s.is_static, workspace);
+    const auto result = cfp::roc_auc(s.probability, s.is_static);
     REQUIRE(result.status == cfp::Status::ok);
     CHECK_THAT(result.auc, WithinAbs(auc_by_pairs(s), 1e-12));
     CHECK((result.used == s.probability.size() && result.skipped == 0));
@@ -54,10 +52,9 @@ TEMPLATE_TEST_CASE("AUC equals the count over all pairs, ties included", "[evalu
 }
 
 TEST_CASE("Perfect, reversed and constant scores have AUC 1, 0 and one half", "[evaluation]") {
-  cfp::CalibrationWorkspace workspace;
   const std::vector<double> rising{0.1, 0.2, 0.8, 0.9}, falling{9, 8, -2, -3}, same(4, 0.3);
   const std::vector<char> labels{0, 0, 1, 1};
-  const auto auc = [&](const std::vector<double>& scores) { return cfp::roc_auc(scores, labels, workspace).auc; };
+  const auto auc = [&](const std::vector<double>& scores) { return cfp::roc_auc(scores, labels).auc; };
   CHECK(auc(rising) == 1);
   CHECK(auc(falling) == 0);
   CHECK(auc(same) == 0.5);
@@ -66,8 +63,7 @@ TEST_CASE("Perfect, reversed and constant scores have AUC 1, 0 and one half", "[
 TEMPLATE_TEST_CASE("Brier, ECE and the table equal those by hand", "[evaluation]", float, double) {
   constexpr TestType low(0.25), high(0.75);
   const Samples<TestType> s{{low, low, low, low, high, high, 1, 1}, {0, 1, 1, 1, 1, 1, 1, 1}};
-  cfp::CalibrationWorkspace workspace;
-  const auto r = cfp::evaluate_calibration<4>(s.probability, s.is_static, workspace);
+  const auto r = cfp::evaluate_calibration<4>(s.probability, s.is_static);
   CHECK(r.status == cfp::Status::ok);
   CHECK(r.used == 8);
   CHECK_THAT(r.brier, WithinAbs((1 * 0.0625 + 3 * 0.5625 + 2 * 0.0625) / 8, 1e-15));
@@ -84,12 +80,11 @@ TEMPLATE_TEST_CASE("Brier, ECE and the table equal those by hand", "[evaluation]
 TEST_CASE("Labels drawn from the probabilities are found calibrated, squashed ones are not", "[evaluation]") {
   cfp::Random random(52, "calibrated");
   auto s = random_samples<double>(random, 200000, 1000);
-  cfp::CalibrationWorkspace workspace;
-  const auto good = cfp::evaluate_calibration(s.probability, s.is_static, workspace);
+  const auto good = cfp::evaluate_calibration(s.probability, s.is_static);
   CHECK(good.expected_calibration_error < 0.005);
   CHECK_THAT(good.brier, WithinAbs(1.0 / 6, 0.003));  // E p (1 - p) for uniform p
   for (double& p : s.probability) p = 0.5 + 0.25 * (p - 0.5);
-  const auto squashed = cfp::evaluate_calibration(s.probability, s.is_static, workspace);
+  const auto squashed = cfp::evaluate_calibration(s.probability, s.is_static);
   CHECK(squashed.expected_calibration_error > 0.15);
   CHECK_THAT(squashed.auc, WithinAbs(good.auc, 1e-12));
 }
@@ -98,8 +93,7 @@ TEMPLATE_TEST_CASE("Hostile probabilities are skipped, and everything stays fini
   constexpr TestType nan = std::numeric_limits<TestType>::quiet_NaN(), inf = std::numeric_limits<TestType>::infinity();
   constexpr TestType huge = (std::numeric_limits<TestType>::max)(), tiny = std::numeric_limits<TestType>::denorm_min();
   const Samples<TestType> s{{nan, inf, -inf, -1, 2, huge, -tiny, 0, 1, 0, tiny}, {0, 1, 0, 1, 0, 1, 0, 1, 0, 0, 1}};
-  cfp::CalibrationWorkspace workspace;
-  const auto r = cfp::evaluate_calibration(s.probability, s.is_static, workspace);
+  const auto r = cfp::evaluate_calibration(s.probability, s.is_static);
   CHECK(r.skipped == 7);
   CHECK(r.used == 4);
   for (const double x : {r.auc, r.brier, r.expected_calibration_error, r.static_fraction}) CHECK((x >= 0 && x <= 1));
@@ -108,21 +102,12 @@ TEMPLATE_TEST_CASE("Hostile probabilities are skipped, and everything stays fini
     CHECK((bin.static_fraction >= 0 && bin.static_fraction <= 1));
   }
 
-  const auto none = cfp::evaluate_calibration(std::vector<TestType>(), {}, workspace);
+  const auto none = cfp::evaluate_calibration(std::vector<TestType>(), {});
   CHECK(none.status == cfp::Status::not_enough_data);
   CHECK(none.auc == 0.5);
   const Samples<TestType> one{{TestType(0.25)}, {1}};
-  const auto single = cfp::evaluate_calibration(one.probability, one.is_static, workspace);
+  const auto single = cfp::evaluate_calibration(one.probability, one.is_static);
   CHECK(single.status == cfp::Status::degenerate);
   CHECK(single.auc == 0.5);
   CHECK(single.brier == 0.5625);
-}
-
-TEST_CASE("A second evaluation of the same size allocates nothing", "[evaluation]") {
-  cfp::Random random(54, "allocation");
-  const auto s = random_samples<float>(random, 500, 100);
-  cfp::CalibrationWorkspace workspace;
-  const auto work = [&] { (void)cfp::evaluate_calibration(s.probability, s.is_static, workspace); };
-  work();
-  CHECK(cfp_test::allocations_in(work) == 0);
 }

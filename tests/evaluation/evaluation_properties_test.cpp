@@ -30,10 +30,7 @@ Predictions predictions(Random& random) {
   }
   return s;
 }
-cfp::CalibrationResult<10> calibration(const Predictions& s) {
-  cfp::CalibrationWorkspace workspace;
-  return cfp::evaluate_calibration(s.p, s.y, workspace);
-}
+cfp::CalibrationResult<10> calibration(const Predictions& s) { return cfp::evaluate_calibration(s.p, s.y); }
 bool close(const cfp::CalibrationResult<10>& a, const cfp::CalibrationResult<10>& b) {
   return std::abs(a.auc - b.auc) < 1e-12 && std::abs(a.brier - b.brier) < 1e-12 &&
          std::abs(a.expected_calibration_error - b.expected_calibration_error) < 1e-12;
@@ -49,8 +46,7 @@ Pair trajectories(Random& random) {
   return pair;
 }
 double ate(const Pair& pair, const cfp::AbsoluteErrorOptions& options = {}) {
-  cfp::TrajectoryErrorWorkspace workspace;
-  return cfp::absolute_trajectory_error(pair.truth, pair.estimate, options, workspace).translation_m.rmse;
+  return cfp::absolute_trajectory_error(pair.truth, pair.estimate, options).translation_m.rmse;
 }
 
 }  // namespace

@@ -32,17 +32,16 @@ std::vector<cfp::StampedPose<double>> trajectory(FuzzInput& in, std::size_t n) {
 void errors(FuzzInput& in) {
   const std::size_t n = in.count(30);
   const auto truth = trajectory(in, n), estimate = in.flag() ? truth : trajectory(in, in.count(30));
-  cfp::TrajectoryErrorWorkspace workspace;
   const cfp::span<const cfp::StampedPose<double>> true_poses(truth), estimated(estimate);
   cfp::AbsoluteErrorOptions absolute;
   absolute.alignment = static_cast<cfp::AlignmentMode>(in.byte() % 4);
   cfp_fuzz::disturb(in, absolute, {&absolute.association.max_difference_s, &absolute.association.offset_s});
-  const auto ate = cfp::absolute_trajectory_error(true_poses, estimated, absolute, workspace);
+  const auto ate = cfp::absolute_trajectory_error(true_poses, estimated, absolute);
   CFP_PROMISE(usable(ate.translation_m.rmse));
   cfp::RelativeErrorOptions relative;
   relative.unit = in.flag() ? cfp::DeltaUnit::frames : cfp::DeltaUnit::seconds;
   cfp_fuzz::disturb(in, relative, {&relative.delta, &relative.offset_s, &relative.scale});
-  const auto rpe = cfp::relative_pose_error(true_poses, estimated, relative, workspace);
+  const auto rpe = cfp::relative_pose_error(true_poses, estimated, relative);
   CFP_PROMISE(usable(rpe.translation_m.rmse) && usable(rpe.rotation_deg.rmse));
 }
 
@@ -51,9 +50,7 @@ void calibration(FuzzInput& in) {
   const std::vector<float> p = in.numbers<float>(n, 0, 1);
   std::vector<char> is_static(n);
   for (char& s : is_static) s = in.flag() ? 1 : 0;
-  cfp::CalibrationWorkspace workspace;
-  const auto result =
-      cfp::evaluate_calibration<10>(cfp::span<const float>(p), cfp::span<const char>(is_static), workspace);
+  const auto result = cfp::evaluate_calibration<10>(cfp::span<const float>(p), cfp::span<const char>(is_static));
   CFP_PROMISE(is_probability(result.auc) && is_probability(result.brier));
   CFP_PROMISE(is_probability(result.expected_calibration_error) && is_probability(result.static_fraction));
 }

@@ -27,10 +27,7 @@ TEST_CASE("AUC follows the order of the scores only", "[properties]") {
       fallen.push_back(-grid[i]);
       opposite.push_back(y[i] == 0 ? 1 : 0);
     }
-    cfp::CalibrationWorkspace workspace;
-    const auto auc = [&](const std::vector<double>& s, const std::vector<char>& l) {
-      return cfp::roc_auc(s, l, workspace).auc;
-    };
+    const auto auc = [&](const std::vector<double>& s, const std::vector<char>& l) { return cfp::roc_auc(s, l).auc; };
     double wins = 0, pairs = 0;
     for (std::size_t i = 0; i < grid.size(); ++i) {
       for (std::size_t j = 0; j < grid.size(); ++j) {
@@ -52,9 +49,8 @@ TEST_CASE("Calibration of any doubles is finite and in range", "[properties]") {
                                        rc::gen::element(0.0, 1.0, -0.0, 1.0 + 1e-15, std::nan(""), HUGE_VAL, 5e-324),
                                        rc::gen::arbitrary<double>());
     const auto p = *rc::gen::container<std::vector<double>>(number);
-    cfp::CalibrationWorkspace workspace;
     const std::vector<char> y = labels(p.size());
-    const auto r = cfp::evaluate_calibration<7>(p, y, workspace);
+    const auto r = cfp::evaluate_calibration<7>(p, y);
     for (const double x : {r.auc, r.brier, r.expected_calibration_error, r.static_fraction}) {
       RC_ASSERT(x >= 0 && x <= 1);
     }

@@ -33,13 +33,12 @@ inline cfp::SE3<double> fake_truth(double t) {
 
 inline void evaluate(cfp_slam::RunRecord& run) {
   const auto estimate = run.trajectory();
-  cfp::TrajectoryErrorWorkspace workspace;
   cfp::AbsoluteErrorOptions absolute;
   absolute.expected_poses = run.frames.size();
-  run.absolute = cfp::absolute_trajectory_error(run.truth, estimate, absolute, workspace);
+  run.absolute = cfp::absolute_trajectory_error(run.truth, estimate, absolute);
   cfp::RelativeErrorOptions relative;
   relative.expected_poses = run.frames.size();
-  run.relative = cfp::relative_pose_error(run.truth, estimate, relative, workspace);
+  run.relative = cfp::relative_pose_error(run.truth, estimate, relative);
 }
 
 inline void fake_boxes(const FakeRun& fake, std::size_t k, cfp::Random& random, cfp_slam::RunFrame& frame,

@@ -14,15 +14,6 @@
 
 namespace cfp {
 
-struct RankedLabel {
-  double score;
-  bool is_static;
-};
-
-struct CalibrationWorkspace {
-  std::vector<RankedLabel> ranked;
-};
-
 /// Probability that a randomly chosen static sample scores higher than a moving one, ties counting one half
 /// (Mann–Whitney): sum over (static i, moving j) of ([s_i > s_j] + [s_i = s_j] / 2) / (N_static N_moving). In [0, 1].
 struct AucResult {
@@ -51,23 +42,31 @@ struct CalibrationResult : AucResult {
 namespace detail {
 inline namespace CFP_ISA {
 
-/// Fills `ranked` with the samples whose score lies in [lowest, highest].
+struct LabelledScore {
+  double score;
+  bool is_static;
+};
+
+/// The samples whose score lies in [lowest, highest].
 template <typename Scalar>
-void gather(span<const Scalar> scores, span<const char> is_static, double lowest, double highest,
-            std::vector<RankedLabel>& ranked, AucResult& result) {
+[[nodiscard]] std::vector<LabelledScore> gather(span<const Scalar> scores, span<const char> is_static, double lowest,
+                                                double highest) {
   CFP_ASSERT(scores.size() == is_static.size());
-  ranked.clear();
+  std::vector<LabelledScore> samples;
   for (std::size_t i = 0; i < scores.size(); ++i) {
     const double score = static_cast<double>(scores[i]);
-    if (score >= lowest && score <= highest) ranked.push_back({score, is_static[i] != 0});
+    if (score >= lowest && score <= highest) samples.push_back({score, is_static[i] != 0});
   }
-  result.used = ranked.size();
-  result.skipped = scores.size() - result.used;
+  return samples;
 }
 
-/// Sets auc and status from ranked, which it sorts.
-inline void rank(std::vector<RankedLabel>& ranked, AucResult& result) noexcept {
-  std::sort(ranked.begin(), ranked.end(), [](const RankedLabel& a, const RankedLabel& b) { return a.score < b.score; });
+/// Of these samples, which are left of `all`.
+[[nodiscard]] inline AucResult rank(std::vector<LabelledScore> ranked, std::size_t all) noexcept {
+  AucResult result;
+  result.used = ranked.size();
+  result.skipped = all - result.used;
+  std::sort(ranked.begin(), ranked.end(),
+            [](const LabelledScore& a, const LabelledScore& b) { return a.score < b.score; });
   double moving_below = 0, static_sum = 0, wins = 0;
   for (std::size_t begin = 0, end = 0; begin < ranked.size(); begin = end) {
     double static_here = 0, moving_here = 0;
@@ -77,10 +76,11 @@ inline void rank(std::vector<RankedLabel>& ranked, AucResult& result) noexcept {
     static_sum += static_here;
     moving_below += moving_here;
   }
-  if (ranked.empty()) return;
+  if (ranked.empty()) return result;
   const bool both = static_sum > 0 && moving_below > 0;
   result.status = both ? Status::ok : Status::degenerate;
   if (both) result.auc = clamp_probability(wins / static_sum / moving_below);
+  return result;
 }
 
 }  // namespace CFP_ISA
@@ -88,30 +88,27 @@ inline void rank(std::vector<RankedLabel>& ranked, AucResult& result) noexcept {
 
 inline namespace CFP_ISA {
 
-/// Arrays of one length. Any finite scores, not only probabilities. O(n log n); allocates in the workspace on first use
-/// only.
+/// Arrays of one length. Any finite scores, not only probabilities. O(n log n).
 template <typename Scores>
-[[nodiscard]] AucResult roc_auc(const Scores& scores, span<const char> is_static, CalibrationWorkspace& workspace) {
-  AucResult result;
+[[nodiscard]] AucResult roc_auc(const Scores& scores, span<const char> is_static) {
   const double largest = (std::numeric_limits<double>::max)();
-  detail::gather(span<const range_value_t<Scores>>(scores), is_static, -largest, largest, workspace.ranked, result);
-  detail::rank(workspace.ranked, result);
-  return result;
+  const span<const range_value_t<Scores>> all(scores);
+  return detail::rank(detail::gather(all, is_static, -largest, largest), all.size());
 }
 
-/// All of the above for probabilities in [0, 1]. No usable sample → zeros, auc 0.5, not_enough_data. O(n log n);
-/// allocates in the workspace on first use only. Sources: Brier, "Verification of forecasts expressed in terms of
-/// probability", 1950; Guo et al., "On calibration of modern neural networks", ICML 2017 (ECE, equally wide bins).
+/// All of the above for probabilities in [0, 1]. No usable sample → zeros, auc 0.5, not_enough_data. O(n log n).
+/// Sources: Brier, "Verification of forecasts expressed in terms of probability", 1950; Guo et al., "On calibration of
+/// modern neural networks", ICML 2017 (ECE, equally wide bins).
 template <std::size_t Bins = 10, typename Probabilities>
 [[nodiscard]] CalibrationResult<Bins> evaluate_calibration(const Probabilities& static_probability,
-                                                           span<const char> is_static,
-                                                           CalibrationWorkspace& workspace) {
+                                                           span<const char> is_static) {
   static_assert(Bins > 0, "the reliability table needs a bin");
   CalibrationResult<Bins> result;
-  detail::gather(span<const range_value_t<Probabilities>>(static_probability), is_static, 0.0, 1.0, workspace.ranked,
-                 result);
+  const span<const range_value_t<Probabilities>> all(static_probability);
+  const std::vector<detail::LabelledScore> samples = detail::gather(all, is_static, 0.0, 1.0);
+  static_cast<AucResult&>(result) = detail::rank(samples, all.size());
   if (result.used == 0) return result;
-  for (const RankedLabel& sample : workspace.ranked) {
+  for (const detail::LabelledScore& sample : samples) {
     const double p = sample.score;
     const double y = sample.is_static ? 1 : 0;
     result.static_fraction += y;
@@ -131,7 +128,6 @@ template <std::size_t Bins = 10, typename Probabilities>
     bin.static_fraction /= count;
     result.expected_calibration_error += count / total * std::abs(bin.static_fraction - bin.mean_probability);
   }
-  detail::rank(workspace.ranked, result);
   return result;
 }
 

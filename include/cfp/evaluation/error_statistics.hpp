@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "cfp/core/numeric.hpp"
-#include "cfp/core/span.hpp"
 #include "cfp/math/so3.hpp"
 
 namespace cfp {
@@ -25,8 +25,8 @@ struct ErrorStatistics {
 
 inline namespace CFP_ISA {
 
-/// Statistics of finite errors ≥ 0. Reorders errors. O(n), allocates nothing; does not overflow below 1e308.
-[[nodiscard]] inline ErrorStatistics error_statistics(span<double> errors) noexcept {
+/// Statistics of finite errors ≥ 0. O(n), in the caller's copy; does not overflow below 1e308.
+[[nodiscard]] inline ErrorStatistics error_statistics(std::vector<double> errors) noexcept {
   ErrorStatistics s;
   s.count = errors.size();
   if (errors.empty()) return s;
@@ -43,7 +43,7 @@ inline namespace CFP_ISA {
   for (const double error : errors) variance += ((error - s.mean) / s.maximum) * ((error - s.mean) / s.maximum) / n;
   s.rmse = s.maximum * std::sqrt(mean_square);
   s.standard_deviation = s.maximum * std::sqrt(variance);
-  double* const middle = errors.begin() + errors.size() / 2;
+  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
   std::nth_element(errors.begin(), middle, errors.end());
   s.median = errors.size() % 2 == 1 ? *middle : 0.5 * *middle + 0.5 * *std::max_element(errors.begin(), middle);
   return s;
@@ -54,20 +54,15 @@ inline namespace CFP_ISA {
 namespace detail {
 inline namespace CFP_ISA {
 
-inline ErrorStatistics statistics_of(const std::vector<double>& errors, std::vector<double>& scratch) {
-  scratch.assign(errors.begin(), errors.end());
-  return error_statistics(scratch);
-}
-
 /// Median time between neighbours (numpy.median); 0 below two poses.
 template <typename Poses>
-double median_interval(const Poses& poses, const std::vector<std::size_t>& order, std::vector<double>& scratch) {
-  scratch.clear();
+double median_interval(const Poses& poses, const std::vector<std::size_t>& order) {
+  std::vector<double> intervals;
   for (std::size_t i = 1; i < order.size(); ++i) {
-    scratch.push_back(
+    intervals.push_back(
         (std::min)(poses[order[i]].time_s - poses[order[i - 1]].time_s, (std::numeric_limits<double>::max)()));
   }
-  return error_statistics(scratch).median;
+  return error_statistics(std::move(intervals)).median;
 }
 
 template <typename Matrix>  // so that an evaluation that is not called is not compiled

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "cfp/core/options.hpp"
-#include "cfp/core/span.hpp"
 #include "cfp/math/matrix3.hpp"
 #include "cfp/math/se3.hpp"
 
@@ -33,16 +32,6 @@ struct AssociationOptions {
 struct TimeMatch {
   std::size_t first = 0;
   std::size_t second = 0;
-};
-
-struct AssociationWorkspace {
-  struct Candidate {
-    double difference_s;
-    std::size_t first, second;  // positions in the orders
-  };
-  std::vector<std::size_t> first_order, second_order;
-  std::vector<Candidate> candidates;
-  std::vector<char> first_taken, second_taken;
 };
 
 /// How much of a recording an estimated trajectory covers: what a reader needs beside every error.
@@ -76,10 +65,10 @@ template <typename Scalar>
 }
 
 /// Indices of the usable poses in order of time; of several with one stamp the last in the array stays, as in the
-/// dictionaries of the TUM scripts. O(n log n). order is overwritten; it grows on first use only.
+/// dictionaries of the TUM scripts. O(n log n).
 template <typename Poses>
-void time_order(const Poses& poses, std::vector<std::size_t>& order) {
-  order.clear();
+[[nodiscard]] std::vector<std::size_t> time_order(const Poses& poses) {
+  std::vector<std::size_t> order;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     if (is_usable(poses[i])) order.push_back(i);
   }
@@ -89,53 +78,54 @@ void time_order(const Poses& poses, std::vector<std::size_t>& order) {
   order.erase(std::unique(order.begin(), order.end(),
                           [&](std::size_t a, std::size_t b) { return poses[a].time_s == poses[b].time_s; }),
               order.end());
+  return order;
 }
 
 /// One-to-one association as in the TUM script associate.py: the pair of free stamps with the smallest |first − (second
 /// + offset)| is matched first, ties go to the earlier first stamp and then to the earlier second one, until no pair
-/// differs by less than max_difference_s. matches come out in order of time. O(n log n) in the poses and in the pairs
-/// that differ by less than max_difference_s. workspace.first_order and .second_order hold time_order of the inputs
-/// afterwards.
+/// differs by less than max_difference_s. Matches come in order of time. O(n log n) in the poses and in the pairs that
+/// differ by less than max_difference_s.
 template <typename First, typename Second>
-void associate(const First& first, const Second& second, const AssociationOptions& options,
-               AssociationWorkspace& workspace, std::vector<TimeMatch>& matches) {
-  const auto &first_order = workspace.first_order, &second_order = workspace.second_order;
-  time_order(first, workspace.first_order);
-  time_order(second, workspace.second_order);
+[[nodiscard]] std::vector<TimeMatch> associate(const First& first, const Second& second,
+                                               const AssociationOptions& options = {}) {
+  const std::vector<std::size_t> first_order = time_order(first), second_order = time_order(second);
   const auto second_time = [&](std::size_t j) { return second[second_order[j]].time_s + options.offset_s; };
-  workspace.candidates.clear();
+  struct Candidate {
+    double difference_s;
+    std::size_t first, second;  // positions in the orders
+  };
+  std::vector<Candidate> candidates;
   for (std::size_t i = 0, begin = 0; i < first_order.size(); ++i) {
     const double time = first[first_order[i]].time_s;
     const auto is_near = [&](std::size_t j) { return std::abs(time - second_time(j)) < options.max_difference_s; };
     while (begin < second_order.size() && second_time(begin) < time && !is_near(begin)) ++begin;
     for (std::size_t j = begin; j < second_order.size() && (second_time(j) < time || is_near(j)); ++j) {
-      if (is_near(j)) workspace.candidates.push_back({std::abs(time - second_time(j)), i, j});
+      if (is_near(j)) candidates.push_back({std::abs(time - second_time(j)), i, j});
     }
   }
-  std::sort(workspace.candidates.begin(), workspace.candidates.end(), [](const auto& a, const auto& b) {
+  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
     return std::tie(a.difference_s, a.first, a.second) < std::tie(b.difference_s, b.first, b.second);
   });
-  workspace.first_taken.assign(first_order.size(), 0);
-  workspace.second_taken.assign(second_order.size(), 0);
-  matches.clear();
-  for (const auto& pair : workspace.candidates) {
-    if (workspace.first_taken[pair.first] != 0 || workspace.second_taken[pair.second] != 0) continue;
-    workspace.first_taken[pair.first] = workspace.second_taken[pair.second] = 1;
+  std::vector<char> first_taken(first_order.size()), second_taken(second_order.size());
+  std::vector<TimeMatch> matches;
+  for (const Candidate& pair : candidates) {
+    if (first_taken[pair.first] != 0 || second_taken[pair.second] != 0) continue;
+    first_taken[pair.first] = second_taken[pair.second] = 1;
     matches.push_back({first_order[pair.first], second_order[pair.second]});
   }
   std::sort(matches.begin(), matches.end(),
             [&](const TimeMatch& a, const TimeMatch& b) { return first[a.first].time_s < first[b.first].time_s; });
+  return matches;
 }
 
-/// Coverage of the matches (first = truth, second = estimate), which are in order of time; the orders are those of
-/// time_order. expected_poses 0 stands for all usable estimated poses. Without a match all fractions and times are 0;
-/// times saturate at the largest double. O(matches), allocates nothing.
+/// Coverage of the matches (first = truth, second = estimate), which are in order of time. expected_poses 0 stands for
+/// all usable estimated poses. Without a match all fractions and times are 0; times saturate at the largest double.
+/// O(n log n).
 template <typename Truth, typename Estimate>
 [[nodiscard]] TrajectoryCoverage trajectory_coverage(const Truth& truth, const Estimate& estimate,
-                                                     span<const std::size_t> truth_order,
-                                                     span<const std::size_t> estimate_order,
-                                                     span<const TimeMatch> matches, std::size_t expected_poses,
-                                                     double offset_s) noexcept {
+                                                     const std::vector<TimeMatch>& matches, std::size_t expected_poses,
+                                                     double offset_s) {
+  const std::vector<std::size_t> truth_order = time_order(truth), estimate_order = time_order(estimate);
   TrajectoryCoverage coverage;
   coverage.matched = matches.size();
   coverage.expected = expected_poses > 0 ? expected_poses : estimate_order.size();
@@ -146,8 +136,8 @@ template <typename Truth, typename Estimate>
   };
   coverage.pose_fraction =
       clamp_probability(static_cast<double>(coverage.matched) / static_cast<double>(coverage.expected));
-  const double whole_s = truth[truth_order[truth_order.size() - 1]].time_s - truth[truth_order[0]].time_s;
-  const double covered_s = estimate[matches[matches.size() - 1].second].time_s - estimate[matches[0].second].time_s;
+  const double whole_s = truth[truth_order.back()].time_s - truth[truth_order.front()].time_s;
+  const double covered_s = estimate[matches.back().second].time_s - estimate[matches.front().second].time_s;
   coverage.time_fraction = whole_s > 0 ? clamp_probability(covered_s / whole_s) : 1;
   for (std::size_t k = 0; k < matches.size(); ++k) {
     const double time_s = estimate[matches[k].second].time_s;

@@ -2,8 +2,7 @@
 /// Absolute trajectory error (ATE) and relative pose error (RPE), with the protocol in the result: a figure without its
 /// alignment, matched poses, coverage and gaps cannot be compared. Equal to evaluate_ate.py and evaluate_rpe.py of the
 /// TUM RGB-D benchmark (Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012); departures
-/// are named below. Both functions take unsorted trajectories with duplicates and broken poses (see time_order) and
-/// allocate nothing after the first call of a size.
+/// are named below. Both functions take unsorted trajectories with duplicates and broken poses (see time_order).
 #pragma once
 
 #include <cmath>
@@ -23,10 +22,18 @@ struct AbsoluteErrorOptions {
   std::size_t expected_poses = 0;  ///< frames the estimate should have; 0: as many as it has usable poses
 };
 
+/// The errors one by one, for plots over time: entry k belongs to the estimated pose with index pose[k] (for RPE: the
+/// first of the pair), in order of time.
+struct PoseErrors {
+  std::vector<std::size_t> pose;
+  std::vector<double> translation_m, rotation_deg;
+};
+
 struct AbsoluteErrorResult {
   ErrorStatistics translation_m;  ///< |t_truth − S t_estimate| after alignment; the field's "ATE" is its rmse
   ErrorStatistics rotation_deg;   ///< angle of R_truthᵀ S.R R_estimate; not in the TUM script
-  Similarity S_truth_estimate;    ///< the alignment
+  PoseErrors errors;
+  Similarity S_truth_estimate;  ///< the alignment
   AlignmentMode alignment = AlignmentMode::rigid;
   TrajectoryCoverage coverage;
   /// degenerate: the matched poses do not fix the alignment's rotation; errors valid
@@ -53,29 +60,11 @@ struct RelativeErrorOptions {
 struct RelativeErrorResult {
   ErrorStatistics translation_m;  ///< per interval, not divided by its length
   ErrorStatistics rotation_deg;
+  PoseErrors errors;
   double delta = 1;
   DeltaUnit unit = DeltaUnit::seconds;
   TrajectoryCoverage coverage;  ///< matched: poses that begin or end a pair
   Status status = Status::not_enough_data;
-};
-
-/// Scratch of both errors, and the errors one by one, for plots over time: entry k belongs to the estimated pose with
-/// index pose[k] (for RPE: the first of the pair), in order of time.
-struct TrajectoryErrorWorkspace {
-  std::vector<std::size_t> pose;
-  std::vector<double> translation_m, rotation_deg;
-  AssociationWorkspace association;
-  std::vector<TimeMatch> matches;
-  std::vector<Vector3<double>> truth_points, estimate_points;
-  std::vector<double> scratch;
-  std::vector<char> used;
-
-  void clear() noexcept { pose.clear(), translation_m.clear(), rotation_deg.clear(); }
-  void add(std::size_t index, double distance_m, double angle_deg) {
-    pose.push_back(index);
-    translation_m.push_back(distance_m);
-    rotation_deg.push_back(angle_deg);
-  }
 };
 
 inline namespace CFP_ISA {
@@ -96,26 +85,20 @@ inline namespace CFP_ISA {
 /// refuses. Departure: the script stops with an error below two matches, and aligns rigidly only.
 template <typename Truth, typename Estimate>
 [[nodiscard]] AbsoluteErrorResult absolute_trajectory_error(const Truth& truth, const Estimate& estimate,
-                                                            const AbsoluteErrorOptions& options,
-                                                            TrajectoryErrorWorkspace& workspace) {
+                                                            const AbsoluteErrorOptions& options = {}) {
   AbsoluteErrorResult result;
   result.alignment = options.alignment;
-  workspace.clear();
   if (invalid_field(options)) {
     result.status = Status::invalid_input;
     return result;
   }
-  auto& matches = workspace.matches;
-  associate(truth, estimate, options.association, workspace.association, matches);
-  workspace.truth_points.clear();
-  workspace.estimate_points.clear();
+  const std::vector<TimeMatch> matches = associate(truth, estimate, options.association);
+  std::vector<Vector3<double>> truth_points, estimate_points;
   for (const TimeMatch& m : matches) {
-    workspace.truth_points.push_back(truth[m.first].T_world_cam.translation.template cast<double>());
-    workspace.estimate_points.push_back(estimate[m.second].T_world_cam.translation.template cast<double>());
+    truth_points.push_back(truth[m.first].T_world_cam.translation.template cast<double>());
+    estimate_points.push_back(estimate[m.second].T_world_cam.translation.template cast<double>());
   }
-  result.coverage =
-      trajectory_coverage(truth, estimate, workspace.association.first_order, workspace.association.second_order,
-                          matches, options.expected_poses, options.association.offset_s);
+  result.coverage = trajectory_coverage(truth, estimate, matches, options.expected_poses, options.association.offset_s);
   if (matches.empty()) return result;
 
   result.status = Status::ok;
@@ -123,21 +106,22 @@ template <typename Truth, typename Estimate>
   if (options.alignment == AlignmentMode::first_pose) {
     S.rotation = detail::double_pose(truth[matches[0].first]).rotation *
                  detail::double_pose(estimate[matches[0].second]).rotation.transpose();
-    S.translation = workspace.truth_points[0] - S.rotation * workspace.estimate_points[0];
+    S.translation = truth_points[0] - S.rotation * estimate_points[0];
   } else if (options.alignment != AlignmentMode::none) {
     const AlignmentResult aligned =
-        align_points(workspace.estimate_points, workspace.truth_points, options.alignment == AlignmentMode::similarity);
+        align_points(estimate_points, truth_points, options.alignment == AlignmentMode::similarity);
     S = aligned.S_to_from;
     result.status = aligned.status;
   }
   for (std::size_t k = 0; k < matches.size(); ++k) {
     const Matrix3<double> R_truth = detail::double_pose(truth[matches[k].first]).rotation;
     const Matrix3<double> R_estimate = detail::double_pose(estimate[matches[k].second]).rotation;
-    workspace.add(matches[k].second, detail::finite_norm(workspace.truth_points[k] - S * workspace.estimate_points[k]),
-                  detail::angle_deg(R_truth.transpose() * S.rotation * R_estimate));
+    result.errors.pose.push_back(matches[k].second);
+    result.errors.translation_m.push_back(detail::finite_norm(truth_points[k] - S * estimate_points[k]));
+    result.errors.rotation_deg.push_back(detail::angle_deg(R_truth.transpose() * S.rotation * R_estimate));
   }
-  result.translation_m = detail::statistics_of(workspace.translation_m, workspace.scratch);
-  result.rotation_deg = detail::statistics_of(workspace.rotation_deg, workspace.scratch);
+  result.translation_m = error_statistics(result.errors.translation_m);
+  result.rotation_deg = error_statistics(result.errors.rotation_deg);
   return result;
 }
 
@@ -153,34 +137,28 @@ template <typename Truth, typename Estimate>
 /// of the trace, which loses half the digits of small angles.
 template <typename Truth, typename Estimate>
 [[nodiscard]] RelativeErrorResult relative_pose_error(const Truth& truth, const Estimate& estimate,
-                                                      const RelativeErrorOptions& options,
-                                                      TrajectoryErrorWorkspace& workspace) {
+                                                      const RelativeErrorOptions& options = {}) {
   RelativeErrorResult result;
   result.delta = options.delta;
   result.unit = options.unit;
-  workspace.clear();
   if (invalid_field(options)) {
     result.status = Status::invalid_input;
     return result;
   }
-  auto& truth_order = workspace.association.first_order;
-  auto& order = workspace.association.second_order;
-  auto& matches = workspace.matches;
-  time_order(truth, truth_order);
-  time_order(estimate, order);
+  const std::vector<std::size_t> truth_order = time_order(truth), order = time_order(estimate);
   const std::size_t n = truth_order.empty() ? 0 : order.size();
   const auto truth_stamp = [&](std::size_t i) { return truth[truth_order[i]].time_s; };
   const auto stamp = [&](std::size_t i) { return estimate[order[i]].time_s; };
-  matches.clear();
+  std::vector<TimeMatch> matches;
   for (std::size_t i = 0; i < n; ++i) {
     matches.push_back(
         {truth_order[detail::closest_index(truth_order.size(), stamp(i) + options.offset_s, truth_stamp)], order[i]});
   }
-  const double max_difference_s = 2 * detail::median_interval(truth, truth_order, workspace.scratch);
+  const double max_difference_s = 2 * detail::median_interval(truth, truth_order);
   const auto has_truth = [&](std::size_t i) {
     return std::abs(truth[matches[i].first].time_s - (stamp(i) + options.offset_s)) <= max_difference_s;
   };
-  workspace.used.assign(n, 0);
+  std::vector<char> used(n);
   for (std::size_t i = 0; i < n; ++i) {
     const std::size_t j = options.unit == DeltaUnit::seconds
                               ? detail::closest_index(n, stamp(i) + options.delta, stamp)
@@ -192,20 +170,21 @@ template <typename Truth, typename Estimate>
         detail::double_pose(truth[matches[j].first]).inverse() * detail::double_pose(truth[matches[i].first]);
     P.translation *= options.scale;
     const SE3<double> E = P.inverse() * Q;
-    workspace.used[i] = workspace.used[j] = 1;
-    workspace.add(order[i], detail::finite_norm(E.translation), detail::angle_deg(E.rotation));
+    used[i] = used[j] = 1;
+    result.errors.pose.push_back(order[i]);
+    result.errors.translation_m.push_back(detail::finite_norm(E.translation));
+    result.errors.rotation_deg.push_back(detail::angle_deg(E.rotation));
   }
   std::size_t kept = 0;
   for (std::size_t i = 0; i < n; ++i) {
-    if (workspace.used[i] != 0) matches[kept++] = matches[i];
+    if (used[i] != 0) matches[kept++] = matches[i];
   }
   matches.resize(kept);
-  result.coverage =
-      trajectory_coverage(truth, estimate, truth_order, order, matches, options.expected_poses, options.offset_s);
-  if (workspace.pose.size() < 2) return result;
+  result.coverage = trajectory_coverage(truth, estimate, matches, options.expected_poses, options.offset_s);
+  if (result.errors.pose.size() < 2) return result;
   result.status = Status::ok;
-  result.translation_m = detail::statistics_of(workspace.translation_m, workspace.scratch);
-  result.rotation_deg = detail::statistics_of(workspace.rotation_deg, workspace.scratch);
+  result.translation_m = error_statistics(result.errors.translation_m);
+  result.rotation_deg = error_statistics(result.errors.rotation_deg);
   return result;
 }
 
