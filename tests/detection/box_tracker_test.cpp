@@ -270,6 +270,7 @@ TEST_CASE("The order of the detections changes nothing but their indices", "[det
   cfp::BoxTracker<double> one(in_image()), two(in_image());
   for (int k = 0; k < 300; ++k) {
     Detections detections = scene(noise, 8, k);
+    detections.push_back({detections[0].box, detections[0].class_id, 0.3});  // overlaps as much as the first
     const Boxes a = copy(one.track(detections, 1.0 / 30));
     for (std::size_t i = detections.size(); i > 1; --i)
       std::swap(detections[i - 1], detections[shuffle.index(static_cast<std::uint32_t>(i))]);

@@ -19,8 +19,7 @@ namespace cfp {
 inline namespace CFP_ISA {
 
 /// Not thread-safe; one tracker per camera. After warm-up (as many tracks and detections as before) a frame allocates
-/// nothing. Equal calls give equal bits. The order of a frame's detections changes nothing but their indices, unless
-/// two overlaps are equal to the last bit.
+/// nothing. Equal calls give equal bits. The order of a frame's detections changes nothing but their indices.
 template <typename Scalar = double>
 class BoxTracker {
  public:
@@ -91,7 +90,8 @@ class BoxTracker {
     return result;
   }
 
-  // Keeps what can be used of the detections, with where it came from.
+  // Keeps what can be used of the detections, with where it came from, in an order of its own: that of the detections
+  // must not matter.
   void select(span<const Detection<Scalar>> detections, BoxTrackerResult<Scalar>& result) {
     const Scalar far = Scalar(1e6);
     candidates_.clear();
@@ -107,6 +107,11 @@ class BoxTracker {
         candidates_.push_back({d, static_cast<int>(i), true});
       }
     }
+    const auto key = [](const Candidate& c) {
+      return std::make_tuple(c.box.x1, c.box.y1, c.box.x2, c.box.y2, c.class_id, -c.score);
+    };
+    std::sort(candidates_.begin(), candidates_.end(),
+              [&](const Candidate& a, const Candidate& b) { return key(a) < key(b); });
   }
 
   static void show(const Candidate& candidate, Track& track) noexcept {
@@ -128,27 +133,17 @@ class BoxTracker {
   }
 
   void start_tracks(BoxTrackerResult<Scalar>& result) {
-    births_.clear();
-    for (std::size_t j = 0; j < candidates_.size(); ++j) {
-      if (!candidates_[j].free) continue;
-      if (static_cast<double>(candidates_[j].score) >= options_.birth_threshold) {
-        births_.push_back(j);
-      } else {
+    for (const Candidate& candidate : candidates_) {
+      if (!candidate.free) continue;
+      if (!(static_cast<double>(candidate.score) >= options_.birth_threshold)) {
         ++result.ignored;
+        continue;
       }
-    }
-    // Newcomers get their ids in an order of their own, so that the order of the detections does not matter.
-    const auto key = [this](std::size_t j) {
-      const Candidate& c = candidates_[j];
-      return std::make_tuple(c.box.x1, c.box.y1, c.box.x2, c.box.y2, c.class_id, -c.score);
-    };
-    std::sort(births_.begin(), births_.end(), [&](std::size_t a, std::size_t b) { return key(a) < key(b); });
-    for (const std::size_t j : births_) {
       Track track;
-      track.filter = make_box_filter(candidates_[j].box, options_.motion);
-      track.class_id = candidates_[j].class_id;
+      track.filter = make_box_filter(candidate.box, options_.motion);
+      track.class_id = candidate.class_id;
       track.id = next_id_++;
-      show(candidates_[j], track);
+      show(candidate, track);
       tracks_.push_back(track);
     }
   }
@@ -196,7 +191,6 @@ class BoxTracker {
   std::vector<TrackedBox<Scalar>> output_;
   std::vector<Candidate> candidates_;
   std::vector<int> partner_;
-  std::vector<std::size_t> births_;
   BoxAssociationWorkspace workspace_;
 };
 
