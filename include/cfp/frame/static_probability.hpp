@@ -109,8 +109,16 @@ class StaticProbability {
 
  private:
   /// M of every keypoint; for a host that keeps none the one that changes no weight.
-  span<const Scalar> or_unknown(span<const Scalar> map_point_probability);
-  StageResult<Scalar> result(span<const Scalar> map_point_probability);
+  span<const Scalar> or_unknown(span<const Scalar> map_point_probability) {
+    if (!map_point_probability.empty()) return map_point_probability;
+    unknown_.resize(state_.size());
+    for (std::size_t i = 0; i < state_.size(); ++i) unknown_[i] = unknown_map_point(i, options_, state_);
+    return unknown_;
+  }
+  StageResult<Scalar> result(span<const Scalar> map_point_probability) {
+    weigh_keypoints(or_unknown(map_point_probability), options_, state_);
+    return {state_.weight, state_.static_probability, state_.report};
+  }
 
   Camera camera_;
   FrameOptions options_;
@@ -139,21 +147,6 @@ StageResult<typename Camera::ScalarType> StaticProbability<Camera>::fine(const P
   if (state_.previous.known && !(match.empty() && state_.current.descriptors.empty()))
     constrain_keypoints(pose, or_unknown(map_point_probability), camera_, options_, state_);
   return result(map_point_probability);
-}
-
-template <typename Camera>
-span<const typename Camera::ScalarType> StaticProbability<Camera>::or_unknown(
-    span<const Scalar> map_point_probability) {
-  if (!map_point_probability.empty()) return map_point_probability;
-  unknown_.resize(state_.size());
-  for (std::size_t i = 0; i < state_.size(); ++i) unknown_[i] = unknown_map_point(i, options_, state_);
-  return unknown_;
-}
-
-template <typename Camera>
-StageResult<typename Camera::ScalarType> StaticProbability<Camera>::result(span<const Scalar> map_point_probability) {
-  weigh_keypoints(or_unknown(map_point_probability), options_, state_);
-  return {state_.weight, state_.static_probability, state_.report};
 }
 
 }  // namespace CFP_ISA
