@@ -41,12 +41,17 @@ template <typename Scalar>
   return model;
 }
 
-/// Marks in scratch.mask which of scratch.members, indices of pixels and depths, lie on the object of their box: all
-/// where there are no depths, and where these cannot tell.
-template <typename Scalar>
+/// Sets scratch.members to the indices for which `belongs` holds, and marks in scratch.mask which of them lie on the
+/// object of the box: all where there are no depths, and where these cannot tell.
+template <typename Scalar, typename Belongs>
 ForegroundResult separate_members(const TrackedBox<Scalar>& box, const PointSpan<Scalar, 2>& pixels,
-                                  span<const Scalar> depths, const FrameOptions& options, FrameState<Scalar>& state) {
+                                  span<const Scalar> depths, const Belongs& belongs, const FrameOptions& options,
+                                  FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
+  scratch.members.clear();
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    if (belongs(i)) scratch.members.push_back(static_cast<std::int32_t>(i));
+  }
   scratch.mask.assign(scratch.members.size(), char(1));
   if (depths.empty()) return {};
   scratch.depths.clear();
@@ -84,14 +89,12 @@ void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameS
   scratch.pair_label.assign(state.boxes.size() * n, KeypointLabel::outside);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     const TrackedBox<Scalar>& box = state.boxes[b];
-    scratch.members.clear();
-    for (std::size_t i = 0; i < n; ++i) {
-      if (lies_on(box, frame.labels, flow.current(i, 0), flow.current(i, 1)))
-        scratch.members.push_back(static_cast<std::int32_t>(i));
-    }
+    const auto belongs = [&](std::size_t i) {
+      return lies_on(box, frame.labels, flow.current(i, 0), flow.current(i, 1));
+    };
     const bool by_depth = options.coarse.use_depth_foreground && is_non_rigid(box.class_id, options);
     const span<const Scalar> depths = by_depth ? flow.previous_depths : span<const Scalar>();
-    const ForegroundResult separated = separate_members(box, flow.current, depths, options, state);
+    const ForegroundResult separated = separate_members(box, flow.current, depths, belongs, options, state);
     for (std::size_t m = 0; m < scratch.members.size(); ++m)
       scratch.pair_label[b * n + static_cast<std::size_t>(scratch.members[m])] =
           scratch.mask[m] != 0 ? KeypointLabel::foreground : KeypointLabel::background;

@@ -16,20 +16,6 @@ namespace cfp {
 namespace detail {
 inline namespace CFP_ISA {
 
-/// Collects the keypoints of one object in scratch.members. Returns whether a segmentation chose them.
-template <typename Scalar>
-bool collect_members(const Frame<Scalar>& frame, const TrackedBox<Scalar>& box, FrameState<Scalar>& state) {
-  const bool by_index = !frame.object_of_keypoint.empty() && !box.compensated();
-  state.scratch.members.clear();
-  for (std::size_t i = 0; i < state.size(); ++i) {
-    if (state.label[i] == KeypointLabel::invalid) continue;
-    const auto& [x, y] = state.current.keypoints[i];
-    if (by_index ? frame.object_of_keypoint[i] == box.detection : lies_on(box, frame.labels, x, y))
-      state.scratch.members.push_back(static_cast<std::int32_t>(i));
-  }
-  return by_index || (!frame.labels.empty() && !box.compensated());
-}
-
 /// Sets state.flow_probability: the score of the flow pair next to the keypoint, among the pairs in its box. Only the
 /// camera's motion judges a pair with depth well enough for that; after estimate_objects.
 template <typename Scalar>
@@ -81,11 +67,17 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
   const Scalar threshold = static_cast<Scalar>(options.object_threshold);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     const TrackedBox<Scalar>& box = state.boxes[b];
-    const bool segmented = detail::collect_members(frame, box, state);
+    const bool by_index = !frame.object_of_keypoint.empty() && !box.compensated();
+    const bool segmented = by_index || (!frame.labels.empty() && !box.compensated());
+    const auto belongs = [&](std::size_t i) {
+      if (state.label[i] == KeypointLabel::invalid) return false;
+      const auto& [x, y] = state.current.keypoints[i];
+      return by_index ? frame.object_of_keypoint[i] == box.detection : detail::lies_on(box, frame.labels, x, y);
+    };
     const bool by_depth = !segmented && options.coarse.use_depth_foreground && is_non_rigid(box.class_id, options);
     const ForegroundResult separated = detail::separate_members(
         box, PointSpan<Scalar, 2>(state.current.keypoints),
-        by_depth ? span<const Scalar>(state.current.depths) : span<const Scalar>(), options, state);
+        by_depth ? span<const Scalar>(state.current.depths) : span<const Scalar>(), belongs, options, state);
     if (separated.status == ForegroundStatus::ok)
       state.current.object_depths.push_back({box.id, static_cast<Scalar>(separated.depth_m)});
     else if (by_depth)
