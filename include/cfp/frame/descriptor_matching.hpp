@@ -104,7 +104,8 @@ template <typename Scalar>
                                                    const DescriptorMatchOptions& options,
                                                    const DescriptorMatchWorkspace<Scalar>& workspace) noexcept {
   const Scalar radius = static_cast<Scalar>(options.radius_px);
-  NearestDescriptor nearest{-1, options.max_distance + 1, static_cast<int>(8 * previous.bytes)};
+  const int bits = static_cast<int>(8 * previous.bytes);
+  NearestDescriptor nearest{-1, (std::min)(options.max_distance, bits) + 1, bits};
   auto at = std::lower_bound(workspace.candidates.begin(), workspace.candidates.end(), y - radius,
                              [](const auto& candidate, Scalar limit) { return candidate.y < limit; });
   for (; at != workspace.candidates.end() && at->y <= y + radius; ++at) {
