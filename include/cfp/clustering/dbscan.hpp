@@ -4,8 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
-#include <cstdint>
 #include <limits>
 #include <vector>
 
@@ -53,8 +51,7 @@ inline namespace CFP_ISA {
 // eps in the type of the values; a finite double beyond the range of float counts as the largest float.
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar radius(double eps) noexcept {
-  return eps < static_cast<double>((std::numeric_limits<Scalar>::max)()) ? static_cast<Scalar>(eps)
-                                                                         : (std::numeric_limits<Scalar>::max)();
+  return static_cast<Scalar>((std::min)(eps, static_cast<double>((std::numeric_limits<Scalar>::max)())));
 }
 
 // Position of a share in [0, 1) of n > 0 ascending values.

@@ -5,8 +5,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
-#include <cstdint>
 #include <vector>
 
 #include "cfp/clustering/adaptive.hpp"

@@ -19,7 +19,7 @@
 namespace cfp {
 inline namespace CFP_ISA {
 
-/// The dotted name of an option, "first.flow.ransac.confidence"; false when there is nothing to name. Holds the names
+/// The dotted name of an option, "coarse.flow.ransac.confidence"; false when there is nothing to name. Holds the names
 /// of string literals, innermost first, and allocates nothing before `string`.
 class OptionPath {
  public:

@@ -59,7 +59,6 @@ inline namespace CFP_ISA {
 template <typename Scalar>
 [[nodiscard]] Scalar robust_sigma(span<Scalar> distances, int degrees_of_freedom) noexcept {
   const std::size_t n = copy_distances(span<const Scalar>(distances), distances);
-  if (n == 0) return Scalar(0);
   const Scalar median = order_statistic(distances.subspan(0, n), quantile_rank(0.5, n) - 1);
   return median / Scalar(degrees_of_freedom == 1 ? 0.674489750196082 : 1.177410022515475);
 }

@@ -79,7 +79,6 @@ template <typename Scalar>
   scratch.scratch.clear();
   std::copy_if(scratch.depths.begin(), scratch.depths.end(), std::back_inserter(scratch.scratch),
                [](Scalar z) { return is_valid_depth(z); });
-  if (scratch.scratch.empty()) return 0;
   return static_cast<double>(
       order_statistic(span<Scalar>(scratch.scratch), quantile_rank(0.5, scratch.scratch.size()) - 1));
 }

@@ -5,7 +5,6 @@
 /// CV_32F.
 #pragma once
 
-#include <cstddef>
 #include <vector>
 
 #include <opencv2/core/mat.hpp>
