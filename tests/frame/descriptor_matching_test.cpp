@@ -133,6 +133,9 @@ TEST_CASE("The largest distance that matches is the option's, and a pixel withou
     pair.match[0] = -1;
     CHECK(pair.run() == (bits <= 50 ? 1U : 0U));
   }
+  cfp::DescriptorMatchOptions any;
+  any.max_distance = (std::numeric_limits<int>::max)();
+  CHECK(pair.run(any) == 1);
   Pairs whole(17);
   whole.run();
   Pairs holes(17);

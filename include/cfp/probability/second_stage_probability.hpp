@@ -65,18 +65,12 @@ template <typename Scalar>
   return clamp_probability(projection.static_probability * share + epipolar.static_probability * (Scalar(1) - share));
 }
 
-/// Whether a constraint has something to say: a match without any (no depth and too little translation) is as none.
-template <typename Scalar>
-[[nodiscard]] constexpr bool is_judged(const SecondStageKeypoint<Scalar>& keypoint) noexcept {
-  return keypoint.matched && (keypoint.projection.available || keypoint.epipolar.available);
-}
-
 /// The rule that holds for a keypoint.
 template <typename Scalar>
 [[nodiscard]] constexpr SecondStageRule second_stage_rule(const SecondStageKeypoint<Scalar>& keypoint,
                                                           Scalar object_threshold) noexcept {
   if (keypoint.foreground && !keypoint.box_associated) return SecondStageRule::new_object;
-  if (!is_judged(keypoint))
+  if (!keypoint.matched || !(keypoint.projection.available || keypoint.epipolar.available))
     return keypoint.foreground ? SecondStageRule::unmatched_foreground : SecondStageRule::unmatched_background;
   return is_high_dynamic(keypoint.object_probability, object_threshold) ? SecondStageRule::high_dynamic
                                                                         : SecondStageRule::low_dynamic;
@@ -103,8 +97,9 @@ template <typename Scalar>
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar second_stage_evidence(const SecondStageKeypoint<Scalar>& keypoint,
                                                      Scalar object_threshold) noexcept {
-  const bool from_nowhere = keypoint.foreground && !keypoint.box_associated;
-  return from_nowhere || is_judged(keypoint) ? second_stage_probability(keypoint, object_threshold) : Scalar(0.5);
+  const SecondStageRule rule = second_stage_rule(keypoint, object_threshold);
+  const bool unmatched = rule == SecondStageRule::unmatched_foreground || rule == SecondStageRule::unmatched_background;
+  return unmatched ? Scalar(0.5) : second_stage_probability(keypoint, object_threshold);
 }
 
 /// K beside E of the same keypoint: at most 1/2 on an object that E says moves (E < 1/2). Both measure one motion, and
