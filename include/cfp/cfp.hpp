@@ -75,7 +75,6 @@
 #include "cfp/probability/first_stage_probability.hpp"
 #include "cfp/probability/map_point.hpp"
 #include "cfp/probability/object.hpp"
-#include "cfp/probability/object_memory.hpp"
 #include "cfp/probability/second_stage_probability.hpp"
 #include "cfp/robust/fundamental_ransac.hpp"
 #include "cfp/robust/pnp_ransac.hpp"

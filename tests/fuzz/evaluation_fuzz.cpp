@@ -6,7 +6,6 @@
 #include "cfp/probability/distance_sigmoid.hpp"
 #include "cfp/probability/map_point.hpp"
 #include "cfp/probability/object.hpp"
-#include "cfp/probability/object_memory.hpp"
 #include "fuzz_input.hpp"
 
 namespace {

@@ -1,4 +1,4 @@
-#include "cfp/probability/object_memory.hpp"
+#include "cfp/probability/object.hpp"
 
 #include <cmath>
 #include <limits>

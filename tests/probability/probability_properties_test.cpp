@@ -1,7 +1,7 @@
 // Properties of the objects' memory, for whatever the generators make; those of the formulas are in tests/properties.
 #include <cmath>
 
-#include "cfp/probability/object_memory.hpp"
+#include "cfp/probability/object.hpp"
 #include "cfp_testing/numbers.hpp"
 #include "support/properties.hpp"
 

@@ -9,7 +9,7 @@
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
 #include "cfp/geometry/camera.hpp"
-#include "cfp/probability/object_memory.hpp"
+#include "cfp/probability/object.hpp"
 
 namespace cfp {
 

@@ -14,7 +14,6 @@
 #include "cfp/frame/frame.hpp"
 #include "cfp/frame/health.hpp"
 #include "cfp/probability/object.hpp"
-#include "cfp/probability/object_memory.hpp"
 #include "cfp/probability/second_stage_probability.hpp"
 
 namespace cfp {
