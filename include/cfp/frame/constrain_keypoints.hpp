@@ -73,22 +73,19 @@ template <typename Scalar>
   return enough ? outside : fit(true);
 }
 
-/// Median of the valid depths among the matches, 0 without any; for the parallax form of t_Th.
-template <typename Scalar>
-[[nodiscard]] double median_depth(FrameScratch<Scalar>& scratch) {
-  scratch.scratch.clear();
-  std::copy_if(scratch.depths.begin(), scratch.depths.end(), std::back_inserter(scratch.scratch),
-               [](Scalar z) { return is_valid_depth(z); });
-  return static_cast<double>(
-      order_statistic(span<Scalar>(scratch.scratch), quantile_rank(0.5, scratch.scratch.size()) - 1));
-}
-
+/// Whether |t| is above t_Th, in metres and, where asked, as a share of the median depth of the matches (0: none has).
 template <typename Scalar>
 [[nodiscard]] bool has_enough_translation(const SE3<double>& T_cur_prev, const FineOptions& options,
                                           FrameScratch<Scalar>& scratch) {
   const double t = T_cur_prev.translation.norm();
   if (!(t > options.min_translation_m)) return false;
-  return options.min_parallax <= 0 || t > options.min_parallax * median_depth(scratch);
+  if (options.min_parallax <= 0) return true;
+  std::vector<Scalar>& depths = scratch.scratch;
+  depths.clear();
+  std::copy_if(scratch.depths.begin(), scratch.depths.end(), std::back_inserter(depths),
+               [](Scalar z) { return is_valid_depth(z); });
+  const Scalar median = order_statistic(span<Scalar>(depths), quantile_rank(0.5, depths.size()) - 1);
+  return t > options.min_parallax * static_cast<double>(median);
 }
 
 }  // namespace CFP_ISA
