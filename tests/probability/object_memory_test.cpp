@@ -68,14 +68,16 @@ TEST_CASE("A frame without evidence keeps O known for a while, then it is unknow
   CHECK(late.static_probability == 0.5);
 }
 
-TEST_CASE("Any O and any time give an O in [0, 1]", "[probability][object_memory]") {
+TEST_CASE("Any O, any time and any limit give an O in [0, 1]", "[probability][object_memory]") {
   const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
   cfp::Random random(1, "hostile memory");
   cfp::ObjectMemory memory;
+  cfp::ObjectMemoryOptions options;
   const double values[] = {nan, inf, -inf, -1, 0, 1e-300, 0.5, 1, 2};
   for (int k = 0; k < 1000; ++k) {
     const double o = values[random.index(9)], step = values[random.index(9)];
-    const double result = remember_object(seen(o), step, threshold, {}, memory).static_probability;
+    options.evidence_limit = k % 2 == 0 ? 3 : 100;
+    const double result = remember_object(seen(o), step, threshold, options, memory).static_probability;
     CHECK((result >= 0 && result <= 1));
   }
 }

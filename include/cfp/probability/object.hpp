@@ -55,7 +55,7 @@ struct ObjectProbability {
 
 struct ObjectMemoryOptions {
   double time_constant_s = 0.2;  ///< after it, evidence counts 1/e, >= 0; 0: no memory, as printed
-  /// log-odds that a frame may contribute and memory may hold, > 0: a start is seen at once
+  /// log-odds that a frame may contribute and memory may hold, in (0, 100]: a start is seen at once
   double evidence_limit = 3;
 };
 
@@ -81,7 +81,7 @@ inline namespace CFP_ISA {
 
 [[nodiscard]] constexpr OptionPath invalid_field(const ObjectMemoryOptions& o) noexcept {
   if (!detail::non_negative(o.time_constant_s)) return "time_constant_s";
-  return detail::positive(o.evidence_limit) ? OptionPath() : "evidence_limit";
+  return o.evidence_limit > 0 && o.evidence_limit <= 100 ? OptionPath() : "evidence_limit";
 }
 
 /// The options on the scale of a measured noise, one standard deviation in pixels of one coordinate; as they are where
