@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Applies the recipe of README.md to a checkout of ORB-SLAM2, by function names: apply.py FOLDER [--check].
+"""Applies the recipe of README.md to a checkout of ORB-SLAM2, by function names.
 
-Changes nothing unless every place is found exactly as often as expected. --check only looks. The numbers are those of
-the steps in README.md.
+Changes nothing unless every place is found exactly as often as expected. The numbers are those of the steps in
+README.md.
 """
+import argparse
 import re
 import sys
 from pathlib import Path
@@ -158,15 +159,19 @@ def scope(text, function):
 
 
 def main():
-    if len(sys.argv) < 2:
-        sys.exit(__doc__)
-    root, texts, failures = Path(sys.argv[1]), {}, 0
+    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("folder", type=Path, help="of ORB-SLAM2")
+    arguments.add_argument("--check", action="store_true", help="only look")
+    options = arguments.parse_args()
+    root, texts, failures = options.folder, {}, 0
     for step, name, function, pattern, replacement, times in STEPS:
         path = root / name
         if path not in texts:
             if not path.is_file():
-                sys.exit(f"{path} is not there")
+                sys.exit(f"{path} is not there: {root} is no checkout of ORB-SLAM2")
             texts[path] = path.read_text(encoding="utf-8", errors="surrogateescape").replace("\r\n", "\n")
+            if "mpStaticWeights" in texts[path] or "mStaticProbability" in texts[path]:
+                sys.exit(f"{path} has been changed already: take a fresh checkout")
         where = scope(texts[path], function)
         begin, end = where or (0, 0)
         part, found = re.subn(pattern, replacement, texts[path][begin:end])
@@ -176,10 +181,11 @@ def main():
         texts[path] = texts[path][:begin] + part + texts[path][end:]
     if failures:
         sys.exit(f"{failures} places differ from ORB-SLAM2 as it was published; nothing was changed")
-    if "--check" not in sys.argv:
+    if not options.check:
         for path, text in texts.items():
             path.write_text(text, encoding="utf-8", errors="surrogateescape")
-    print(f"{len(STEPS)} places in {len(texts)} files")
+    done = "found, nothing was changed" if options.check else "changed"
+    print(f"{len(STEPS)} places in {len(texts)} files {done}")
 
 
 if __name__ == "__main__":
