@@ -134,3 +134,30 @@ TEST_CASE("Flow of the frame before, with its depths", "[interop]") {
   CHECK(pairs.previous_depths[0] == 2);
   CHECK(flow.Next(image, cv::Mat(), keys, {}).previous_depths.empty());
 }
+
+TEST_CASE("Flow in a box: the room behind a person has its share of the corners", "[interop]") {
+  // A person at 1 m on half of the box, with stronger corners than the wall at 3 m.
+  cv::Mat image(240, 320, CV_8UC1), depth(240, 320, CV_32F, cv::Scalar(1));
+  cv::randu(image, 0, 255);
+  const cv::Rect wall(160, 0, 160, 240);
+  cv::randu(image(wall), 80, 175);
+  depth(wall) = 3;
+  const auto wall_share = [&](float person_m) {
+    cfp::FrameState<float> last;
+    cfp::TrackedBox<float> box;
+    box.id = 5;
+    box.box = {0, 0, 320, 240};
+    last.boxes.push_back(box);
+    last.current.object_depths.push_back({5, person_m});
+    cfp_integration::FrameFlow flow;
+    CHECK(flow.Next(image, depth, {}, last).current.size() == 0);
+    const auto pairs = flow.Next(image, depth, {}, last);
+    REQUIRE(pairs.previous.size() > 100);
+    std::size_t on_wall = 0;
+    for (std::size_t i = 0; i < pairs.previous.size(); ++i) on_wall += pairs.previous(i, 0) >= 160 ? 1 : 0;
+    return double(on_wall) / double(pairs.previous.size());
+  };
+  const double room_share = cfp::OpticalFlowOptions().room_share;
+  CHECK(wall_share(0) < 0.5 * room_share);
+  CHECK(wall_share(1) == Approx(room_share).margin(0.01));
+}

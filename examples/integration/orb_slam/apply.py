@@ -11,7 +11,7 @@ from pathlib import Path
 
 GUARD = "if(mpStaticWeights) "
 NEW_FRAME = (r"if(mpStaticWeights)\n    {\n        mpStaticWeights->NewFrame(mCurrentFrame,mDetections,mFlow.Next("
-             r"mImGray,%s,mCurrentFrame.mvKeys,mpStaticWeights->Probability().state().boxes));\n"
+             r"mImGray,%s,mCurrentFrame.mvKeys,mpStaticWeights->Probability().state()));\n"
              r"        mDetections.reset();\n    }\n\n    \1")
 
 # Step, file, function ("" for the whole file), a regular expression, what takes its place, how many times it is found.

@@ -6,6 +6,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "../../support/room_mask.hpp"
+#include "cfp/frame/frame_state.hpp"
 #include "cfp/interop/opencv.hpp"
 #include "cfp/interop/opencv_flow.hpp"
 #include "static_weights.hpp"
@@ -49,12 +51,18 @@ inline cfp::FrameOptions StaticWeightsOptions(int personClass, int width, int he
 // Flow from the image of the last call to this one; the views hold until the next call.
 class FrameFlow {
  public:
-  // gray as extracted from, depth in metres (empty: none), the keypoints of this frame, and the boxes of the last one.
+  // gray as extracted from, depth in metres (empty: none), the keypoints of this frame, and what is known of the last
+  // one: corners go to the room outside of its boxes and, by depth, behind the people in them, as far as possible.
   cfp::FlowPairs<float> Next(const cv::Mat& gray, const cv::Mat& depth, const std::vector<cv::KeyPoint>& keys,
-                             const std::vector<cfp::TrackedBox<float>>& lastBoxes) {
+                             const cfp::FrameState<float>& last) {
     mBoxes.clear();
-    for (const auto& box : lastBoxes) mBoxes.push_back(box.box);
-    mTracker.track(gray, mLastKeys, mBoxes);
+    mPeople.clear();
+    for (const auto& box : last.boxes) {
+      mBoxes.push_back(box.box);
+      mPeople.push_back({box.box, cfp::object_depth(last.current, box.id)});
+    }
+    cfp_examples::room_mask(gray.size(), mLastDepth, 1, mPeople, mRoom);
+    mTracker.track(gray, mLastKeys, mBoxes, mRoom);
     cfp::FlowPairs<float> flow = mTracker.pairs();
     mDepths.resize(flow.previous.size());
     if (cfp::sample_depth(mLastDepth, flow.previous, 1, mDepths) == cfp::Status::ok) flow.previous_depths = mDepths;
@@ -67,8 +75,9 @@ class FrameFlow {
  private:
   cfp::OpticalFlowTracker mTracker;
   std::vector<cv::KeyPoint> mLastKeys;
-  cv::Mat mLastDepth;
+  cv::Mat mLastDepth, mRoom;
   std::vector<cfp::Box<float>> mBoxes;
+  std::vector<cfp_examples::BoxedPerson> mPeople;
   std::vector<float> mDepths;
 };
 
