@@ -120,11 +120,12 @@ inline void store_pose(const BundlePoseSums& sums, double* target) noexcept {
   for (int r = 0; r < 6; ++r) target[36 + r] = s[21 + r];
 }
 
-/// One range of observations of one pose: fills its slots, adds to the pose's sums and returns the cost.
+/// One range of observations of one pose: fills its slots, adds to the pose's sums, which a fixed one has not, and
+/// returns the cost.
 template <bool Stereo, typename Camera, typename Loss>
 double linearize_range(span<const BundleMeasurement> range, const Camera& camera, double baseline_fx, const Loss& loss,
                        const BundlePose& pose, const std::vector<Vector3<double>>& points, std::vector<double>& slots,
-                       BundlePoseSums& sums) noexcept {
+                       BundlePoseSums* sums) noexcept {
   BundleChunk chunk;
   double cost = 0;
   for (std::size_t first = 0; first < range.size(); first += BundleChunk::size) {
@@ -143,7 +144,7 @@ double linearize_range(span<const BundleMeasurement> range, const Camera& camera
       for (int e = 0; e < 6; ++e) slot[e] = chunk.N[e][i];
       for (int e = 0; e < 3; ++e) slot[6 + e] = chunk.n[e][i];
     }
-    add_to_pose(chunk, padded, sums);
+    if (sums != nullptr) add_to_pose(chunk, padded, *sums);
   }
   return cost;
 }
@@ -154,15 +155,16 @@ void linearize_pose(const BundleIndex& index, std::size_t k, const Camera& camer
                     const MonoLoss& mono, const StereoLoss& stereo, const BundleState& state,
                     BundleLinearization& out) noexcept {
   BundlePoseSums sums = {};
+  BundlePoseSums* const used = k < index.free_poses ? &sums : nullptr;
   const auto range = [&](std::size_t r) {
     return span<const BundleMeasurement>(index.observations.data() + index.range_begin[r],
                                          index.range_begin[r + 1] - index.range_begin[r]);
   };
   out.costs[k] =
-      linearize_range<false>(range(2 * k), camera, baseline_fx, mono, state.poses[k], state.points, out.slots, sums) +
+      linearize_range<false>(range(2 * k), camera, baseline_fx, mono, state.poses[k], state.points, out.slots, used) +
       linearize_range<true>(range(2 * k + 1), camera, baseline_fx, stereo, state.poses[k], state.points, out.slots,
-                            sums);
-  if (k < index.free_poses) store_pose(sums, out.poses.data() + k * BundleLinearization::pose_doubles);
+                            used);
+  if (used != nullptr) store_pose(sums, out.poses.data() + k * BundleLinearization::pose_doubles);
 }
 
 /// The points' own blocks, from their slots.
