@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Core>
 
@@ -18,58 +19,66 @@ struct NormalEquations {
   Eigen::Matrix<double, N, 1> g = Eigen::Matrix<double, N, 1>::Zero();
 };
 
+inline namespace CFP_ISA {
+
+/// The inverse of L in A = L L^T (lower triangle of A is read) in its place, zeros above; false when A is not positive
+/// definite. Row by row with L = M D^1/2, M of unit diagonal, and V = M^-1: with w = V a for what precedes the diagonal
+/// in row a of A, the row of V is (-(D^-1 w)^T V, 1), and the roots are left to the end.
+template <int N>
+[[nodiscard]] bool invert_triangle(Eigen::Matrix<double, N, N>& A) noexcept {
+  constexpr std::size_t n = static_cast<std::size_t>(N);
+  double V[n][n], inverse[n];  // inverse: of D
+  for (int i = 0; i < N; ++i) {
+    double l[n], rest = A(i, i);
+    for (int j = 0; j < i; ++j) {
+      double w = 0;
+      for (int k = 0; k <= j; ++k) w += V[j][k] * A(i, k);
+      l[j] = w * inverse[j];
+      rest -= w * l[j];
+    }
+    if (!(rest > 0 && rest <= (std::numeric_limits<double>::max)())) return false;
+    inverse[i] = 1 / rest;
+    V[i][i] = 1;
+    for (int k = 0; k < i; ++k) {
+      V[i][k] = 0;
+      for (int j = k; j < i; ++j) V[i][k] -= l[j] * V[j][k];
+      V[k][i] = 0;
+    }
+  }
+  for (int r = 0; r < N; ++r) {
+    const double root = std::sqrt(inverse[r]);
+    for (int c = 0; c < N; ++c) A(r, c) = root * V[r][c];
+  }
+  return true;
+}
+
+}  // namespace CFP_ISA
 }  // namespace cfp::detail
 
 namespace cfp {
 inline namespace CFP_ISA {
 
-/// Solves (H + damping diag H) step = -g by Cholesky (L D L^T) of the matrix scaled to a unit diagonal; H symmetric,
-/// its upper triangle is read. False, and step meaningless, for an H that is not positive definite, one of whose
-/// pivots, 1 - (multiple correlation)^2 of an unknown with those before it, does not stand out of the rounding of H, or
-/// when the step is not finite. A pivot is v' H v with v = (-regression on those before, 1): elements of H with a
-/// relative error of `tolerance` move it by up to tolerance |v|_1^2. Allocates nothing.
+/// Solves (H + damping diag H) step = -g by Cholesky of the matrix scaled to a unit diagonal; H symmetric, its upper
+/// triangle is read. False, and step meaningless, for an H that is not positive definite, one of whose pivots, 1 -
+/// (multiple correlation)^2 of an unknown with those before it, does not stand out of the rounding of H, or when the
+/// step is not finite. A pivot is v' H v with v = (-regression on those before, 1): elements of H with a relative error
+/// of `tolerance` move it by up to tolerance |v|_1^2. Allocates nothing.
 template <int N>
 [[nodiscard]] bool solve_normal_equations(const Eigen::Matrix<double, N, N>& H, const Eigen::Matrix<double, N, 1>& g,
                                           double damping, double tolerance,
                                           Eigen::Matrix<double, N, 1>& step) noexcept {
-  constexpr std::size_t n = static_cast<std::size_t>(N);
-  double scale[n], L[n][n], V[n][n], pivot[n], inverse[n];  // V = L^-1
-  for (int i = 0; i < N; ++i) {
-    if (!(H(i, i) > 0) || !is_finite(H(i, i))) return false;
-    scale[i] = 1 / std::sqrt(H(i, i));
-  }
-  for (int j = 0; j < N; ++j) {
-    double d = 1 + damping;
-    for (int k = 0; k < j; ++k) d -= L[j][k] * L[j][k] * pivot[k];
-    double spread = 1;
-    for (int i = 0; i < j; ++i) {
-      V[j][i] = -L[j][i];
-      for (int k = i + 1; k < j; ++k) V[j][i] -= L[j][k] * V[k][i];
-      spread += std::abs(V[j][i]);
-    }
-    if (!(d > tolerance * spread * spread)) return false;
-    pivot[j] = d;
-    inverse[j] = 1 / d;
-    for (int i = j + 1; i < N; ++i) {
-      double sum = H(j, i) * scale[j] * scale[i];
-      for (int k = 0; k < j; ++k) sum -= L[i][k] * L[j][k] * pivot[k];
-      L[i][j] = sum * inverse[j];
-    }
-  }
-  for (int i = 0; i < N; ++i) {
-    step[i] = -g[i] * scale[i];
-    for (int k = 0; k < i; ++k) step[i] -= L[i][k] * step[k];
-  }
-  for (int i = N - 1; i >= 0; --i) {
-    step[i] *= inverse[i];
-    for (int k = i + 1; k < N; ++k) step[i] -= L[k][i] * step[k];
-  }
-  bool finite = true;
-  for (int i = 0; i < N; ++i) {
-    step[i] *= scale[i];
-    finite = finite && is_finite(step[i]);
-  }
-  return finite;
+  using Vector = Eigen::Matrix<double, N, 1>;
+  if (!(H.diagonal().array() > 0).all() || !H.diagonal().allFinite()) return false;
+  const Vector scale = H.diagonal().cwiseSqrt().cwiseInverse();
+  Eigen::Matrix<double, N, N> T = scale.asDiagonal() * H.transpose() * scale.asDiagonal();
+  T.diagonal().setConstant(1 + damping);
+  if (!detail::invert_triangle(T)) return false;
+  // A row of the inverse triangle is v over the root of its pivot.
+  const double spread = T.cwiseAbs().rowwise().sum().maxCoeff();
+  if (!(tolerance * spread * spread < 1)) return false;
+  const Vector scaled = scale.cwiseProduct(g), reduced = T.lazyProduct(scaled);
+  step = -scale.cwiseProduct(T.transpose().lazyProduct(reduced));
+  return step.allFinite();
 }
 
 /// By how much the quadratic model falls with that step: step^T (damping diag(H) step - g).

@@ -6,11 +6,10 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <vector>
 
 #include "cfp/core/span.hpp"
+#include "cfp/math/normal_equations.hpp"
 
 namespace cfp::detail {
 
@@ -37,33 +36,6 @@ inline void number_blocks(BlockEnvelope& envelope) {
     envelope.begin.push_back(envelope.blocks);
     envelope.blocks += row + 1 - envelope.first[row];
   }
-}
-
-/// The inverse of L in A = L L^T (lower triangle of A is read) in its place, zeros above; false when A is not positive
-/// definite. Row by row: with T the inverse of what precedes row a, L's row is (l = T a, d), the inverse's (-l^T T / d,
-/// 1 / d).
-template <int N>
-[[nodiscard]] bool invert_triangle(Eigen::Matrix<double, N, N>& A) noexcept {
-  constexpr std::size_t n = static_cast<std::size_t>(N);
-  double T[n][n];
-  for (int i = 0; i < N; ++i) {
-    double l[n], rest = A(i, i);
-    for (int j = 0; j < i; ++j) {
-      l[j] = 0;
-      for (int k = 0; k <= j; ++k) l[j] += T[j][k] * A(i, k);
-      rest -= l[j] * l[j];
-    }
-    if (!(rest > 0 && rest <= (std::numeric_limits<double>::max)())) return false;
-    T[i][i] = 1 / std::sqrt(rest);
-    for (int k = 0; k < i; ++k) {
-      double sum = 0;
-      for (int j = k; j < i; ++j) sum += l[j] * T[j][k];
-      T[i][k] = -T[i][i] * sum;
-      T[k][i] = 0;
-    }
-  }
-  for (int e = 0; e < N * N; ++e) A(e / N, e % N) = T[e / N][e % N];
-  return true;
 }
 
 /// From A to L in its place, the diagonal blocks of L inverted; of diagonal blocks the lower triangle is read. False
