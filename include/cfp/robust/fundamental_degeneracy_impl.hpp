@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/math/matrix3.hpp"
@@ -146,38 +147,31 @@ struct DegeneracyCheck {
       for (int attempt = 0; attempt < 10 && inside(i); ++attempt) i = drawn();
       return i;
     };
-    T explained = 0, outside = 0, both = 0, seen = 0;
-    const auto support = [&](std::size_t i) {
-      return search.distances_sq[i] <= search.noise_limit() ? search.weights()[i] : T(0);
-    };
-    for (std::size_t i = 0; i < pairs.size; ++i) {
-      explained += support(i);
-      outside += inside(i) ? T(0) : support(i);
-    }
-    const bool few = explained <= T(0.4) * search.total_weight();
+    const auto supports = [&](std::size_t i) { return search.distances_sq[i] <= search.noise_limit(); };
+    const bool few = search.weight_of(supports) <= T(0.4) * search.total_weight();
+    const T seen = std::accumulate(weights.begin(), weights.end(), T(0));
     sample_homographies(columns, 12, drawn_outside);
-    for (const float w : weights) seen += static_cast<T>(w);
     // One that explains most of what F does out there would hold a third of the pairs, and a dozen samples show half.
     if (few || transfer_cost(columns, H, transfer_limit()) <= 0.85 * seen) {
       sample_homographies(columns, 38, drawn_outside);
       refine_homography(columns, 4 * transfer_limit(), 3, H);
       refine_homography(columns, transfer_noise_limit(), 3, H);
-      for (std::size_t i = 0; i < pairs.size; ++i)
-        both += !inside(i) && transfer_sq(pairs, H, i) <= transfer_noise_limit() ? support(i) : T(0);
+      const T outside = search.weight_of([&](std::size_t i) { return supports(i) && !inside(i); });
+      const T both = search.weight_of([&](std::size_t i) { return supports(i) && !inside(i) && holds(i); });
       if (few || both >= T(0.8) * outside) return true;
     }
     H = before;
     return false;
   }
 
+  // Whether H's transfer holds pair i.
+  [[nodiscard]] bool holds(std::size_t i) const noexcept { return transfer_sq(pairs, H, i) <= transfer_noise_limit(); }
+
   // Share of the pairs explained by H that `other` explains, too.
   [[nodiscard]] double explained_by(const Matrix3<T>& other) const noexcept {
-    double both = 0, all = 0;
-    for (std::size_t i = 0; i < pairs.size; ++i) {
-      if (!(transfer_sq(pairs, H, i) <= transfer_noise_limit())) continue;
-      all += search.weights()[i];
-      both += transfer_sq(pairs, other, i) <= T(1.5) * transfer_noise_limit() ? search.weights()[i] : 0.0;
-    }
+    const T all = search.weight_of([&](std::size_t i) { return holds(i); });
+    const T both = search.weight_of(
+        [&](std::size_t i) { return holds(i) && transfer_sq(pairs, other, i) <= T(1.5) * transfer_noise_limit(); });
     return all > 0 ? both / all : 0;
   }
 
@@ -188,7 +182,7 @@ struct DegeneracyCheck {
     const Matrix3<T> K_inverse = inverse(K);
     Matrix3<T> M = Matrix3<T>::Zero();
     for (std::size_t i = 0; i < pairs.size; ++i) {
-      if (!(transfer_sq(pairs, H, i) <= transfer_noise_limit())) continue;
+      if (!holds(i)) continue;
       const Vector3<T> p = K_inverse * (to_pixels[0] * previous_point<T>(pairs, i)),
                        q = K_inverse * (to_pixels[1] * current_point<T>(pairs, i));
       M += search.weights()[i] * q.normalized() * p.normalized().transpose();

@@ -59,6 +59,14 @@ struct FundamentalSearch {
   [[nodiscard]] span<const double> weights() const noexcept { return {pairs.row(4), pairs.size}; }
   [[nodiscard]] double total_weight() const noexcept { return pairs.total_shared; }
 
+  // Of the pairs that `counts` accepts.
+  template <typename Counts>
+  [[nodiscard]] T weight_of(Counts&& counts) const {
+    T sum = 0;
+    for (std::size_t i = 0; i < pairs.size; ++i) sum += counts(i) ? weights()[i] : T(0);
+    return sum;
+  }
+
   // Squared Sampson distance that 95 % of the true pairs stay below.
   [[nodiscard]] T noise_limit() const noexcept { return T(3.84) * noise_variance; }
   [[nodiscard]] T wide_limit() const noexcept { return (std::max)(limit, noise_limit()); }
