@@ -52,15 +52,6 @@ template <typename Scalar>
   return (Scalar(1) - bounded) / bounded;
 }
 
-template <typename Scalar>
-[[nodiscard]] Scalar log_odds_update(Scalar k, Scalar m, Scalar rate, Scalar limit) noexcept {
-  using std::pow;
-  const Scalar updated = Scalar(1) / (Scalar(1) + odds_against(m, limit) * pow(odds_against(k, limit), rate));
-  // A K beyond the bound never lowers M: a point that was never in doubt keeps the weight 1 that it has without this
-  // library.
-  return k > Scalar(1) - limit && updated < m ? m : (std::min)((std::max)(updated, limit), Scalar(1) - limit);
-}
-
 }  // namespace CFP_ISA
 }  // namespace detail
 
@@ -83,17 +74,16 @@ inline namespace CFP_ISA {
 template <typename Scalar>
 [[nodiscard]] Scalar updated_map_point(Scalar keypoint_probability, Scalar map_point_probability,
                                        const MapPointOptions& options) noexcept {
-  const Scalar m = clamp_probability(map_point_probability);
-  const Scalar k = clamp_probability(keypoint_probability);
-  switch (options.policy) {
-    case MapPointPolicy::copy:
-      return k;
-    case MapPointPolicy::exponential_mean:
-      return clamp_probability(m + Scalar(options.rate) * (k - m));
-    case MapPointPolicy::log_odds:
-      return detail::log_odds_update(k, m, Scalar(options.rate), Scalar(options.evidence_limit));
-  }
-  return m;
+  using std::pow;
+  const Scalar m = clamp_probability(map_point_probability), k = clamp_probability(keypoint_probability);
+  const Scalar rate = Scalar(options.rate), limit = Scalar(options.evidence_limit);
+  if (options.policy == MapPointPolicy::copy) return k;
+  if (options.policy == MapPointPolicy::exponential_mean) return clamp_probability(m + rate * (k - m));
+  const Scalar odds = detail::odds_against(m, limit) * pow(detail::odds_against(k, limit), rate);
+  const Scalar updated = Scalar(1) / (Scalar(1) + odds);
+  // A K beyond the bound never lowers M: a point that was never in doubt keeps the weight 1 that it has without this
+  // library.
+  return k > Scalar(1) - limit && updated < m ? m : (std::min)((std::max)(updated, limit), Scalar(1) - limit);
 }
 
 /// Bayes' rule with M of before as the prior of a keypoint: odds = odds(M) odds(E) odds(K)^constraint_power, where E is
