@@ -97,11 +97,9 @@ template <typename First, typename Second>
   std::vector<Candidate> candidates;
   for (std::size_t i = 0, begin = 0; i < first_order.size(); ++i) {
     const double time = first[first_order[i]].time_s;
-    const auto is_near = [&](std::size_t j) { return std::abs(time - second_time(j)) < options.max_difference_s; };
-    while (begin < second_order.size() && second_time(begin) < time && !is_near(begin)) ++begin;
-    for (std::size_t j = begin; j < second_order.size() && (second_time(j) < time || is_near(j)); ++j) {
-      if (is_near(j)) candidates.push_back({std::abs(time - second_time(j)), i, j});
-    }
+    while (begin < second_order.size() && time - second_time(begin) >= options.max_difference_s) ++begin;
+    for (std::size_t j = begin; j < second_order.size() && second_time(j) - time < options.max_difference_s; ++j)
+      candidates.push_back({std::abs(time - second_time(j)), i, j});
   }
   std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
     return std::tie(a.difference_s, a.first, a.second) < std::tie(b.difference_s, b.first, b.second);

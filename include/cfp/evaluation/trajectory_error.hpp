@@ -175,12 +175,11 @@ template <typename Truth, typename Estimate>
     result.errors.translation_m.push_back(detail::finite_norm(E.translation));
     result.errors.rotation_deg.push_back(detail::angle_deg(E.rotation));
   }
-  std::size_t kept = 0;
+  std::vector<TimeMatch> used_matches;
   for (std::size_t i = 0; i < n; ++i) {
-    if (used[i] != 0) matches[kept++] = matches[i];
+    if (used[i] != 0) used_matches.push_back(matches[i]);
   }
-  matches.resize(kept);
-  result.coverage = trajectory_coverage(truth, estimate, matches, options.expected_poses, options.offset_s);
+  result.coverage = trajectory_coverage(truth, estimate, used_matches, options.expected_poses, options.offset_s);
   if (result.errors.pose.size() < 2) return result;
   result.status = Status::ok;
   result.translation_m = error_statistics(result.errors.translation_m);
