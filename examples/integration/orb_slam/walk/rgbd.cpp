@@ -1,10 +1,12 @@
 // Feeds a recording to ORB-SLAM2 in real time and writes the trajectory, as its rgbd_tum does, with the detections of
 // the recording's detections.txt:
 //   rgbd VOCABULARY.txt RECORDING TRAJECTORY.txt VARIANT [mono]
-// VARIANT: plain (cfp is not called), cfp or another of cfp::Variant's names. mono: without the depths.
+// VARIANT: plain (cfp is not called), cfp or another of cfp::Variant's names. mono: without the depths. SPEED=0.2 in
+// the environment feeds a fifth of the images per second, for machines that do other work.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -20,6 +22,14 @@
 #include "support/variant.hpp"
 
 namespace {
+
+// Of the recording's time.
+double speed() {
+  const char* text = std::getenv("SPEED");
+  const double value = text == nullptr ? 1 : std::strtod(text, nullptr);
+  if (!(value > 0)) throw std::runtime_error("SPEED must be a number above 0");
+  return value;
+}
 
 // What ORB-SLAM2 reads: the recording's camera, and the values of its own RGB-D examples.
 std::string settings_of(const cfp_examples::TumCamera& c, const std::string& file) {
@@ -48,12 +58,13 @@ void run(const char* vocabulary, const char* folder, const std::string& trajecto
         variant, cfp_integration::StaticWeightsOptions(detector.class_of("person"), camera.width, camera.height)));
 
   std::vector<double> milliseconds;
+  const double times = speed();
   const auto start = Clock::now();
   for (std::size_t i = 0; i < recording.size(); ++i) {
     const cfp_examples::SequenceFrame frame = recording.load(i);
     if (!frame.usable) continue;
     if (!plain) slam.SetDetections(detector.detect(frame.bgr, frame.time_s));
-    std::this_thread::sleep_until(start + std::chrono::duration<double>(frame.time_s - recording.time_s(0)));
+    std::this_thread::sleep_until(start + std::chrono::duration<double>((frame.time_s - recording.time_s(0)) / times));
     const auto begin = Clock::now();
     if (mono) {
       slam.TrackMonocular(frame.bgr, frame.time_s);
