@@ -16,7 +16,7 @@
 
 namespace cfp_examples {
 
-using OrbDescriptor = std::array<std::uint64_t, 4>;  // 256 bits
+using OrbDescriptor = std::array<std::uint8_t, 32>;
 
 struct FeatureOptions {
   int count = 1000;           // keypoints kept

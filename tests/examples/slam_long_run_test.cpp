@@ -162,7 +162,7 @@ class Room {
   Corner corner(const cfp::Vector3<double>& position) {
     Corner c;
     c.position = position;
-    for (auto& word : c.descriptor) word = random_();
+    for (auto& byte : c.descriptor) byte = static_cast<std::uint8_t>(random_());
     c.farthest_m = 1.5 / (1 - random_.uniform());  // the finer, the more there are
     c.angle = random_.uniform(0, 360);
     return c;
@@ -272,7 +272,7 @@ class Room {
     frame.descriptors.push_back(c.descriptor);
     for (std::uint32_t flips = random_.index(20); flips > 0; --flips) {
       const std::uint32_t bit = random_.index(256);
-      frame.descriptors.back()[bit / 64] ^= std::uint64_t(1) << bit % 64;
+      frame.descriptors.back()[bit / 8] ^= static_cast<std::uint8_t>(1U << bit % 8);
     }
   }
 

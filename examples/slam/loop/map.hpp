@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <bitset>
 #include <cstddef>
 #include <map>
 #include <unordered_map>
@@ -12,12 +11,6 @@
 #include "frame.hpp"
 
 namespace cfp_slam {
-
-[[nodiscard]] inline int hamming(const Descriptor& a, const Descriptor& b) {
-  int distance = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) distance += static_cast<int>(std::bitset<64>(a[i] ^ b[i]).count());
-  return distance;
-}
 
 struct Observation {
   int keyframe = 0;

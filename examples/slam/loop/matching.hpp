@@ -9,6 +9,7 @@
 #include <limits>
 #include <vector>
 
+#include "cfp/frame/descriptor_matching.hpp"
 #include "cfp/geometry/depth_noise.hpp"
 #include "map.hpp"
 
@@ -16,6 +17,10 @@ namespace cfp_slam {
 
 // ORB-SLAM2's limits on the Hamming distance of 256 bits.
 inline constexpr int far_descriptor = 100, near_descriptor = 50;
+
+[[nodiscard]] inline int hamming(const Descriptor& a, const Descriptor& b) {
+  return cfp::hamming_distance(a.data(), b.data(), a.size());
+}
 
 // A point expected at a pixel.
 struct Expected {
