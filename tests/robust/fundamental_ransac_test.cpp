@@ -127,12 +127,12 @@ TEST_CASE("Few pairs and many mismatches: F is found as far as samples go", "[ro
   FundamentalRansacWorkspace workspace;
   cfp::Random random(46, "hard");
   int lost = 0;
-  for (int trial = 0; trial < 100; ++trial) {
+  for (int trial = 0; trial < 500; ++trial) {
     const auto scene = make_two_view_scene<double>(random, noisy(120, 0.55));
     const auto result = fundamental_ransac(PointPairs{scene.prev, scene.cur}, FundamentalRansacOptions{}, workspace);
     lost += result.found() && cfp_test::median_sampson_of_truth<double>(scene, result.F) < 0.4 ? 0 : 1;
   }
-  CHECK(lost <= 4);  // a thousand samples miss with a chance of 2.5 %
+  CHECK(lost <= 30);  // of 500: a thousand samples miss with a chance of 2.5 %, and 1.5 % are refused or led astray
 }
 
 TEST_CASE("Without noise mismatches move F by a fiftieth of the threshold at most", "[robust]") {
@@ -406,9 +406,12 @@ TEST_CASE("A slow camera before a far wall has an F where its noise allows, and 
   // A video's parallax over a far wall is often below threshold_px; the choice must rest on the noise, not on the
   // threshold.
   FundamentalRansacWorkspace workspace;
+  constexpr int scenes = 60;
   for (const double noise_px : {0.02, 0.1, 0.3, 0.5}) {
-    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-      for (const double translation_m : {0.0, 0.03, 0.1}) {
+    for (const double translation_m : {0.0, 0.03, 0.1}) {
+      INFO("noise " << noise_px << " px, translation " << translation_m << " m");
+      int found = 0, rotations = 0;
+      for (std::uint64_t seed = 1; seed <= scenes; ++seed) {
         cfp_test::DynamicSceneOptions options;
         options.people = 0;
         options.pixel_noise_px = noise_px;
@@ -416,11 +419,13 @@ TEST_CASE("A slow camera before a far wall has an F where its noise allows, and 
         const auto scene = cfp_test::make_dynamic_scene<double>(options, seed);
         const auto result = fundamental_ransac(PointPairs{scene.previous_keypoints, scene.keypoints}, scene.camera,
                                                FundamentalRansacOptions{}, workspace);
-        INFO("noise " << noise_px << " px, translation " << translation_m << " m, seed " << seed << ": "
-                      << to_string(result.status));
-        if (translation_m == 0) CHECK(result.status == RansacStatus::pure_rotation);
-        if (translation_m == 0.1 || (translation_m > 0 && noise_px <= 0.1)) CHECK(result.found());
+        found += result.found() ? 1 : 0;
+        rotations += result.status == RansacStatus::pure_rotation ? 1 : 0;
       }
+      if (translation_m == 0) CHECK(rotations >= scenes - 1);
+      if (translation_m == 0) CHECK(found == 0);
+      if (translation_m == 0.1) CHECK(found >= (noise_px > 0.4 ? scenes - 3 : scenes));
+      if (translation_m == 0.03 && noise_px <= 0.1) CHECK(found == scenes);
     }
   }
 }
