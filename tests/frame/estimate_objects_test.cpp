@@ -128,6 +128,15 @@ TEST_CASE("With a label image, the pairs on an object are those on its label", "
   CHECK(run.state.objects[0].pairs + run.state.objects[1].pairs == labelled);
   CHECK(report.foreground == labelled);
   CHECK(report.background == 0);
+
+  // Depths that would halve each object change nothing: the label image is what tells.
+  std::vector<double> depths(scene.keypoints.size());
+  for (std::size_t i = 0; i < depths.size(); ++i) depths[i] = i % 2 == 0 ? 1.5 : 6;
+  frame.flow.previous_depths = depths;
+  cfp::FrameOptions by_lines;
+  by_lines.coarse.flow.use_depth = false;
+  (void)run.coarse(by_lines, frame, scene.camera);
+  CHECK(run.state.objects[0].pairs + run.state.objects[1].pairs == labelled);
 }
 
 TEST_CASE("Where people fill the view, what lies behind them tells the camera's motion, not they themselves",
@@ -162,7 +171,7 @@ TEST_CASE("What a box leaves out of its person does not outvote what lies behind
       scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.002, 0.001, 0.001, 0.001, -0.002, 0.001));
       const auto add = [&](double x, double y, double depth, double shift) {
         cfp::Vector3<double> ray;
-        cfp::Vector2<double> pixel;
+        cfp::Vector2<double> pixel(0, 0);
         (void)scene.camera.unproject(cfp::Vector2<double>(x, y), ray);
         (void)scene.camera.project(scene.T_cur_prev * (ray * depth) + cfp::Vector3<double>(shift, 0, 0), pixel);
         scene.previous_keypoints.push_back({x, y});

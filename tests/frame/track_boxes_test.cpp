@@ -61,6 +61,8 @@ TEST_CASE("A time stamp that does not grow is reported, and the boxes stay", "[f
     CHECK(camera.see(second, nothing).report.time == cfp::Status::invalid_input);
     REQUIRE(camera.state.boxes.size() == 1);
     CHECK_THAT(camera.state.boxes[0].box.x1, WithinAbs(100, 1));
+    CHECK(camera.see(10.03, person).report.time == cfp::Status::ok);
+    CHECK(camera.state.boxes[0].id == 1);
   }
 }
 

@@ -36,6 +36,39 @@ bool near(const cv::Point2f& a, const cv::Point2f& b, float distance) {
 
 }  // namespace
 
+TEST_CASE("Options of the flow outside their ranges are named", "[flow]") {
+  using Options = cfp::OpticalFlowOptions;
+  CHECK(!invalid_field(Options()));
+  const auto refused = [](void (*set)(Options&)) {
+    Options options;
+    set(options);
+    return invalid_field(options).string();
+  };
+  CHECK(refused([](Options& o) { o.corners = -1; }) == "corners");
+  CHECK(refused([](Options& o) { o.corner_distance = -1; }) == "corner_distance");
+  CHECK(refused([](Options& o) { o.corner_quality = 0; }) == "corner_quality");
+  CHECK(refused([](Options& o) { o.corner_quality = 1; }) == "corner_quality");
+  CHECK(refused([](Options& o) { o.room_share = 1.01; }) == "room_share");
+  CHECK(refused([](Options& o) { o.room_share = std::numeric_limits<double>::quiet_NaN(); }) == "room_share");
+  CHECK(refused([](Options& o) { o.keypoints_per_box = -1; }) == "keypoints_per_box");
+  CHECK(refused([](Options& o) { o.keypoints_outside = -1; }) == "keypoints_outside");
+  CHECK(refused([](Options& o) { o.window = 2; }) == "window");
+  CHECK(refused([](Options& o) { o.levels = 0; }) == "levels");
+  CHECK(refused([](Options& o) { o.iterations = 0; }) == "iterations");
+  CHECK(refused([](Options& o) { o.precision = -1; }) == "precision");
+  // The ends are used as they are.
+  Options least;
+  least.corners = least.keypoints_per_box = 0;
+  least.corner_distance = least.precision = least.room_share = 0;
+  least.window = 3;
+  least.levels = least.iterations = 1;
+  CHECK(!invalid_field(least));
+  cfp::OpticalFlowTracker tracker(least);
+  tracker.track(texture(), {}, {});
+  tracker.track(moved(texture(), 1, 0), {}, {});
+  CHECK(tracker.previous().empty());
+}
+
 TEST_CASE("Pairs follow the image, over several frames", "[flow]") {
   const cv::Mat image = texture();
   cfp::OpticalFlowTracker tracker;

@@ -92,14 +92,14 @@ void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameS
     const auto belongs = [&](std::size_t i) {
       return lies_on(box, frame.labels, flow.current(i, 0), flow.current(i, 1));
     };
-    const bool by_depth = options.coarse.use_depth_foreground && is_non_rigid(box.class_id, options);
+    const bool segmented = !frame.labels.empty() && !box.compensated();
+    const bool by_depth = !segmented && options.coarse.use_depth_foreground && is_non_rigid(box.class_id, options);
     const span<const Scalar> depths = by_depth ? flow.previous_depths : span<const Scalar>();
     const ForegroundResult separated = separate_members(box, flow.current, depths, belongs, options, state);
     for (std::size_t m = 0; m < scratch.members.size(); ++m)
       scratch.pair_label[b * n + static_cast<std::size_t>(scratch.members[m])] =
           scratch.mask[m] != 0 ? KeypointLabel::foreground : KeypointLabel::background;
-    const bool exact = !frame.labels.empty() && !box.compensated();
-    if (!depths.empty() && !exact)
+    if (!depths.empty())
       label_margin(box.box, separated, flow, options.coarse.flow.margin, {scratch.pair_label.data() + b * n, n});
   }
 }

@@ -133,7 +133,8 @@ void begin_frame(const Frame<Scalar>& frame, FrameState<Scalar>& state) {
   std::swap(state.previous, state.current);
   FrameMemory<Scalar>& current = state.current;
   current.known = false;  // until it is whole: what allocates may throw
-  current.timestamp_s = frame.timestamp_s;
+  const bool stamped = is_finite(frame.timestamp_s) || !state.previous.known;  // else the clock stays where it was
+  current.timestamp_s = stamped ? frame.timestamp_s : state.previous.timestamp_s;
   current.object_depths.clear();
   current.depths.assign(frame.depths.begin(), frame.depths.end());
   const std::size_t bytes = current.descriptor_bytes = frame.descriptors.bytes;

@@ -14,6 +14,8 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
+#include "cfp/core/numeric.hpp"
+#include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/frame/frame.hpp"
 #include "cfp/geometry/box.hpp"
@@ -22,24 +24,42 @@
 namespace cfp {
 
 struct OpticalFlowOptions {
-  int corners = 500;  ///< at most, over the whole image, found at half resolution: they carry the camera's motion
-  double corner_distance = 6;    ///< between two of them, px
-  double corner_quality = 0.01;  ///< least strength of a corner, as a share of the strongest one's
-  double room_share = 0.6;       ///< of the corners, where `track` is told that the room is seen, if there are so many
-  int keypoints_per_box = 100;   ///< at most, besides, in each box, one per cell of a grid
-  int keypoints_outside = 0;     ///< at most, outside all boxes, likewise
-  int window = 11;               ///< side of the patch that is tracked, px
+  int corners = 500;  ///< at most, over the whole image, found at half resolution: they carry the camera's motion; >= 0
+  double corner_distance = 6;    ///< between two of them, px; >= 0
+  double corner_quality = 0.01;  ///< least strength of a corner, as a share of the strongest one's; in (0, 1)
+  double room_share = 0.6;       ///< of the corners, where `track` is told that the room is seen, if there are so many;
+                                 ///< in [0, 1]
+  int keypoints_per_box = 100;   ///< at most, besides, in each box, one per cell of a grid; >= 0
+  int keypoints_outside = 0;     ///< at most, outside all boxes, likewise; >= 0
+  int window = 11;               ///< side of the patch that is tracked, px; >= 3
   int levels = 4;                ///< of the pyramid, >= 1
-  int iterations = 20;           ///< per level
-  double precision = 0.02;       ///< an update below this ends the iterations, px
+  int iterations = 20;           ///< per level, >= 1
+  double precision = 0.02;       ///< an update below this ends the iterations, px; >= 0
 };
 
 inline namespace CFP_ISA {
 
+[[nodiscard]] constexpr OptionPath invalid_field(const OpticalFlowOptions& o) noexcept {
+  if (o.corners < 0) return "corners";
+  if (!detail::non_negative(o.corner_distance)) return "corner_distance";
+  if (!(o.corner_quality > 0 && o.corner_quality < 1)) return "corner_quality";
+  if (!(o.room_share >= 0 && o.room_share <= 1)) return "room_share";
+  if (o.keypoints_per_box < 0) return "keypoints_per_box";
+  if (o.keypoints_outside < 0) return "keypoints_outside";
+  if (o.window < 3) return "window";
+  if (o.levels < 1) return "levels";
+  if (o.iterations < 1) return "iterations";
+  if (!detail::non_negative(o.precision)) return "precision";
+  return {};
+}
+
 /// One per camera. Not thread-safe.
 class OpticalFlowTracker {
  public:
-  explicit OpticalFlowTracker(const OpticalFlowOptions& options = {}) : options_(options) {}
+  /// Options outside their ranges are the caller's error: see `validate`.
+  explicit OpticalFlowTracker(const OpticalFlowOptions& options = {}) : options_(options) {
+    CFP_ASSERT(!invalid_field(options));
+  }
 
   /// Makes the pairs between the image of the last call and this one (8-bit grey; none after the first call, or when
   /// the size has changed). keypoints and boxes are those of the previous image, which is where tracking starts;
