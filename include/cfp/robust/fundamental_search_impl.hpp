@@ -111,24 +111,19 @@ struct FundamentalSearch {
 
   // A short baseline gives the cost several minima, often within a hundredth of each other, and chance decides into
   // which of them the first good sample leads; or it leads to an F between two motions, within the threshold of both.
-  // Samples of F's own inliers are mostly good, every other one of them beside a strip of the image in which a person
-  // may be whom F follows in part: the best of them are refined, too, each under its own noise, and the one that chance
-  // explains least wins. What it brings: cfp_fundamental_scale_study, cfp_fundamental_degeneracy_study. F is the one
-  // whose noise was measured last.
+  // Samples of F's own inliers are mostly good: the best of them are refined, too, each under its own noise, and the
+  // one that chance explains least wins. What it brings: cfp_fundamental_scale_study. F is the one whose noise was
+  // measured last.
   void explore(FactoredF<T>& F) noexcept {
     constexpr int samples = 20, starts = 2;
     Candidate best[starts];
     collect_inliers();
     const std::uint32_t n = static_cast<std::uint32_t>(list.size());
     if (n < 8) return;
-    const T* const x = pairs.row(0);
     for (int k = 0; k < samples; ++k) {
       Sample sample;
-      const T centre = x[list[random.index(n)]], beside = k % 2 == 0 ? T(-1) : T(1);  // the image is about 5 wide
       for (std::uint32_t j = 0; j < 7; ++j) {
-        int attempt = 0;
-        do std::swap(list[j], list[j + random.index(n - j)]);
-        while (std::abs(x[list[j]] - centre) < beside && ++attempt < 5);
+        std::swap(list[j], list[j + random.index(n - j)]);
         sample[j] = list[j];
       }
       solve(sample, [&](const Model& candidate) {
