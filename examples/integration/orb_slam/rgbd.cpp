@@ -1,6 +1,7 @@
 // Feeds a recording to ORB-SLAM2 in real time and writes the trajectory, as its rgbd_tum does, with the detections of
 // the recording's detections.txt:
 //   rgbd VOCABULARY.txt RECORDING TRAJECTORY.txt VARIANT [mono]
+// Built by their CMakeLists.txt, with cfp/include and cfp/examples among the include directories.
 // VARIANT: plain (cfp is not called), cfp or another of cfp::Variant's names. mono: without the depths. SPEED=0.2 in
 // the environment feeds a fifth of the images per second, for machines that do other work.
 #include <algorithm>
@@ -9,8 +10,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <iterator>
-#include <memory>
 #include <stdexcept>
 #include <string>
 #include <thread>
