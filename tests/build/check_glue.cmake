@@ -1,5 +1,6 @@
 # cmake -D ROOT=<project> -P check_glue.cmake: what a host has to write for cfp stays small: lines of code between the
-# marks [glue] of the examples, together for each host. README.md of the examples names the same numbers.
+# marks [glue] of the examples, together for each host. README.md of the examples names the same numbers. And no call in an
+# example names a scalar or a view: they deduce.
 cmake_minimum_required(VERSION 3.16)
 set(folder "${ROOT}/examples/integration")
 file(READ "${folder}/README.md" page)
@@ -40,3 +41,11 @@ check_glue(stella_vslam_shape 80 stella_vslam_shape/cfp_glue.hpp)
 check_glue(plain_c 80 plain_c/cfp_weights.cpp)
 check_glue(ceres 60 ceres/weighted_pose.hpp)
 check_glue(g2o 20 g2o/weighted_edge.hpp)
+
+file(GLOB_RECURSE sources "${ROOT}/examples/*.hpp" "${ROOT}/examples/*.cpp" "${ROOT}/examples/*.md")
+foreach(source "${ROOT}/README.md" ${sources})
+  file(STRINGS "${source}" calls REGEX "span<[^()]*>[({]|cfp::[a-z_0-9]+<(float|double)>[({]")
+  if(calls)
+    message(FATAL_ERROR "${source}: what deduces is written out:\n${calls}")
+  endif()
+endforeach()

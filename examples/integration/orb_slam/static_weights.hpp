@@ -34,7 +34,7 @@ class StaticWeights {
     if (F.mvDepth.size() == frame.keypoints.size()) frame.depths = F.mvDepth;
     frame.descriptors = Host::Descriptors(F);
     frame.flow = flow;
-    if (detections) frame.detections = cfp::span<const cfp::Detection<float>>(*detections);
+    if (detections) frame.detections = *detections;
     mProbability.coarse(frame);
     Remember(F);
   }

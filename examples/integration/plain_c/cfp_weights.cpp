@@ -36,7 +36,7 @@ void cfp_weights_coarse(cfp_weights* w, const cfp_weights_frame* in, float* weig
   w->detections.clear();
   for (int b = 0; b < in->boxes; ++b)
     w->detections.push_back({{in->box[4 * b], in->box[4 * b + 1], in->box[4 * b + 2], in->box[4 * b + 3]}, 0, 1});
-  if (in->boxes >= 0) frame.detections = cfp::span<const cfp::Detection<float>>(w->detections);
+  if (in->boxes >= 0) frame.detections = w->detections;
   frame.flow = {points(in->flow_previous, in->flow_pairs), points(in->flow_current, in->flow_pairs)};
   const auto coarse = w->probability.coarse(frame);
   std::copy(coarse.weight.begin(), coarse.weight.end(), weight);

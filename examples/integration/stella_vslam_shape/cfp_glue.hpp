@@ -27,7 +27,7 @@ class static_weights {
     frame.keypoints = {&obs.undist_keypts_.data()->pt.x, obs.undist_keypts_.size(), sizeof(obs.undist_keypts_[0])};
     frame.depths = obs.depths_;
     frame.flow = flow;
-    if (detections) frame.detections = cfp::span<const cfp::Detection<float>>(*detections);
+    if (detections) frame.detections = *detections;
     report_ = probability_.coarse(frame).report;
   }
 
