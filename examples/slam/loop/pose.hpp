@@ -23,6 +23,10 @@ namespace cfp_slam {
 struct BelievedPose {
   double time_s = 0;
   cfp::SE3<double> T_cam_world;
+
+  [[nodiscard]] cfp::PoseStep<double> step_to(const cfp::SE3<double>& T_cam_world_then, double then_s) const {
+    return {T_cam_world_then * T_cam_world.inverse(), then_s - time_s};
+  }
 };
 
 struct RefinedPose {
@@ -56,9 +60,7 @@ class PoseSolver {
     };
     cfp::PoseResult result = solve(frame.T_cam_world, options_.pose);
     std::optional<cfp::PoseStep<double>> step;
-    if (believed)
-      step =
-          cfp::PoseStep<double>{result.T_cam_world * believed->T_cam_world.inverse(), frame.time_s - believed->time_s};
+    if (believed) step = believed->step_to(result.T_cam_world, frame.time_s);
     RefinedPose out{0, 0, cfp::assess_pose(result, observations.pixels, weights_, inlier_, step, health)};
     if (!cfp::is_solved(result.status)) return out;
     if (decided) {  // what agrees with that, proven or not, makes it more exact

@@ -69,6 +69,8 @@ struct FrameRecord {
   cfp::PoseAssessment pose;
   cfp::FrameHealth health;
   std::vector<BoxRecord> boxes;
+
+  void add_note(const std::string& what) { note += (note.empty() ? "" : "; ") + what; }
 };
 
 }  // namespace cfp_slam

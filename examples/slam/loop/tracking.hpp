@@ -10,19 +10,15 @@
 #include <utility>
 #include <vector>
 
-#include "cfp/evaluation/trajectory.hpp"
-#include "cfp/frame/detector_health.hpp"
-#include "cfp/frame/detector_lag.hpp"
 #include "cfp/frame/static_probability.hpp"
 #include "cfp/interop/opencv.hpp"
+#include "detector_watch.hpp"
 #include "front_end.hpp"
 #include "local_bundle.hpp"
 #include "local_map.hpp"
+#include "localization.hpp"
 #include "mapping.hpp"
-#include "motion.hpp"
-#include "pose.hpp"
-#include "relocalization.hpp"
-#include "run.hpp"
+#include "pose_history.hpp"
 
 namespace cfp_slam {
 
@@ -34,12 +30,12 @@ class Tracking {
         view_(view),
         observer_(observer),
         probability_(camera, options.probability),
-        refine_pose_(options),
-        relocalize_(options.seed),
+        detector_(options),
+        localization_(options, view, map_, probability_, observer),
         local_map_(options.features),
-        mapping_(options),
-        detector_(options.detector_health),
-        lag_(options.detector_lag) {}
+        mapping_(options) {}
+  Tracking(const Tracking&) = delete;
+  Tracking& operator=(const Tracking&) = delete;
 
   // `record` comes with time and image; the rest is filled in.
   void track(FrontEndResult&& input, FrameRecord& record) {
@@ -53,7 +49,7 @@ class Tracking {
       if (trial_) trial_->left_s -= step_s;
     }
     if (interval_.is_gap(frame.time_s)) {  // the last frame says nothing of where its points are now
-      note(record, "gap before this frame: " + std::to_string(frame.time_s - last_.time_s) + " s");
+      record.add_note("gap before this frame: " + std::to_string(frame.time_s - last_.time_s) + " s");
       input.flow_from.clear();
       input.flow_to.clear();
       input.flow_depths_m.clear();
@@ -62,8 +58,8 @@ class Tracking {
     estimate(input, record);
     const Part part(observer_, Module::mapping);
     record.keypoints = frame.size();
-    record.matches = static_cast<std::size_t>(
-        std::count_if(from_last_.match.begin(), from_last_.match.end(), [](int j) { return j != cfp::no_match; }));
+    const auto& match = localization_.match();
+    record.matches = match.size() - std::size_t(std::count(match.begin(), match.end(), cfp::no_match));
     if (map_.keyframes.empty()) {
       initialize(frame, record);
     } else {
@@ -75,78 +71,51 @@ class Tracking {
         extend_map(frame, record);
       } else if (lost_s_ < options_.new_map_after_s || !begin_world(frame, record)) {
         record.outcome = Outcome::lost;
-        note(record, std::string("lost, ") + cfp::to_string(pose_.health.status));
+        record.add_note(std::string("lost, ") + cfp::to_string(pose_.health.status));
       }
     }
     record.inliers = pose_.inliers;
     record.pose = pose_.health;
     if (frame.has_pose) {
-      poses_.push_back({frame.time_s, local_map_.reference(), frame.T_cam_world * reference_pose().inverse()});
+      poses_.add(frame, local_map_.reference(), map_);
       believed_ = BelievedPose{frame.time_s, frame.T_cam_world};
       lost_s_ = 0;
     }
-    motion_.learn(last_, frame);
+    localization_.learn(last_, frame);
     last_ = std::move(frame);
   }
 
-  // Puts the last bundle adjustment's result into the map. The poses of the tracked frames are relative to their
-  // reference keyframes after all bundle adjustment, as ORB-SLAM2 writes trajectories.
+  // Puts the last bundle adjustment's result into the map.
   RunResult finish() {
     take_bundle(true);
-    RunResult result;
-    for (const RelativePose& p : poses_) {
-      result.trajectory.push_back({p.time_s, (p.T_cam_reference * map_.pose(p.reference)).inverse()});
-      result.world.push_back(map_.keyframe(p.reference).world);
-    }
-    result.keyframes = map_.alive_keyframes.size();
-    result.map_points = map_.alive_points();
-    return result;
+    return poses_.result(map_);
   }
 
  private:
-  struct RelativePose {
-    double time_s = 0;
-    int reference = 0;
-    cfp::SE3<double> T_cam_reference;
-  };
   struct Trial {  // of the newest map
     double left_s = 0;
     std::size_t first_pose = 0;  // of poses_
   };
 
-  static void note(FrameRecord& record, const std::string& what) {
-    record.note += (record.note.empty() ? "" : "; ") + what;
-  }
-
   // Matches, probabilities, weights and the pose, each twice.
   void estimate(FrontEndResult& input, FrameRecord& record) {
     Frame& frame = input.frame;
-    predicted_ = motion_.predict(last_, frame.time_s, view_);
-    {
-      const Part part(observer_, Module::matching);
-      grid_.build(frame, view_);
-      match_last(frame, predicted_.T_cam_world);
-    }
+    localization_.begin(frame, last_);
     cfp::StageResult<float> stage = coarse(input, record);
     observer_.weighted(stage, probability_.state(), frame);
     note_boxes(record);
     if (const std::optional<cfp::PoseEstimate> pose = first_pose(frame, stage.weight)) {
       {
         const Part part(observer_, Module::fine);
-        stage = probability_.fine(*pose, from_last_.match, frame.map_point_probability);
+        stage = probability_.fine(*pose, localization_.match(), frame.map_point_probability);
       }
       observer_.weighted(stage, probability_.state(), frame);
     }
     record.health = stage.report.health;
     for (std::size_t i = 0; i < frame.size(); ++i)
       frame.static_probability[i] = probability_.static_probability(i, frame.map_point_probability[i]);
-    if (frame.has_pose) second_pose(frame, stage.weight);
+    if (frame.has_pose) pose_ = localization_.second_pose(frame, local_map_, stage.weight, relocalised_, believed_);
     observer_.decided(probability_, frame, map_);
-  }
-
-  void match_last(Frame& frame, const cfp::SE3<double>& T_cam_world) {
-    match_last_(frame, grid_, last_, map_, T_cam_world, view_, options_.search_radius, options_.enough_matches,
-                from_last_);
   }
 
   cfp::StageResult<float> coarse(const FrontEndResult& input, FrameRecord& record) {
@@ -154,38 +123,14 @@ class Tracking {
     frame.timestamp_s = input.frame.time_s;
     frame.keypoints = cfp::view(input.frame.keypoints);
     frame.depths = input.frame.depths_m;
-    if (input.detections) frame.detections = believed_detections(*input.detections, record);
+    if (input.detections) frame.detections = detector_.believed(*input.detections, probability_.state(), record);
     frame.flow = {cfp::view(input.flow_from), cfp::view(input.flow_to), input.flow_depths_m};
     frame.map_point_probability = input.frame.map_point_probability;
-    frame.image_motion = predicted_.image_motion;
+    frame.image_motion = localization_.image_motion();
     const Part part(observer_, Module::coarse);
     const auto stage = probability_.coarse(frame);
-    const double lag_s = lag_.update(frame, probability_.state());
-    if (lag_s > 0) {
-      note(record, "detector late by " + cfp_examples::fixed(lag_s, 1) + " s");
-      detector_ok_ = false;  // its boxes are used: they are near
-    }
+    detector_.look_for_lag(frame, probability_.state(), record);
     return stage;
-  }
-
-  // Nothing, as if it had not run, of a detector that is silent or stuck: its boxes are carried on. Where they have
-  // left the view, nothing is left to be seen.
-  std::optional<cfp::span<const cfp::Detection<float>>> believed_detections(const cfp_examples::Detections& detections,
-                                                                            FrameRecord& record) {
-    cfp::DetectorStatus status = detector_.update(cfp::span<const cfp::Detection<float>>(detections));
-    const auto& before = probability_.state();
-    const bool left = before.boxes.empty() && int(before.report.frames_since_detector) < options_.max_idle;
-    if (status == cfp::DetectorStatus::silent && left) {
-      detector_.reset();
-      status = cfp::DetectorStatus::ok;
-    }
-    if (status != cfp::DetectorStatus::ok) note(record, std::string("detector ") + cfp::to_string(status));
-    detector_ok_ = status == cfp::DetectorStatus::ok || status == cfp::DetectorStatus::absurd;
-    if (!detector_ok_) return std::nullopt;
-    detections_.clear();
-    std::copy_if(detections.begin(), detections.end(), std::back_inserter(detections_),
-                 [&](const auto& d) { return !cfp::is_absurd(d, options_.detector_health); });
-    return cfp::span<const cfp::Detection<float>>(detections_);
   }
 
   void note_boxes(FrameRecord& record) const {
@@ -199,42 +144,12 @@ class Tracking {
     }
   }
 
-  // From the last frame's points or, when those do not give it and over a gap, from the map. The motion since the last
-  // frame, if both frames have a pose.
+  // The motion since the last frame, if both frames have a pose.
   std::optional<cfp::PoseEstimate> first_pose(Frame& frame, cfp::span<const float> weight) {
     if (map_.keyframes.empty()) return std::nullopt;
-    const Part part(observer_, Module::pose);
-    frame.T_cam_world = predicted_.T_cam_world;
-    if (last_.has_pose) pose_ = refine(frame, weight, from_last_.expected_proven, false, options_.first_health);
-    if (!pose_.health.ok()) {
-      relocalised_ = relocalize_(frame, map_, local_map_.points(), probability_, view_.camera);
-      if (relocalised_) {
-        match_last(frame, frame.T_cam_world);
-        pose_ = refine(frame, weight, from_last_.expected_proven, false, options_.first_health);
-      }
-    }
-    frame.has_pose = pose_.health.ok();
+    relocalised_ = localization_.first_pose(frame, last_, local_map_, weight, believed_, pose_);
     if (!frame.has_pose || !last_.has_pose) return std::nullopt;
     return cfp::PoseEstimate{frame.T_cam_world * last_.T_cam_world.inverse(), pose_.inliers};
-  }
-
-  // With the local map.
-  void second_pose(Frame& frame, cfp::span<const float> weight) {
-    if (relocalised_) (void)from_local_map(frame, local_map_, weight, true);
-    pose_ = from_local_map(frame, local_map_, weight, false);
-    frame.has_pose = pose_.health.ok();
-  }
-
-  // What is new is searched for twice: a wide search finds many a wrong match, a narrow one from there tells what the
-  // pose is worth.
-  RefinedPose from_local_map(Frame& frame, LocalMap& local_map, cfp::span<const float> weight, bool wide) {
-    {
-      const Part part(observer_, Module::matching);
-      local_map.search(frame, grid_, map_, view_, wide);
-    }
-    const Part part(observer_, Module::pose);
-    return refine(frame, weight, local_map.expected_proven(), true,
-                  relocalised_ ? options_.relocalised_health : options_.health);
   }
 
   // What took the view may take it for as long again as it has: so long a new map is on trial. Is it lost within that,
@@ -253,12 +168,12 @@ class Tracking {
   }
   void end_trial(FrameRecord& record) {
     take_bundle(true);
-    poses_.resize(trial_->first_pose);
+    poses_.take_back_after(trial_->first_pose);
     map_.drop_world();
     trial_.reset();
     believed_.reset();
     probation_ = 0;
-    note(record, "the new map is given up, its poses are taken back");
+    record.add_note("the new map is given up, its poses are taken back");
   }
 
   // A pose from the map alone is on probation until some frames have been tracked from it. When it turns out to have
@@ -266,30 +181,15 @@ class Tracking {
   void follow_probation(const Frame& frame, FrameRecord& record) {
     const bool failed = probation_ > 0 && (!frame.has_pose || (relocalised_ && is_jump(frame)));
     if (failed) {
-      poses_.resize(first_on_probation_);
+      poses_.take_back_after(first_on_probation_);
       believed_.reset();
-      note(record, "a relocalisation was wrong, its poses are taken back");
+      record.add_note("a relocalisation was wrong, its poses are taken back");
     }
     if (relocalised_ && frame.has_pose && (failed || probation_ == 0)) first_on_probation_ = poses_.size();
     probation_ = !frame.has_pose ? 0 : relocalised_ ? options_.probation : std::max(probation_ - 1, 0);
   }
   [[nodiscard]] bool is_jump(const Frame& frame) const {
-    if (!believed_) return false;
-    const cfp::PoseStep<double> step{frame.T_cam_world * believed_->T_cam_world.inverse(),
-                                     frame.time_s - believed_->time_s};
-    return cfp::is_jump(step, options_.health);
-  }
-
-  // The stage's weights hold M of what the last frame saw; that of points which joined since comes on top.
-  RefinedPose refine(Frame& frame, cfp::span<const float> weight, std::size_t expected, bool prune,
-                     const cfp::PoseHealthOptions& health) {
-    weights_.assign(weight.begin(), weight.end());
-    for (std::size_t i = 0; i < frame.size(); ++i) {
-      if (map_.is_alive(frame.map_point[i]))
-        weights_[i] = probability_.weight(i, map_.point(frame.map_point[i]).static_probability);
-    }
-    return refine_pose_(frame, from_last_, map_, weights_, view_, expected, prune, health,
-                        relocalised_ ? std::nullopt : believed_);
+    return believed_ && cfp::is_jump(believed_->step_to(frame.T_cam_world, frame.time_s), options_.health);
   }
 
   [[nodiscard]] std::size_t usable_points(const Frame& frame) const {
@@ -303,8 +203,8 @@ class Tracking {
     const std::size_t usable = usable_points(frame);
     if (usable < options_.min_initial_points) {
       record.outcome = Outcome::lost;
-      note(record, "waiting for " + std::to_string(options_.min_initial_points) +
-                       " static points with depth: this frame has " + std::to_string(usable));
+      record.add_note("waiting for " + std::to_string(options_.min_initial_points) +
+                      " static points with depth: this frame has " + std::to_string(usable));
       return;
     }
     frame.T_cam_world = {};
@@ -326,7 +226,7 @@ class Tracking {
     trial_ = Trial{lost_s_, poses_.size()};
     initialize(frame, record);
     record.outcome = Outcome::relocalised;
-    note(record, "new map");
+    record.add_note("new map");
     return true;
   }
 
@@ -338,34 +238,23 @@ class Tracking {
     if (probation_ > 0 || ++frames_since_join_ % interval != 0 ||
         std::none_of(map_.alive_keyframes.begin(), map_.alive_keyframes.end(), is_other))
       return;
-    Frame probe = frame;
-    from_last_.match.swap(no_match_);
-    from_last_.match.assign(frame.size(), cfp::no_match);
+    const auto found = localization_.find_elsewhere(frame, world_);
     std::optional<cfp::SE3<double>> T_other_world;
-    if (relocalize_.from_keyframes(probe, map_, 3, world_, probability_, view_.camera)) {
-      LocalMap around(options_.features);
-      relocalised_ = true;  // the step to this pose is none of the camera's
-      (void)from_local_map(probe, around, frame.static_probability, true);
-      const RefinedPose pose = from_local_map(probe, around, frame.static_probability, false);
-      relocalised_ = false;
-      if (pose.health.ok()) T_other_world = probe.T_cam_world.inverse() * frame.T_cam_world;
-      if (T_other_world && T_other_world_ && agree(*T_other_world, *T_other_world_, frame))
-        join_world(map_.keyframe(around.reference()).world, *T_other_world, probe, pose, around.reference(), frame,
-                   record);
-    }
+    if (found) T_other_world = found->frame.T_cam_world.inverse() * frame.T_cam_world;
+    if (T_other_world && T_other_world_ && agree(*T_other_world, *T_other_world_, frame))
+      join_world(*found, *T_other_world, frame, record);
     T_other_world_ = T_other_world;
-    from_last_.match.swap(no_match_);
   }
-  // `probe` is the frame as the other world sees it, by its keyframe `reference`.
-  void join_world(int other, const cfp::SE3<double>& T_other_world, const Frame& probe, const RefinedPose& pose,
-                  int reference, Frame& frame, FrameRecord& record) {
+  void join_world(const Localization::Elsewhere& found, const cfp::SE3<double>& T_other_world, Frame& frame,
+                  FrameRecord& record) {
+    const int other = map_.keyframe(found.reference).world;
     take_bundle(true);
     const bool is_older = other < world_;
     if (is_older) {
       last_.T_cam_world = last_.T_cam_world * T_other_world.inverse();
-      frame = probe;
-      pose_ = pose;
-      local_map_.set_reference(reference);
+      frame = found.frame;
+      pose_ = found.pose;
+      local_map_.set_reference(found.reference);
     }
     if (trial_) {
       end_trial(record);
@@ -378,7 +267,7 @@ class Tracking {
       std::copy_if(map_.alive_keyframes.begin(), map_.alive_keyframes.end(), std::back_inserter(joined),
                    [&](int k) { return map_.keyframe(k).world == newer; });
       is_older ? map_.join(world_, other, T_other_world) : map_.join(other, world_, T_other_world.inverse());
-      note(record, "joined to the old map");
+      record.add_note("joined to the old map");
       take_back_what_has_gone(joined, frame, record);
     }
     world_ = std::min(world_, other);
@@ -387,14 +276,11 @@ class Tracking {
   void take_back_what_has_gone(const std::vector<int>& keyframes, const Frame& frame, FrameRecord& record) {
     std::vector<int> gone;
     std::copy_if(keyframes.begin(), keyframes.end(), std::back_inserter(gone),
-                 [&](int k) { return has_gone(map_, k, frame, grid_, view_); });
+                 [&](int k) { return has_gone(map_, k, frame, localization_.grid(), view_); });
     if (gone.empty()) return;
-    const auto is_by_it = [&](const RelativePose& p) {
-      return std::find(gone.begin(), gone.end(), map_.ancestor(p.reference)) != gone.end();
-    };
-    poses_.erase(std::remove_if(poses_.begin(), poses_.end(), is_by_it), poses_.end());
+    poses_.take_back_of(gone, map_);
     for (const int k : gone) map_.erase_keyframe(k);
-    note(record, "poses by what has gone since are taken back");
+    record.add_note("poses by what has gone since are taken back");
   }
   // Where the camera of a frame is by two transformations.
   static bool agree(const cfp::SE3<double>& a, const cfp::SE3<double>& b, const Frame& frame) {
@@ -406,7 +292,7 @@ class Tracking {
     const bool on_probation = relocalised_ || probation_ > 0;
     const bool apart = world_ != map_.keyframe(map_.alive_keyframes.front()).world;
     record.outcome = on_probation || apart ? Outcome::relocalised : Outcome::tracked;
-    update_points(map_, frame, probability_, !on_probation, detector_ok_);
+    update_points(map_, frame, probability_, !on_probation, detector_.ok());
     ++frames_since_keyframe_;
     if (!on_probation &&
         mapping_.wants_keyframe(map_, frame, local_map_.reference(), pose_.in_map, frames_since_keyframe_))
@@ -443,38 +329,28 @@ class Tracking {
   View view_;
   Observer& observer_;
   cfp::StaticProbability<Camera> probability_;
-  MotionModel motion_;
-  KeypointGrid grid_;
-  LastFrameMatching match_last_;
-  PoseSolver refine_pose_;
-  Relocalization relocalize_;
+  Map map_;
+  DetectorWatch detector_;
+  Localization localization_;
   LocalMap local_map_;
   Mapping mapping_;
   BundleThread bundle_;
+  PoseHistory poses_;
 
-  Map map_;
   Frame last_;
-  MotionModel::Prediction predicted_;
-  LastFrameMatches from_last_;
-  bool relocalised_ = false;     // in this frame
-  RefinedPose pose_;             // of this frame
-  cfp::FrameInterval interval_;  // the motion model is not asked over a gap
-  cfp::DetectorHealth<float> detector_;
-  cfp::DetectorLag<float> lag_;
-  bool detector_ok_ = true;
-  cfp_examples::Detections detections_;
-  std::optional<BelievedPose> believed_;           // the last of all frames
-  int world_ = 0;                                  // of the keyframes to come
-  double lost_s_ = 0;                              // since then
-  std::optional<cfp::SE3<double>> T_other_world_;  // of the last look for other maps
-  int frames_since_join_ = 0;
-  std::optional<Trial> trial_;
-  std::vector<std::int32_t> no_match_;
+  cfp::FrameInterval interval_;           // the motion model is not asked over a gap
+  RefinedPose pose_;                      // of this frame
+  bool relocalised_ = false;              // in this frame
+  std::optional<BelievedPose> believed_;  // the last of all frames
+  double lost_s_ = 0;                     // since then
+  int frames_since_keyframe_ = 0;
+
   int probation_ = 0;                   // frames left
   std::size_t first_on_probation_ = 0;  // of poses_
-  int frames_since_keyframe_ = 0;
-  std::vector<RelativePose> poses_;
-  std::vector<float> weights_;
+  int world_ = 0;                       // of the keyframes to come
+  std::optional<Trial> trial_;
+  std::optional<cfp::SE3<double>> T_other_world_;  // of the last look for other maps
+  int frames_since_join_ = 0;
 };
 
 }  // namespace cfp_slam
