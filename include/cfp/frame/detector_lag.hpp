@@ -49,7 +49,7 @@ class DetectorLag {
   /// above 6 sigma) and -1 when it rests (below 3), and the lag is that of the best mean score, if most pairs there
   /// move. Frames whose flow has no depths, or no camera motion, count for nothing. O(boxes that move x pairs).
   double update(const Frame<Scalar>& frame, const FrameState<Scalar>& state) noexcept {
-    const double dt = state.previous.known ? state.current.timestamp_s - state.previous.timestamp_s : 0;
+    const double dt = detail::elapsed_s(state);
     const double kept = dt > 0 && is_finite(dt) ? std::exp(-dt / options_.memory_s) : 1;
     boxes_ *= kept;
     for (double& sum : scores_) sum *= kept;

@@ -16,11 +16,23 @@ namespace cfp {
 namespace detail {
 inline namespace CFP_ISA {
 
-/// Whether a pixel belongs to an object: by its label where the frame has a label image, else by its box. A compensated
-/// box has no label.
+/// Whether the frame's labels tell what belongs to the object of a box; a compensated box has no label.
+template <typename Scalar>
+[[nodiscard]] bool has_label(const TrackedBox<Scalar>& box, const LabelImage& labels) noexcept {
+  return !labels.empty() && !box.compensated();
+}
+
+/// Whether a pixel belongs to an object: by its label if it has one, else by its box.
 template <typename Scalar>
 [[nodiscard]] bool lies_on(const TrackedBox<Scalar>& box, const LabelImage& labels, Scalar x, Scalar y) noexcept {
-  return labels.empty() || box.compensated() ? contains(box.box, x, y) : label_at(labels, x, y) == box.detection + 1;
+  return has_label(box, labels) ? label_at(labels, x, y) == box.detection + 1 : contains(box.box, x, y);
+}
+
+/// Whether depth tells an object from the background in its box.
+template <typename Scalar>
+[[nodiscard]] bool is_told_by_depth(const TrackedBox<Scalar>& box, bool segmented,
+                                    const FrameOptions& options) noexcept {
+  return !segmented && options.coarse.use_depth_foreground && is_non_rigid(box.class_id, options);
 }
 
 /// What the flow pairs are judged by: the host's motion or F, or the model of the pairs outside all boxes.
@@ -92,8 +104,7 @@ void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameS
     const auto belongs = [&](std::size_t i) {
       return lies_on(box, frame.labels, flow.current(i, 0), flow.current(i, 1));
     };
-    const bool segmented = !frame.labels.empty() && !box.compensated();
-    const bool by_depth = !segmented && options.coarse.use_depth_foreground && is_non_rigid(box.class_id, options);
+    const bool by_depth = is_told_by_depth(box, has_label(box, frame.labels), options);
     const span<const Scalar> depths = by_depth ? flow.previous_depths : span<const Scalar>();
     const ForegroundResult separated = separate_members(box, flow.current, depths, belongs, options, state);
     for (std::size_t m = 0; m < scratch.members.size(); ++m)
@@ -179,7 +190,7 @@ void remember_objects(const FrameOptions& options, FrameState<Scalar>& state) {
   auto& known = state.memories;
   auto& next = state.scratch.memories;
   next.clear();
-  const double dt = state.previous.known ? state.current.timestamp_s - state.previous.timestamp_s : 0;
+  const double dt = detail::elapsed_s(state);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     const auto of_box =
         std::find_if(known.begin(), known.end(), [&](const auto& m) { return m.first == state.boxes[b].id; });

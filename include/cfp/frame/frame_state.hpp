@@ -113,6 +113,19 @@ struct FrameState {
   [[nodiscard]] std::size_t size() const noexcept { return current.keypoints.size(); }
 };
 
+namespace detail {
+inline namespace CFP_ISA {
+
+// s since the frame before, 0 without one. The difference of two clocks of 10^9 s fits a double to a fraction of a
+// microsecond, a float not at all.
+template <typename Scalar>
+[[nodiscard]] double elapsed_s(const FrameState<Scalar>& state) noexcept {
+  return state.previous.known ? state.current.timestamp_s - state.previous.timestamp_s : 0;
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
+
 inline namespace CFP_ISA {
 
 /// Where the object of a track stood in a frame, m; 0: unknown.

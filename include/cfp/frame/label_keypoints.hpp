@@ -68,13 +68,13 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     const TrackedBox<Scalar>& box = state.boxes[b];
     const bool by_index = !frame.object_of_keypoint.empty() && !box.compensated();
-    const bool segmented = by_index || (!frame.labels.empty() && !box.compensated());
+    const bool segmented = by_index || detail::has_label(box, frame.labels);
     const auto belongs = [&](std::size_t i) {
       if (state.label[i] == KeypointLabel::invalid) return false;
       const auto& [x, y] = state.current.keypoints[i];
       return by_index ? frame.object_of_keypoint[i] == box.detection : detail::lies_on(box, frame.labels, x, y);
     };
-    const bool by_depth = !segmented && options.coarse.use_depth_foreground && is_non_rigid(box.class_id, options);
+    const bool by_depth = detail::is_told_by_depth(box, segmented, options);
     const ForegroundResult separated = detail::separate_members(
         box, PointSpan<Scalar, 2>(state.current.keypoints),
         by_depth ? span<const Scalar>(state.current.depths) : span<const Scalar>(), belongs, options, state);

@@ -20,8 +20,7 @@ void track_boxes(const Frame<Scalar>& frame, const FrameOptions& options, BoxTra
   state.boxes.clear();
   if (!options.use_boxes) return;
   FrameReport& report = state.report;
-  // The difference of two clocks of 10^9 s fits a double to a fraction of a microsecond, a float not at all.
-  double dt = state.previous.known ? frame.timestamp_s - state.previous.timestamp_s : 0;
+  double dt = detail::elapsed_s(state);
   if (state.previous.known && !(dt > 0 && is_finite(dt))) {
     report.time = Status::invalid_input;
     dt = 0;
