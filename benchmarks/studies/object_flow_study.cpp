@@ -4,9 +4,11 @@
 // O, and how well O tells moving people from still ones (AUC; a box is moving when at least half, still when at most 2
 // % of its person pixels move). Supports cfp::OpticalFlowOptions, and edge_px of cfp::sample_depth: rendered depth fits
 // its image to the pixel, so --depth spoils it as sensors do: of the frame before, shifted by 6 and 3 px, or what is
-// near widened by 6 px, as stereo matching does.
-//   cfp_object_flow_study [--depth late|shifted|widened] [--smoke | --frames N | TUM_FOLDER...]   instead of rendering,
-// folders of cfp_synthetic; one without labels, with a detections.txt, gives times and mean O alone (as "partly")
+// near widened by 6 px, as stereo matching does. --masks gives the people's pixels in the place of boxes, cut (below 0)
+// or grown by so many px, as networks do.
+//   cfp_object_flow_study [--depth late|shifted|widened] [--masks PX] [--smoke | --frames N | TUM_FOLDER...]   instead
+// of rendering, folders of cfp_synthetic; one without labels, with a detections.txt, gives times and mean O alone (as
+// "partly")
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -14,6 +16,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,6 +29,7 @@
 #include "../../examples/synthetic/sequence.hpp"
 #include "cfp/evaluation/calibration.hpp"
 #include "cfp/frame/estimate_objects.hpp"
+#include "cfp/frame/label_image.hpp"
 #include "cfp/interop/opencv.hpp"
 #include "cfp/interop/opencv_flow.hpp"
 
@@ -39,7 +43,7 @@ struct Person {
 };
 
 struct Image {
-  cv::Mat gray, depth;
+  cv::Mat gray, depth, mask;  // mask: empty, or v for person v - 1
   double metres_per_unit = 0;
   std::vector<cv::KeyPoint> keypoints;
   std::vector<Person> people;
@@ -150,13 +154,35 @@ std::vector<Candidate> candidates() {
   return all;
 }
 
+double moving_share(const cv::Mat& labels, const cv::Mat& inside) {
+  const int moving = cv::countNonZero((labels == 1) & inside), still = cv::countNonZero((labels == 2) & inside);
+  return moving + still > 0 ? double(moving) / (moving + still) : 0;
+}
 double moving_share(const cv::Mat& labels, const cfp::Box<float>& box) {
   if (labels.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const cv::Rect inside =
-      cv::Rect(int(box.x1), int(box.y1), int(std::ceil(box.width())), int(std::ceil(box.height()))) &
-      cv::Rect({0, 0}, labels.size());
-  const int moving = cv::countNonZero(labels(inside) == 1), still = cv::countNonZero(labels(inside) == 2);
-  return moving + still > 0 ? double(moving) / (moving + still) : 0;
+  cv::Mat inside = cv::Mat::zeros(labels.size(), CV_8U);
+  cv::rectangle(inside, cv::Rect(int(box.x1), int(box.y1), int(std::ceil(box.width())), int(std::ceil(box.height()))),
+                255, cv::FILLED);
+  return moving_share(labels, inside);
+}
+
+// People as a network segments them: connected pixels of theirs are one object, 2000 of them at least.
+void add_masks(const cv::Mat& labels, int grow_px, Image& image) {
+  const int size = 2 * std::abs(grow_px) + 1;
+  const cv::Mat disc = cv::getStructuringElement(cv::MORPH_ELLIPSE, {size, size});
+  cv::Mat people = labels != 0, pieces, sizes, centres;
+  grow_px < 0 ? cv::erode(people, people, disc) : cv::dilate(people, people, disc);
+  const int count = cv::connectedComponentsWithStats(people, pieces, sizes, centres);
+  image.mask = cv::Mat::zeros(labels.size(), CV_8U);
+  std::vector<double> share;
+  for (int k = 1; k < count; ++k) {
+    if (sizes.at<int>(k, cv::CC_STAT_AREA) < 2000) continue;
+    share.push_back(moving_share(labels, pieces == k));
+    image.mask.setTo(double(share.size()), pieces == k);
+  }
+  std::vector<cfp::Detection<float>> found;
+  cfp::detections_of(cfp::label_view(image.mask), 0, found);
+  for (std::size_t b = 0; b < found.size(); ++b) image.people.push_back({found[b].box, share[b]});
 }
 
 void judge(std::vector<Candidate>& all, const std::vector<Image>& images, const cfp::PinholeCamera<float>& camera) {
@@ -179,10 +205,12 @@ void judge(std::vector<Candidate>& all, const std::vector<Image>& images, const 
       const Image& before = images[k - 1];
       cfp::sample_depth(before.depth, cfp::view(pairs.first), before.metres_per_unit, depths_m, c.edge_px);
       frame.flow = {cfp::view(pairs.first), cfp::view(pairs.second), depths_m};
+      if (!images[k].mask.empty()) frame.labels = cfp::label_view(images[k].mask);
       cfp::begin_frame(frame, state);
       for (const Person& person : images[k].people) {
         cfp::TrackedBox<float> box;
         box.box = person.box;
+        box.detection = static_cast<int>(state.boxes.size());
         state.boxes.push_back(box);
       }
       cfp::estimate_objects(frame, camera, options, state);
@@ -259,6 +287,7 @@ void print(const std::vector<Candidate>& all) {
 int main(int argc, char** argv) {
   std::vector<std::string> folders;
   std::string depth_is;
+  std::optional<int> mask_px;
   int frames = 60;
   bool smoke = false;
   for (int i = 1; i < argc; ++i) {
@@ -271,6 +300,8 @@ int main(int argc, char** argv) {
         std::fprintf(stderr, "--depth: late, shifted or widened, not '%s'\n", depth_is.c_str());
         return 2;
       }
+    } else if (word == "--masks" && i + 1 < argc) {
+      mask_px = std::atoi(argv[++i]);
     } else if (word == "--frames" && i + 1 < argc) {
       frames = std::max(2, std::atoi(argv[++i]));
     } else {
@@ -289,7 +320,10 @@ int main(int argc, char** argv) {
     if (images.empty()) last_depth.release();
     image.depth = spoiled(depth, depth_is, last_depth);
     image.metres_per_unit = 1 / units_per_metre;
-    for (const auto& box : boxes) image.people.push_back({box, moving_share(labels, box)});
+    if (mask_px && !labels.empty())
+      add_masks(labels, *mask_px, image);
+    else
+      for (const auto& box : boxes) image.people.push_back({box, moving_share(labels, box)});
     images.push_back(std::move(image));
   };
   for (const std::string& folder : folders) {

@@ -128,15 +128,66 @@ TEST_CASE("With a label image, the pairs on an object are those on its label", "
   CHECK(run.state.objects[0].pairs + run.state.objects[1].pairs == labelled);
   CHECK(report.foreground == labelled);
   CHECK(report.background == 0);
+}
 
-  // Depths that would halve each object change nothing: the label image is what tells.
-  std::vector<double> depths(scene.keypoints.size());
-  for (std::size_t i = 0; i < depths.size(); ++i) depths[i] = i % 2 == 0 ? 1.5 : 6;
-  frame.flow.previous_depths = depths;
-  cfp::FrameOptions by_lines;
-  by_lines.coarse.flow.use_depth = false;
-  (void)run.coarse(by_lines, frame, scene.camera);
-  CHECK(run.state.objects[0].pairs + run.state.objects[1].pairs == labelled);
+namespace {
+
+// A person, the wall behind, and pairs on the silhouette, which move as the person does and have the depth of the wall.
+struct SpilledMask {
+  DynamicScene<double> scene;
+  std::vector<std::uint8_t> pixels;
+
+  explicit SpilledMask(double person_motion_m, std::uint64_t seed) : pixels(640 * 480, 0) {
+    cfp::Random random(seed, "spilled mask");
+    scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.02, 0.002, 0.004, 0.001, -0.002, 0.001));
+    const auto add = [&](double x, double y, double depth, double measured, double shift) {
+      cfp::Vector3<double> ray;
+      cfp::Vector2<double> pixel(0, 0);
+      (void)scene.camera.unproject(cfp::Vector2<double>(x, y), ray);
+      (void)scene.camera.project(scene.T_cur_prev * (ray * depth) + cfp::Vector3<double>(shift, 0, 0), pixel);
+      scene.previous_keypoints.push_back({x, y});
+      scene.keypoints.push_back({pixel.x() + 0.1 * random.normal(), pixel.y() + 0.1 * random.normal()});
+      scene.depths.push_back(measured);
+      scene.match.push_back(cfp::no_match);
+    };
+    for (int k = 0; k < 120; ++k) {
+      const double z = random.uniform(1.4, 1.6);
+      add(random.uniform(280, 360), random.uniform(120, 420), z, z, person_motion_m);
+    }
+    for (int k = 0; k < 60; ++k)
+      add(random.uniform(0, 1) < 0.5 ? 275 : 365, random.uniform(120, 420), 1.5, random.uniform(4, 5), person_motion_m);
+    for (int k = 0; k < 300; ++k) {
+      const double z = random.uniform(4, 5), x = random.uniform(20, 200);
+      add(k % 2 == 0 ? x : x + 400, random.uniform(20, 460), z, z, 0);
+    }
+    scene.boxes = {{250, 100, 390, 440}};
+    for (std::size_t y = 100; y < 440; ++y) std::fill_n(pixels.begin() + std::ptrdiff_t(y * 640 + 250), 140, 1);
+  }
+};
+
+}  // namespace
+
+TEST_CASE("Where a mask spills over the silhouette, the depth of the wall does not make a person at rest move",
+          "[frame]") {
+  for (const double person_motion_m : {0.0, 0.02}) {
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      CAPTURE(person_motion_m, seed);
+      const SpilledMask spilled(person_motion_m, seed);
+      FrameRun<double> run(spilled.scene);
+      cfp::Frame<double> frame = run.frame();
+      frame.labels = {spilled.pixels.data(), 640, 480, 640};
+      frame.flow.previous_depths = spilled.scene.depths;
+      const cfp::FrameReport report = run.coarse({}, frame, spilled.scene.camera);
+      CHECK(report.flow_model == cfp::FlowModelKind::motion);
+      CHECK(report.flow_support == cfp::FlowSupport::outside_pairs);
+      CHECK((run.state.objects[0].static_probability > 0.5) == (person_motion_m == 0));
+      CHECK(run.state.objects[0].pairs == 120);
+      // Of the keypoints the mask alone tells; depth tells where the object stands.
+      CHECK(report.foreground == 180);
+      CHECK(report.background == 0);
+      CHECK(cfp::object_depth(run.state.current, run.state.boxes[0].id) == Approx(1.5).margin(0.05));
+    }
+  }
 }
 
 TEST_CASE("Where people fill the view, what lies behind them tells the camera's motion, not they themselves",

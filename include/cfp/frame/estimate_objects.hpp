@@ -28,11 +28,10 @@ template <typename Scalar>
   return has_label(box, labels) ? label_at(labels, x, y) == box.detection + 1 : contains(box.box, x, y);
 }
 
-/// Whether depth tells an object from the background in its box.
+/// Whether depth tells where an object stands, and what in its box or mask is farther.
 template <typename Scalar>
-[[nodiscard]] bool is_told_by_depth(const TrackedBox<Scalar>& box, bool segmented,
-                                    const FrameOptions& options) noexcept {
-  return !segmented && options.coarse.use_depth_foreground && is_non_rigid(box.class_id, options);
+[[nodiscard]] bool is_told_by_depth(const TrackedBox<Scalar>& box, const FrameOptions& options) noexcept {
+  return options.coarse.use_depth_foreground && is_non_rigid(box.class_id, options);
 }
 
 /// What the flow pairs are judged by: the host's motion or F, or the model of the pairs outside all boxes.
@@ -92,7 +91,8 @@ void label_margin(const Box<Scalar>& box, const ForegroundResult& separated, con
 }
 
 /// Sets scratch.pair_label: per box and flow pair, how the pair stands to the object of that box. Where the object is
-/// told from its background by depth, so are the pairs, and those just outside of the box may be invalid.
+/// told from its background by depth, so are the pairs, and those just outside of the box may be invalid. So are those
+/// in its mask that are farther than it: masks spill over the silhouette, where depth and flow are of two surfaces.
 template <typename Scalar>
 void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
@@ -104,13 +104,14 @@ void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameS
     const auto belongs = [&](std::size_t i) {
       return lies_on(box, frame.labels, flow.current(i, 0), flow.current(i, 1));
     };
-    const bool by_depth = is_told_by_depth(box, has_label(box, frame.labels), options);
-    const span<const Scalar> depths = by_depth ? flow.previous_depths : span<const Scalar>();
+    const bool segmented = has_label(box, frame.labels);
+    const KeypointLabel farther = segmented ? KeypointLabel::invalid : KeypointLabel::background;
+    const span<const Scalar> depths = is_told_by_depth(box, options) ? flow.previous_depths : span<const Scalar>();
     const ForegroundResult separated = separate_members(box, flow.current, depths, belongs, options, state);
     for (std::size_t m = 0; m < scratch.members.size(); ++m)
       scratch.pair_label[b * n + static_cast<std::size_t>(scratch.members[m])] =
-          scratch.mask[m] != 0 ? KeypointLabel::foreground : KeypointLabel::background;
-    if (!depths.empty())
+          scratch.mask[m] != 0 ? KeypointLabel::foreground : farther;
+    if (!depths.empty() && !segmented)
       label_margin(box.box, separated, flow, options.coarse.flow.margin, {scratch.pair_label.data() + b * n, n});
   }
 }

@@ -56,7 +56,9 @@ inline namespace CFP_ISA {
 
 /// Sets K, label and box of every keypoint from state.boxes and state.objects. A keypoint on several objects takes the
 /// smallest of their K, and that box decides for it from then on (ties: foreground before background, then the lower
-/// index). Keypoints on no object keep K = 1. O(keypoints x boxes), and keypoints x flow pairs within each box.
+/// index). Keypoints on no object keep K = 1. What a mask or object_of_keypoint gives an object is its foreground;
+/// depth then only tells where it stands, for the next frame and for boxes without a mask. O(keypoints x boxes), and
+/// keypoints x flow pairs within each box.
 template <typename Scalar>
 void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   CFP_ASSERT(state.objects.size() == state.boxes.size());
@@ -74,14 +76,15 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
       const auto& [x, y] = state.current.keypoints[i];
       return by_index ? frame.object_of_keypoint[i] == box.detection : detail::lies_on(box, frame.labels, x, y);
     };
-    const bool by_depth = detail::is_told_by_depth(box, segmented, options);
+    const bool by_depth = detail::is_told_by_depth(box, options);
     const ForegroundResult separated = detail::separate_members(
         box, PointSpan<Scalar, 2>(state.current.keypoints),
         by_depth ? span<const Scalar>(state.current.depths) : span<const Scalar>(), belongs, options, state);
     if (separated.status == ForegroundStatus::ok)
       state.current.object_depths.push_back({box.id, static_cast<Scalar>(separated.depth_m)});
-    else if (by_depth)
+    else if (by_depth && !segmented)
       ++report.undecided_foregrounds;
+    if (segmented) std::fill(scratch.mask.begin(), scratch.mask.end(), char(1));
 
     const Scalar o = static_cast<Scalar>(state.objects[b].static_probability);
     const Scalar k_foreground = first_stage_probability(o, true, threshold);
