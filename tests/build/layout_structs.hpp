@@ -86,6 +86,8 @@
   CFP_LAYOUT(cfp::SVD3<double>, sigma)                                   \
   CFP_LAYOUT(cfp::SE3<float>, translation)                               \
   CFP_LAYOUT(cfp::SE3<double>, translation)                              \
+  CFP_LAYOUT(cfp::UncertainMotion<float>, covariance)                    \
+  CFP_LAYOUT(cfp::UncertainMotion<double>, covariance)                   \
   CFP_LAYOUT(cfp::Trivial<float>, delta)                                 \
   CFP_LAYOUT(cfp::Trivial<double>, delta)                                \
   CFP_LAYOUT(cfp::Huber<float>, delta)                                   \

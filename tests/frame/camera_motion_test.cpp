@@ -6,6 +6,8 @@
 #include <limits>
 #include <vector>
 
+#include <Eigen/Cholesky>
+
 #include "cfp/core/random.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
@@ -70,6 +72,27 @@ TEST_CASE("The camera's motion and the flow's noise are found at rest, in rotati
       }
     }
   }
+}
+
+TEST_CASE("The covariance of the camera's motion is that of its error", "[frame][camera_motion]") {
+  cfp::Random random(6, "covariance");
+  cfp::CameraMotionWorkspace<double> workspace;
+  double sum = 0;
+  constexpr int runs = 400;
+  for (int i = 0; i < runs; ++i) {
+    const cfp::SE3<double> T = motion(0.03, 0.02, random);
+    const Flow f = flow(i % 2 == 0 ? 60 : 300, T, 0.2, 0, random);
+    const cfp::CameraMotion<double> found =
+        cfp::estimate_camera_motion<double>(f.pairs(), f.outside, cfp::SE3<double>(), camera, {}, workspace);
+    REQUIRE(found.known);
+    const cfp::Vector6<double> error = cfp::se3_log(found.T_cur_prev * T.inverse());
+    const Eigen::MatrixXd C = found.covariance;
+    const Eigen::VectorXd e = error;
+    sum += e.dot(C.ldlt().solve(e));
+  }
+  // Six for six unknowns; depths, which have noise, too, count as exact.
+  CHECK(sum / runs > 5);
+  CHECK(sum / runs < 9);
 }
 
 TEST_CASE("What moves by less than the largest noise does not take the camera with it", "[frame][camera_motion]") {

@@ -245,6 +245,42 @@ TEST_CASE("What a box leaves out of its person does not outvote what lies behind
   }
 }
 
+TEST_CASE("The motion that a far, bare wall gives does not make a near person at rest move", "[frame]") {
+  int called_moving[2] = {0, 0};
+  constexpr int seeds = 100;
+  for (const bool walks : {false, true}) {
+    for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+      cfp::Random random(seed, "bare wall");
+      DynamicScene<double> scene;
+      scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.005, 0.002, 0.004, 0.001, -0.002, 0.001));
+      const auto add = [&](double x, double y, double z, double shift) {
+        cfp::Vector3<double> ray;
+        cfp::Vector2<double> pixel(0, 0);
+        (void)scene.camera.unproject(cfp::Vector2<double>(x, y), ray);
+        (void)scene.camera.project(scene.T_cur_prev * (ray * z) + cfp::Vector3<double>(shift, 0, 0), pixel);
+        scene.previous_keypoints.push_back({x, y});
+        scene.keypoints.push_back({pixel.x() + 0.2 * random.normal(), pixel.y() + 0.2 * random.normal()});
+        scene.depths.push_back(z);
+        scene.match.push_back(cfp::no_match);
+      };
+      for (int k = 0; k < 60; ++k) {
+        const double x = random.uniform(20, 200);
+        add(k % 2 == 0 ? x : x + 400, random.uniform(20, 460), 4.2, 0);
+      }
+      for (int k = 0; k < 80; ++k)
+        add(random.uniform(270, 370), random.uniform(120, 420), random.uniform(0.9, 1.1), walks ? 0.03 : 0);
+      scene.boxes = {{250, 100, 390, 440}};
+      FrameRun<double> run(scene);
+      cfp::Frame<double> frame = run.frame();
+      frame.flow.previous_depths = scene.depths;
+      CHECK(run.coarse({}, frame, scene.camera).flow_model == cfp::FlowModelKind::motion);
+      called_moving[walks ? 1 : 0] += run.state.objects[0].static_probability <= 0.9 ? 1 : 0;
+    }
+  }
+  CHECK(called_moving[0] <= 20);
+  CHECK(called_moving[1] == seeds);
+}
+
 TEST_CASE("A person who fills the view of a camera without depths is unknown, not at rest", "[frame]") {
   cfp_test::DynamicSceneOptions crowded;
   crowded.people = 1;

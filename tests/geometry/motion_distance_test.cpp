@@ -93,6 +93,48 @@ TEST_CASE("The motion distance is the Mahalanobis distance under pixel and depth
   }
 }
 
+TEST_CASE("What the motion's own error explains counts for nothing in a motion distance",
+          "[geometry][motion_distance]") {
+  cfp::Random random(7, "uncertain motion");
+  const cfp::MotionDistanceOptions options;
+  const double sigma = 0.2;
+  for (int i = 0; i < 500; ++i) {
+    cfp::UncertainMotion<double> motion = any_motion(random);
+    Eigen::Matrix<double, 6, 6> root;
+    for (int k = 0; k < 36; ++k) root(k / 6, k % 6) = 0.002 * random.normal();
+    motion.covariance = root * root.transpose();
+    Pair p = pair(random);
+    cfp::Vector3<double> ray;
+    cfp::Vector2<double> at;
+    REQUIRE(camera.unproject(p.previous, ray));
+    const auto moved = [&](const cfp::Vector6<double>& xi, double z) {
+      cfp::Vector2<double> q;
+      CHECK(camera.project(cfp::se3_exp(xi) * (motion.T_cur_prev * cfp::Vector3<double>(z * ray)), q));
+      return q;
+    };
+    const cfp::Vector6<double> none = cfp::Vector6<double>::Zero();
+    at = moved(none, p.depth);
+    p.current = at + cfp::Vector2<double>(3 * random.normal(), 3 * random.normal());
+    // The covariance of the pixel by finite differences.
+    Eigen::Matrix<double, 2, 7> by;
+    for (int k = 0; k < 6; ++k)
+      by.col(k) = (moved(1e-6 * cfp::Vector6<double>::Unit(k), p.depth) -
+                   moved(-1e-6 * cfp::Vector6<double>::Unit(k), p.depth)) /
+                  2e-6;
+    by.col(6) =
+        (moved(none, p.depth + 1e-6) - moved(none, p.depth - 1e-6)) / 2e-6 * options.depth_noise.sigma_m(p.depth);
+    const Eigen::Matrix2d S = sigma * sigma * Eigen::Matrix2d::Identity() +
+                              by.leftCols<6>() * motion.covariance * by.leftCols<6>().transpose() +
+                              by.col(6) * by.col(6).transpose();
+    const cfp::Vector2<double> r = p.current - at;
+    const double det = S(0, 0) * S(1, 1) - S(0, 1) * S(1, 0);
+    const double mahalanobis_sq = (S(1, 1) * r[0] * r[0] - 2 * S(0, 1) * r[0] * r[1] + S(0, 0) * r[1] * r[1]) / det;
+    const double d = cfp::motion_distance(p.previous, p.depth, p.current, motion, camera, sigma, options);
+    CHECK_THAT(d, WithinAbs(sigma * std::sqrt(mahalanobis_sq), 1e-5 * (1 + d)));
+    CHECK(d <= cfp::motion_distance(p.previous, p.depth, p.current, motion.T_cur_prev, camera, sigma, options));
+  }
+}
+
 TEST_CASE("A motion distance never grows with the depth's noise", "[geometry][motion_distance]") {
   cfp::Random random(4, "monotone");
   for (int i = 0; i < 200; ++i) {

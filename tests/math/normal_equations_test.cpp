@@ -47,6 +47,22 @@ TEST_CASE("The step solves the damped normal equations", "[math]") {
   agrees_with_eigen<8>();
 }
 
+TEST_CASE("The inverse of an information is its covariance, and a singular one has none", "[math]") {
+  cfp::Random random(8, "normal equations");
+  Eigen::Matrix<double, 6, 6> inverse;
+  for (int trial = 0; trial < 100; ++trial) {
+    const Eigen::MatrixXd H = random_hessian(random, 6);
+    REQUIRE(cfp::invert_normal_equations<6>(H, 0, inverse));
+    const Eigen::MatrixXd expected = H.ldlt().solve(Eigen::MatrixXd::Identity(6, 6)), found = inverse;
+    CHECK((found - expected).norm() <= 1e-6 * expected.norm());
+    CHECK((found - found.transpose()).norm() <= 1e-12 * found.norm());
+    Eigen::Matrix<double, 6, 6> singular = H;
+    singular.col(5) = singular.col(4);
+    singular.row(5) = singular.row(4);
+    CHECK_FALSE(cfp::invert_normal_equations<6>(singular, 1e-12, inverse));
+  }
+}
+
 TEST_CASE("Units of the unknowns do not matter to the step", "[math]") {
   cfp::Random random(6, "normal equations");
   for (int trial = 0; trial < 100; ++trial) {

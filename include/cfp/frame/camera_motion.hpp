@@ -28,9 +28,8 @@ struct CameraMotionOptions {
 };
 
 template <typename Scalar>
-struct CameraMotion {
+struct CameraMotion : UncertainMotion<Scalar> {
   bool known = false;
-  SE3<Scalar> T_cur_prev;
   Scalar sigma_px = Scalar(1);  ///< standard deviation of one coordinate of a static flow pair, robust
 };
 
@@ -87,6 +86,7 @@ template <typename Scalar>
 
   workspace.distances.resize(outside.size());
   SE3<double> T = start;
+  Matrix6<double> covariance;
   motion.sigma_px = Scalar(options.max_sigma_px);
   for (int pass = 0; pass < 2; ++pass) {
     workspace.sigmas.assign(outside.size(), motion.sigma_px);
@@ -96,7 +96,8 @@ template <typename Scalar>
     observations.sigmas = workspace.sigmas;
     const PoseResult refined = refine_pose(observations, camera, T, options.pose, workspace.pose);
     if (!is_solved(refined.status) ||
-        static_cast<double>(refined.inliers) < options.min_inlier_share * static_cast<double>(taken))
+        static_cast<double>(refined.inliers) < options.min_inlier_share * static_cast<double>(taken) ||
+        !invert_normal_equations<6>(refined.information, 1e-12, covariance))
       return motion;
     T = refined.T_cam_world;
     motion.T_cur_prev = T.template cast<Scalar>();
@@ -108,6 +109,7 @@ template <typename Scalar>
     const Scalar sigma = robust_sigma(span<Scalar>(workspace.distances), 2);
     motion.sigma_px = (std::min)((std::max)(sigma, Scalar(options.min_sigma_px)), Scalar(options.max_sigma_px));
   }
+  motion.covariance = covariance.template cast<Scalar>();
   motion.known = true;
   return motion;
 }

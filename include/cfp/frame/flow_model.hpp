@@ -54,7 +54,7 @@ struct FlowModel {
   FlowSupport support = FlowSupport::none;
   RansacStatus status = RansacStatus::not_enough_data;  ///< of the estimate; ok with the caller's matrix
   Matrix3<Scalar> matrix = Matrix3<Scalar>::Zero();     ///< F or H, previous to current
-  SE3<Scalar> T_cur_prev;                               ///< of kind motion
+  UncertainMotion<Scalar> motion;                       ///< of kind motion; the caller's counts as exact
   Scalar sigma_px = Scalar(0);  ///< noise of one coordinate, measured on the pairs on no object; 0: not measured
 };
 
@@ -130,7 +130,7 @@ void flow_distances(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flo
                     const FlowModelOptions& options, span<Scalar> out) noexcept {
   switch (model.kind) {
     case FlowModelKind::motion:
-      return motion_distances(flow.previous, flow.previous_depths, flow.current, model.T_cur_prev, camera,
+      return motion_distances(flow.previous, flow.previous_depths, flow.current, model.motion, camera,
                               model.sigma_px > Scalar(0) ? model.sigma_px : Scalar(options.motion.min_sigma_px),
                               options.motion.distance, out);
     case FlowModelKind::fundamental:
@@ -159,7 +159,7 @@ FlowModel<Scalar> estimate_flow_model(const FlowPairs<Scalar>& flow, span<const 
       model.kind = FlowModelKind::motion;
       model.support = FlowSupport::outside_pairs;
       model.status = RansacStatus::ok;
-      model.T_cur_prev = motion.T_cur_prev;
+      model.motion = motion;
       model.sigma_px = motion.sigma_px;
       return model;
     }

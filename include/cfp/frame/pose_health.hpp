@@ -98,16 +98,10 @@ template <typename Scalar>
 template <typename Derived>
 [[nodiscard]] bool pose_sigmas(const Eigen::MatrixBase<Derived>& information, double& position_sigma_m,
                                double& rotation_sigma_rad) noexcept {
-  const Eigen::Matrix<double, 6, 6> H = information;
-  double variance[2] = {0, 0};
-  for (int i = 0; i < 6; ++i) {
-    Eigen::Matrix<double, 6, 1> unit = Eigen::Matrix<double, 6, 1>::Zero(), column;
-    unit[i] = -1;
-    if (!solve_normal_equations<6>(H, unit, 0, 1e-12, column)) return false;
-    variance[i / 3] += column[i];
-  }
-  position_sigma_m = std::sqrt(variance[0]);
-  rotation_sigma_rad = std::sqrt(variance[1]);
+  Matrix6<double> covariance;
+  if (!invert_normal_equations<6>(information, 1e-12, covariance)) return false;
+  position_sigma_m = std::sqrt(covariance.diagonal().head<3>().sum());
+  rotation_sigma_rad = std::sqrt(covariance.diagonal().tail<3>().sum());
   return true;
 }
 

@@ -21,6 +21,17 @@ struct MotionDistanceOptions {
   UnknownDepth unknown_depth;  ///< of all others
 };
 
+/// A motion of the camera, and how well it is known.
+template <typename Scalar>
+struct UncertainMotion {
+  SE3<Scalar> T_cur_prev;
+  /// Of xi = (translation, rotation) in exp(xi) T_cur_prev: m^2, m rad, rad^2; zero: the motion is exact.
+  Eigen::Matrix<Scalar, 6, 6, Eigen::DontAlign> covariance = Eigen::Matrix<Scalar, 6, 6, Eigen::DontAlign>::Zero();
+
+  UncertainMotion() noexcept = default;
+  CFP_INLINE UncertainMotion(const SE3<Scalar>& exact) noexcept : T_cur_prev(exact) {}
+};
+
 inline namespace CFP_ISA {
 
 [[nodiscard]] constexpr OptionPath invalid_field(const MotionDistanceOptions& o) noexcept {
@@ -28,16 +39,20 @@ inline namespace CFP_ISA {
   return nested("unknown_depth", invalid_field(o.unknown_depth));
 }
 
-/// d = sigma sqrt(r^T (sigma^2 I + sigma_z^2 J J^T)^-1 r), in pixels, with r = pixel_cur - project(T_cur_prev X), X the
-/// previous pixel at its depth z, and J = d project / d z: the Mahalanobis distance of the pair, times sigma_px, so
-/// that (d / sigma)^2 has two degrees of freedom. The part of r along the epipolar line counts as far as the depth
-/// explains none of it. A plane, a rotation or a resting camera is no special case. A depth that is not positive or not
-/// finite: see UnknownDepth. no_distance for a pixel without a ray, a point behind the current camera, or anything not
-/// finite. sigma_px > 0. Not in the paper.
-template <typename Camera, typename Scalar>
-[[nodiscard]] Scalar motion_distance(const Vector2<Scalar>& pixel_prev, const non_deduced<Scalar>& depth_prev,
-                                     const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
-                                     const Camera& camera, const non_deduced<Scalar>& sigma_px,
+/// d = sigma sqrt(r^T (sigma^2 I + sigma_z^2 J J^T + M C M^T)^-1 r), in pixels, with r = pixel_cur - project(p), p =
+/// T_cur_prev X, X the previous pixel at its depth z, J = d project / d z, M = d project / d xi and C the motion's
+/// covariance: the Mahalanobis distance of the pair, times sigma_px, so that (d / sigma)^2 has two degrees of freedom.
+/// The part of r along the epipolar line counts as far as the depth explains none of it, and what the motion's own
+/// error explains counts for nothing: the motion of a room that is far says little of what is near. A plane, a rotation
+/// or a resting camera is no special case. A depth that is not positive or not finite: see UnknownDepth. no_distance
+/// for a pixel without a ray, a point behind the current camera, or anything not finite. sigma_px > 0. Not in the
+/// paper.
+template <typename Camera, typename Scalar = typename Camera::ScalarType>
+[[nodiscard]] Scalar motion_distance(const Vector2<non_deduced<Scalar>>& pixel_prev,
+                                     const non_deduced<Scalar>& depth_prev,
+                                     const Vector2<non_deduced<Scalar>>& pixel_cur,
+                                     const UncertainMotion<non_deduced<Scalar>>& motion, const Camera& camera,
+                                     const non_deduced<Scalar>& sigma_px,
                                      const MotionDistanceOptions& options) noexcept {
   using std::sqrt;
   const Scalar none = Scalar(no_distance<double>);
@@ -47,15 +62,29 @@ template <typename Camera, typename Scalar>
   const Scalar z = measured ? depth_prev : Scalar(1 / options.unknown_depth.inverse_mean);
   const Scalar sigma_z = measured ? Scalar(options.depth_noise.sigma_m(static_cast<double>(z)))
                                   : z * z * Scalar(options.unknown_depth.inverse_sigma);
-  const Vector3<Scalar> turned = T_cur_prev.rotation * ray;
+  const Vector3<Scalar> turned = motion.T_cur_prev.rotation * ray, point = turned * z + motion.T_cur_prev.translation;
   Vector2<Scalar> projected;
   Matrix23<Scalar> jacobian;
-  if (!camera.project(turned * z + T_cur_prev.translation, projected, &jacobian)) return none;
+  if (!camera.project(point, projected, &jacobian)) return none;
   const Vector2<Scalar> r = pixel_cur - projected, along = jacobian * turned;
-  // Sherman and Morrison: the inverse of I + kappa J J^T takes r its part along J but for 1 / (1 + kappa |J|^2).
+  Eigen::Matrix<Scalar, 2, 6> by_motion;
+  by_motion.template leftCols<3>() = jacobian;
+  by_motion.template rightCols<3>() = -jacobian * hat(point);
+  const Scalar per_variance = Scalar(1) / (sigma_px * sigma_px);
+  const Eigen::Matrix<Scalar, 2, 6> spread_by_motion = by_motion.lazyProduct(motion.covariance) * per_variance;
+  // W = I + M C M^T / sigma^2, and its inverse.
+  const Scalar a = Scalar(1) + spread_by_motion.row(0).dot(by_motion.row(0)),
+               b = spread_by_motion.row(0).dot(by_motion.row(1)),
+               c = Scalar(1) + spread_by_motion.row(1).dot(by_motion.row(1)), det = a * c - b * b;
+  const auto times_inverse = [&](const Vector2<Scalar>& v) {
+    return Vector2<Scalar>((c * v[0] - b * v[1]) / det, (a * v[1] - b * v[0]) / det);
+  };
+  // Sherman and Morrison: the inverse of W + kappa J J^T takes r its part along J but for 1 / (1 + kappa J^T W^-1 J).
+  const Vector2<Scalar> along_w = times_inverse(along);
   const Scalar spread = sigma_z / sigma_px, kappa = spread * spread;
-  const Scalar explained = r.dot(along), length_sq = along.squaredNorm();
-  const Scalar distance_sq = r.squaredNorm() - explained * explained * (kappa / (Scalar(1) + kappa * length_sq));
+  const Scalar explained = r.dot(along_w), length_sq = along.dot(along_w);
+  const Scalar distance_sq =
+      r.dot(times_inverse(r)) - explained * explained * (kappa / (Scalar(1) + kappa * length_sq));
   const Scalar distance = sqrt(distance_sq > Scalar(0) ? distance_sq : Scalar(0));
   return has_distance(distance) && is_finite(distance_sq) ? distance : none;
 }
@@ -63,14 +92,14 @@ template <typename Camera, typename Scalar>
 /// motion_distance of every pair. `depths_prev` may be empty: none is known. Sizes must agree. Allocates nothing.
 template <typename Camera, typename Scalar = typename Camera::ScalarType>
 void motion_distances(const PointSpan<non_deduced<Scalar>, 2>& prev, span<const non_deduced<Scalar>> depths_prev,
-                      const PointSpan<non_deduced<Scalar>, 2>& cur, const SE3<non_deduced<Scalar>>& T_cur_prev,
+                      const PointSpan<non_deduced<Scalar>, 2>& cur, const UncertainMotion<non_deduced<Scalar>>& motion,
                       const Camera& camera, non_deduced<Scalar> sigma_px, const MotionDistanceOptions& options,
                       span<non_deduced<Scalar>> out) noexcept {
   CFP_ASSERT(prev.size() == out.size() && cur.size() == out.size());
   CFP_ASSERT(detail::fits(out.size(), depths_prev));
   for (std::size_t i = 0; i < out.size(); ++i) {
     const Scalar depth = depths_prev.empty() ? Scalar(0) : depths_prev[i];
-    out[i] = motion_distance(prev[i], depth, cur[i], T_cur_prev, camera, sigma_px, options);
+    out[i] = motion_distance(prev[i], depth, cur[i], motion, camera, sigma_px, options);
   }
 }
 

@@ -52,6 +52,21 @@ template <int N>
   return true;
 }
 
+// Of H + damping diag H with a unit diagonal, `scale` on either side, the inverse of its Cholesky factor; what
+// solve_normal_equations says of it.
+template <int N>
+[[nodiscard]] bool invert_scaled(const Eigen::Matrix<double, N, N>& H, double damping, double tolerance,
+                                 Eigen::Matrix<double, N, 1>& scale, Eigen::Matrix<double, N, N>& T) noexcept {
+  if (!(H.diagonal().array() > 0).all() || !H.diagonal().allFinite()) return false;
+  scale = H.diagonal().cwiseSqrt().cwiseInverse();
+  T = scale.asDiagonal() * H.transpose() * scale.asDiagonal();
+  T.diagonal().setConstant(1 + damping);
+  if (!invert_triangle(T)) return false;
+  // A row of the inverse triangle is v over the root of its pivot.
+  const double spread = T.cwiseAbs().rowwise().sum().maxCoeff();
+  return tolerance * spread * spread < 1;
+}
+
 }  // namespace CFP_ISA
 }  // namespace cfp::detail
 
@@ -68,17 +83,24 @@ template <int N>
                                           double damping, double tolerance,
                                           Eigen::Matrix<double, N, 1>& step) noexcept {
   using Vector = Eigen::Matrix<double, N, 1>;
-  if (!(H.diagonal().array() > 0).all() || !H.diagonal().allFinite()) return false;
-  const Vector scale = H.diagonal().cwiseSqrt().cwiseInverse();
-  Eigen::Matrix<double, N, N> T = scale.asDiagonal() * H.transpose() * scale.asDiagonal();
-  T.diagonal().setConstant(1 + damping);
-  if (!detail::invert_triangle(T)) return false;
-  // A row of the inverse triangle is v over the root of its pivot.
-  const double spread = T.cwiseAbs().rowwise().sum().maxCoeff();
-  if (!(tolerance * spread * spread < 1)) return false;
+  Vector scale;
+  Eigen::Matrix<double, N, N> T;
+  if (!detail::invert_scaled(H, damping, tolerance, scale, T)) return false;
   const Vector scaled = scale.cwiseProduct(g), reduced = T.lazyProduct(scaled);
   step = -scale.cwiseProduct(T.transpose().lazyProduct(reduced));
   return step.allFinite();
+}
+
+/// The inverse of H, which makes a covariance of an information; false, and the inverse meaningless, where
+/// solve_normal_equations would be.
+template <int N>
+[[nodiscard]] bool invert_normal_equations(const Eigen::Matrix<double, N, N>& H, double tolerance,
+                                           Eigen::Matrix<double, N, N>& inverse) noexcept {
+  Eigen::Matrix<double, N, 1> scale;
+  Eigen::Matrix<double, N, N> T;
+  if (!detail::invert_scaled(H, 0, tolerance, scale, T)) return false;
+  inverse = scale.asDiagonal() * T.transpose().lazyProduct(T) * scale.asDiagonal();
+  return inverse.allFinite();
 }
 
 /// By how much the quadratic model falls with that step: step^T (damping diag(H) step - g).
