@@ -31,6 +31,8 @@ template <typename Scalar>
 struct CameraMotion : UncertainMotion<Scalar> {
   bool known = false;
   Scalar sigma_px = Scalar(1);  ///< standard deviation of one coordinate of a static flow pair, robust
+
+  CFP_INLINE CameraMotion() noexcept {}
 };
 
 /// Scratch memory, reused: after a call, calls of at most the same sizes allocate nothing.

@@ -56,6 +56,8 @@ struct FlowModel {
   Matrix3<Scalar> matrix = Matrix3<Scalar>::Zero();     ///< F or H, previous to current
   UncertainMotion<Scalar> motion;                       ///< of kind motion; the caller's counts as exact
   Scalar sigma_px = Scalar(0);  ///< noise of one coordinate, measured on the pairs on no object; 0: not measured
+
+  CFP_INLINE FlowModel() noexcept {}
 };
 
 /// Scratch memory, reused: after a call, calls of at most the same sizes allocate nothing.

@@ -28,7 +28,7 @@ struct UncertainMotion {
   /// Of xi = (translation, rotation) in exp(xi) T_cur_prev: m^2, m rad, rad^2; zero: the motion is exact.
   Eigen::Matrix<Scalar, 6, 6, Eigen::DontAlign> covariance = Eigen::Matrix<Scalar, 6, 6, Eigen::DontAlign>::Zero();
 
-  UncertainMotion() noexcept = default;
+  CFP_INLINE UncertainMotion() noexcept {}  // out of line, what zeroes a matrix is shared by units of other flags
   CFP_INLINE UncertainMotion(const SE3<Scalar>& exact) noexcept : T_cur_prev(exact) {}
 };
 
