@@ -27,8 +27,8 @@ inline cv::Mat annotate(const cv::Mat& bgr, const RunFrame& frame) {
     const cv::Scalar colour = box.compensated ? cv::Scalar(0, 140, 255) : cv::Scalar(0, 225, 255);
     const cv::Point corner(static_cast<int>(box.box.x1), static_cast<int>(box.box.y1));
     cv::rectangle(picture, corner, {static_cast<int>(box.box.x2), static_cast<int>(box.box.y2)}, colour, 2);
-    const std::string text = std::to_string(box.id) + " O " +
-                             (box.object_known ? cfp_examples::fixed(box.object_probability, 2) : "unknown") +
+    const std::string text = std::to_string(box.id) +
+                             ": O=" + (box.object_known ? cfp_examples::fixed(box.object_probability, 2) : "unknown") +
                              (box.compensated ? " compensated" : "");
     const cv::Point place(std::max(corner.x + 4, 4), std::max(corner.y + 16, 16));
     cv::putText(picture, text, place, cv::FONT_HERSHEY_SIMPLEX, 0.45, {0, 0, 0}, 3, cv::LINE_AA);
