@@ -32,7 +32,7 @@ struct CameraMotion : UncertainMotion<Scalar> {
   bool known = false;
   Scalar sigma_px = Scalar(1);  ///< standard deviation of one coordinate of a static flow pair, robust
 
-  CFP_INLINE CameraMotion() noexcept {}
+  CFP_INLINE CameraMotion() noexcept {}  // NOLINT(modernize-use-equals-default): inline
 };
 
 /// Scratch memory, reused: after a call, calls of at most the same sizes allocate nothing.

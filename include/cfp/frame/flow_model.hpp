@@ -57,7 +57,7 @@ struct FlowModel {
   UncertainMotion<Scalar> motion;                       ///< of kind motion; the caller's counts as exact
   Scalar sigma_px = Scalar(0);  ///< noise of one coordinate, measured on the pairs on no object; 0: not measured
 
-  CFP_INLINE FlowModel() noexcept {}
+  CFP_INLINE FlowModel() noexcept {}  // NOLINT(modernize-use-equals-default): inline
 };
 
 /// Scratch memory, reused: after a call, calls of at most the same sizes allocate nothing.

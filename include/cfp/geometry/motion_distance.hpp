@@ -28,7 +28,8 @@ struct UncertainMotion {
   /// Of xi = (translation, rotation) in exp(xi) T_cur_prev: m^2, m rad, rad^2; zero: the motion is exact.
   Eigen::Matrix<Scalar, 6, 6, Eigen::DontAlign> covariance = Eigen::Matrix<Scalar, 6, 6, Eigen::DontAlign>::Zero();
 
-  CFP_INLINE UncertainMotion() noexcept {}  // out of line, what zeroes a matrix is shared by units of other flags
+  // Inline: a default one may stand out of line, and what zeroes a matrix must not be shared by units of other flags.
+  CFP_INLINE UncertainMotion() noexcept {}  // NOLINT(modernize-use-equals-default)
   CFP_INLINE UncertainMotion(const SE3<Scalar>& exact) noexcept : T_cur_prev(exact) {}
 };
 
