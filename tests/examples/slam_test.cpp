@@ -472,7 +472,7 @@ TEST_CASE("A detector that is late is noticed, and what was known to move stays 
   } observer;
   Options options;
   options.threads = false;
-  options.detector_lag.min_boxes = 6;
+  options.detector_lag.min_boxes = 4;
   run_slam(sequence, detector, options, observer);
   CHECK(observer.late_frames >= 5);
   CHECK(observer.compared >= 20);

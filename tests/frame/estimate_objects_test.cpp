@@ -12,6 +12,23 @@ using cfp_test::DynamicScene;
 using cfp_test::FrameRun;
 using cfp_test::make_dynamic_scene;
 
+namespace {
+
+// A flow pair of a scene whose camera motion is set: the pixel (x, y) at depth z, whose point has moved along x.
+void add_pair(DynamicScene<double>& scene, const cfp::Vector2<double>& from, double z, double shift_m, double noise_px,
+              cfp::Random& random) {
+  cfp::Vector3<double> ray;
+  cfp::Vector2<double> pixel(0, 0);
+  (void)scene.camera.unproject(from, ray);
+  (void)scene.camera.project(scene.T_cur_prev * (ray * z) + cfp::Vector3<double>(shift_m, 0, 0), pixel);
+  scene.previous_keypoints.push_back({from.x(), from.y()});
+  scene.keypoints.push_back({pixel.x() + noise_px * random.normal(), pixel.y() + noise_px * random.normal()});
+  scene.depths.push_back(z);
+  scene.match.push_back(cfp::no_match);
+}
+
+}  // namespace
+
 TEST_CASE("The host's F is taken as it is", "[frame]") {
   const DynamicScene<double> scene = make_dynamic_scene<double>({}, 61);
   FrameRun<double> run(scene);
@@ -140,15 +157,9 @@ struct SpilledMask {
   explicit SpilledMask(double person_motion_m, std::uint64_t seed) : pixels(640 * 480, 0) {
     cfp::Random random(seed, "spilled mask");
     scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.02, 0.002, 0.004, 0.001, -0.002, 0.001));
-    const auto add = [&](double x, double y, double depth, double measured, double shift) {
-      cfp::Vector3<double> ray;
-      cfp::Vector2<double> pixel(0, 0);
-      (void)scene.camera.unproject(cfp::Vector2<double>(x, y), ray);
-      (void)scene.camera.project(scene.T_cur_prev * (ray * depth) + cfp::Vector3<double>(shift, 0, 0), pixel);
-      scene.previous_keypoints.push_back({x, y});
-      scene.keypoints.push_back({pixel.x() + 0.1 * random.normal(), pixel.y() + 0.1 * random.normal()});
-      scene.depths.push_back(measured);
-      scene.match.push_back(cfp::no_match);
+    const auto add = [&](double x, double y, double z, double measured, double shift) {
+      add_pair(scene, {x, y}, z, shift, 0.1, random);
+      scene.depths.back() = measured;
     };
     for (int k = 0; k < 120; ++k) {
       const double z = random.uniform(1.4, 1.6);
@@ -220,15 +231,8 @@ TEST_CASE("What a box leaves out of its person does not outvote what lies behind
       cfp::Random random(seed, "close person");
       DynamicScene<double> scene;
       scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.002, 0.001, 0.001, 0.001, -0.002, 0.001));
-      const auto add = [&](double x, double y, double depth, double shift) {
-        cfp::Vector3<double> ray;
-        cfp::Vector2<double> pixel(0, 0);
-        (void)scene.camera.unproject(cfp::Vector2<double>(x, y), ray);
-        (void)scene.camera.project(scene.T_cur_prev * (ray * depth) + cfp::Vector3<double>(shift, 0, 0), pixel);
-        scene.previous_keypoints.push_back({x, y});
-        scene.keypoints.push_back({pixel.x() + 0.1 * random.normal(), pixel.y() + 0.1 * random.normal()});
-        scene.depths.push_back(depth);
-        scene.match.push_back(cfp::no_match);
+      const auto add = [&](double x, double y, double z, double shift) {
+        add_pair(scene, {x, y}, z, shift, 0.1, random);
       };
       for (int k = 0; k < 500; ++k)
         add(random.uniform(200, 440), random.uniform(75, 470), random.uniform(0.65, 0.75), person_motion_m);
@@ -254,14 +258,7 @@ TEST_CASE("The motion that a far, bare wall gives does not make a near person at
       DynamicScene<double> scene;
       scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.005, 0.002, 0.004, 0.001, -0.002, 0.001));
       const auto add = [&](double x, double y, double z, double shift) {
-        cfp::Vector3<double> ray;
-        cfp::Vector2<double> pixel(0, 0);
-        (void)scene.camera.unproject(cfp::Vector2<double>(x, y), ray);
-        (void)scene.camera.project(scene.T_cur_prev * (ray * z) + cfp::Vector3<double>(shift, 0, 0), pixel);
-        scene.previous_keypoints.push_back({x, y});
-        scene.keypoints.push_back({pixel.x() + 0.2 * random.normal(), pixel.y() + 0.2 * random.normal()});
-        scene.depths.push_back(z);
-        scene.match.push_back(cfp::no_match);
+        add_pair(scene, {x, y}, z, shift, 0.2, random);
       };
       for (int k = 0; k < 60; ++k) {
         const double x = random.uniform(20, 200);
