@@ -52,8 +52,8 @@ template <int N>
   return true;
 }
 
-// Of H + damping diag H with a unit diagonal, `scale` on either side, the inverse of its Cholesky factor; what
-// solve_normal_equations says of it.
+// The inverse of the Cholesky factor of H + damping diag H, scaled to a unit diagonal: by `scale` on either side. False
+// where solve_normal_equations is.
 template <int N>
 [[nodiscard]] bool invert_scaled(const Eigen::Matrix<double, N, N>& H, double damping, double tolerance,
                                  Eigen::Matrix<double, N, 1>& scale, Eigen::Matrix<double, N, N>& T) noexcept {
