@@ -4,9 +4,10 @@
 // O, and how well O tells moving people from still ones (AUC; a box is moving when at least half, still when at most 2
 // % of its person pixels move). Supports cfp::OpticalFlowOptions, and edge_px of cfp::sample_depth: rendered depth fits
 // its image to the pixel, so --depth spoils it as sensors do: of the frame before, shifted by 6 and 3 px, or what is
-// near widened by 6 px, as stereo matching does. --masks gives the people's pixels in the place of boxes, cut (below 0)
-// or grown by so many px, as networks do.
-//   cfp_object_flow_study [--depth late|shifted|widened] [--masks PX] [--smoke | --frames N | TUM_FOLDER...]   instead
+// near widened by 6 px, as stereo matching does; or there is none, as with one camera. --masks gives the people's
+// pixels in the place of boxes, cut (below 0) or grown by so many px, as networks do.
+//   cfp_object_flow_study [--depth late|shifted|widened|none] [--masks PX] [--smoke | --frames N | TUM_FOLDER...]
+//   instead
 // of rendering, folders of cfp_synthetic; one without labels, with a detections.txt, gives times and mean O alone (as
 // "partly")
 #include <algorithm>
@@ -59,7 +60,7 @@ struct Candidate {
   std::vector<char> is_static{};
   double still_sum = 0, moving_sum = 0, partly_sum = 0, pairs = 0;
   std::size_t still = 0, moving = 0, partly = 0, unknown = 0, frames = 0, still_passed = 0, moving_passed = 0,
-              no_model = 0, homographies = 0;
+              no_model = 0, up_to_scale = 0;
 };
 
 double processor_ms() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
@@ -203,7 +204,10 @@ void judge(std::vector<Candidate>& all, const std::vector<Image>& images, const 
       cfp::Frame<float> frame;
       std::vector<float> depths_m(pairs.first.size());
       const Image& before = images[k - 1];
-      cfp::sample_depth(before.depth, cfp::view(pairs.first), before.metres_per_unit, depths_m, c.edge_px);
+      if (before.depth.empty())
+        depths_m.clear();
+      else
+        cfp::sample_depth(before.depth, cfp::view(pairs.first), before.metres_per_unit, depths_m, c.edge_px);
       frame.flow = {cfp::view(pairs.first), cfp::view(pairs.second), depths_m};
       if (!images[k].mask.empty()) frame.labels = cfp::label_view(images[k].mask);
       cfp::begin_frame(frame, state);
@@ -223,7 +227,7 @@ void judge(std::vector<Candidate>& all, const std::vector<Image>& images, const 
       c.pairs += static_cast<double>(pairs.first.size());
       ++c.frames;
       c.no_model += result.flow_model == cfp::FlowModelKind::none ? 1U : 0U;
-      c.homographies += result.flow_model == cfp::FlowModelKind::homography ? 1U : 0U;
+      c.up_to_scale += result.flow_model == cfp::FlowModelKind::motion_up_to_scale ? 1U : 0U;
       for (std::size_t b = 0; b < objects.size(); ++b) {
         const double share = images[k].people[b].moving_share, o = objects[b].static_probability;
         if (objects[b].status != cfp::Status::ok) ++c.unknown;
@@ -245,6 +249,7 @@ void judge(std::vector<Candidate>& all, const std::vector<Image>& images, const 
 
 // The depth image as another sensor would have it.
 cv::Mat spoiled(const cv::Mat& depth, const std::string& how, cv::Mat& last) {
+  if (how == "none") return {};
   cv::Mat out = depth.clone();
   if (how == "late" && last.size() == depth.size()) out = last;
   if (how == "shifted")
@@ -266,7 +271,7 @@ void finish(Image& image, const cv::Mat& bgr, cv::ORB& orb) {
 void print(const std::vector<Candidate>& all) {
   std::printf("%-36s %6s | %6s %6s %6s %6s %6s | %7s %7s %7s | %7s %7s | %7s %5s %5s | %4s %4s %4s\n", "", "pairs",
               "flow", "F, O", "sum", "95 %", "ratio", "AUC", "still>", "moving>", "O still", "moving", "partly",
-              "boxes", "unkn.", "F", "H", "none");
+              "boxes", "unkn.", "T, F", "T~", "none");
   for (const Candidate& c : all) {
     const auto auc = cfp::roc_auc(c.score, c.is_static);
     const auto mean = [](double sum, std::size_t n) { return n > 0 ? sum / static_cast<double>(n) : 0.0; };
@@ -277,8 +282,8 @@ void print(const std::vector<Candidate>& all) {
         quantile(c.total_ms, 0.5), quantile(c.total_ms, 0.95),
         quantile(c.total_ms, 0.5) / quantile(all[0].total_ms, 0.5), auc.auc, mean(double(c.still_passed), c.still),
         mean(double(c.moving_passed), c.moving), mean(c.still_sum, c.still), mean(c.moving_sum, c.moving),
-        mean(c.partly_sum, c.partly), c.still + c.moving + c.partly, c.unknown, c.frames - c.no_model - c.homographies,
-        c.homographies, c.no_model);
+        mean(c.partly_sum, c.partly), c.still + c.moving + c.partly, c.unknown, c.frames - c.no_model - c.up_to_scale,
+        c.up_to_scale, c.no_model);
   }
 }
 
@@ -296,8 +301,8 @@ int main(int argc, char** argv) {
       smoke = true;
     } else if (word == "--depth" && i + 1 < argc) {
       depth_is = argv[++i];
-      if (depth_is != "late" && depth_is != "shifted" && depth_is != "widened") {
-        std::fprintf(stderr, "--depth: late, shifted or widened, not '%s'\n", depth_is.c_str());
+      if (depth_is != "late" && depth_is != "shifted" && depth_is != "widened" && depth_is != "none") {
+        std::fprintf(stderr, "--depth: late, shifted, widened or none, not '%s'\n", depth_is.c_str());
         return 2;
       }
     } else if (word == "--masks" && i + 1 < argc) {

@@ -3,7 +3,8 @@
 // of scoring: AUC; moving people missed at 5 % false alarms, over all and in the worst cell from 0.5 m/s on; static
 // people called moving (O <= O_Th) at each noise; share of the frames in which O is known.
 // Then the same in a bare room, whose motion says little of a person who is near; "motion taken as exact" leaves its
-// covariance out.
+// covariance out. Then with one camera, no depths at all, in five kinds of scene and at three frame rates: with the
+// fundamental matrix alone, and with the motion up to scale where there is none.
 //   cfp_object_motion_study [N per cell, default 20] [seed, default 1] | --smoke
 //
 // The simulator: 640 x 480 at 30 Hz, f = 535 px. Camera: still; sideways or forward 0.3 m/s; rotating 20 deg/s; both;
@@ -12,7 +13,8 @@
 // motion, along the axis or with the camera at 0.2 to 2 m/s, limbs at +-30 % of it. Noise 0.1 to 0.4 px per coordinate,
 // 4 % of the points up to 6 px off, depth noise of structured light; wrong depths: a point of the person has the depth
 // of what is behind it, a point beside it the person's. The bare room has 60 points, no furniture and a person at 0.8
-// to 1.6 m.
+// to 1.6 m; a cluttered one 0.8 to 4.5 m in cells of 40 x 50 px; a floor with a slanted wall; a street with houses on
+// both sides, 40 m long, a person at 3 to 10 m.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -32,7 +34,6 @@ using V2 = cfp::Vector2<double>;
 using V3 = cfp::Vector3<double>;
 
 const cfp::PinholeCamera<double> camera{535.4, 539.2, 320.1, 247.6};
-constexpr double frame_s = 1 / 30.0;
 constexpr std::array<double, 5> noises = {0.1, 0.15, 0.2, 0.3, 0.4};
 const std::array<const char*, 6> cameras = {"still", "sideways", "forward", "rotating", "both", "slow"};
 const std::array<const char*, 5> people = {"at rest", "across", "along", "axis", "with"};
@@ -66,26 +67,41 @@ void draw_camera(std::size_t kind, cfp::Random& random, V3& velocity, V3& turn) 
   if (kind == 5) velocity = 0.05 * any.normalized();
 }
 
+double bare_depth(const V2& p) {
+  const double floor = p.y() > 300 ? 1.35 * camera.fy / (p.y() - camera.cy) : 1e9;
+  return std::min(4.2 + 0.001 * (p.x() - 320), floor);
+}
+double furnished_depth(const V2& p) {
+  const double column = std::floor(p.x() / 70), row = std::floor(p.y() / 90);
+  return std::min(bare_depth(p), std::fmod(column * 7 + row * 3, 5) < 1 ? 2.2 + 0.2 * std::fmod(column, 4) : 1e9);
+}
+double cluttered_depth(const V2& p) {
+  return 0.8 + 0.37 * std::fmod(std::floor(p.x() / 40) * 7 + std::floor(p.y() / 50) * 3, 11);
+}
+double slanted_depth(const V2& p) {
+  return std::min(1.35 * camera.fy / std::max(p.y() - camera.cy + 100, 1.0), 2 + 4 * p.x() / 640);
+}
+double street_depth(const V2& p) {
+  const double houses = 2000 / std::max(std::abs(p.x() - 320) - 100, 1.0);
+  return std::min({1.5 * camera.fy / std::max(p.y() - camera.cy, 1.0), houses, 40.0});
+}
+
 struct Room {
   const char* name;
   int points;
-  bool furnished;
+  double (*depth)(const V2& pixel);
   double nearest_m, farthest_m;  // a person in it
 };
-constexpr std::array<Room, 2> rooms = {
-    {{"a furnished room", 350, true, 1.5, 3.5}, {"a bare room", 60, false, 0.8, 1.6}}};
-
-/// Depth of the room at a pixel.
-double room_depth(const Room& room, const V2& p) {
-  const double column = std::floor(p.x() / 70), row = std::floor(p.y() / 90);
-  const double floor = p.y() > 300 ? 1.35 * camera.fy / (p.y() - camera.cy) : 1e9;
-  const double furniture =
-      room.furnished && std::fmod(column * 7 + row * 3, 5) < 1 ? 2.2 + 0.2 * std::fmod(column, 4) : 1e9;
-  return std::min({4.2 + 0.001 * (p.x() - 320), floor, furniture});
-}
+constexpr std::array<Room, 5> rooms = {{{"a furnished room", 350, furnished_depth, 1.5, 3.5},
+                                        {"a bare room", 60, bare_depth, 0.8, 1.6},
+                                        {"a cluttered room", 200, cluttered_depth, 1, 3},
+                                        {"a floor and a slanted wall", 200, slanted_depth, 1.5, 3.5},
+                                        {"a street", 250, street_depth, 3, 10}}};
+constexpr std::size_t rooms_with_depth = 2;
 
 /// One frame. `who` draws the camera's motion and the person, `random` the points and the noise.
-Scene simulate(const Cell& cell, const Room& room, double wrong_depths, cfp::Random& who, cfp::Random& random) {
+Scene simulate(const Cell& cell, const Room& room, double frame_s, double wrong_depths, cfp::Random& who,
+               cfp::Random& random) {
   Scene scene;
   V3 velocity, turn;
   draw_camera(cell.camera, who, velocity, turn);
@@ -121,7 +137,7 @@ Scene simulate(const Cell& cell, const Room& room, double wrong_depths, cfp::Ran
     const V2 p(random.uniform(6, 633), random.uniform(6, 473));
     const double beside =
         std::pow((p.x() - centre.x()) / half_width, 2) + std::pow((p.y() - centre.y()) / half_height, 2);
-    if (beside > 1) add(p, room_depth(room, p), V3::Zero(), beside < 1.5 ? z : room_depth(room, p));
+    if (beside > 1) add(p, room.depth(p), V3::Zero(), beside < 1.5 ? z : room.depth(p));
   }
   const int on_person = static_cast<int>(who.uniform(30, 120));
   for (int i = 0; i < on_person; ++i) {
@@ -129,28 +145,29 @@ Scene simulate(const Cell& cell, const Room& room, double wrong_depths, cfp::Ran
     const V2 p(centre.x() + half_width * radius * std::cos(angle), centre.y() + half_height * radius * std::sin(angle));
     const V3 limb(random.normal(), random.normal(), random.normal());
     add(p, z + 0.08 * random.normal(), frame_s * (random.uniform(0.7, 1.3) * walk + 0.2 * walk.norm() * limb),
-        room_depth(room, p));
+        room.depth(p));
   }
   return scene;
 }
 
 struct Way {
-  const char* name;
+  const char* name = "";
   cfp::FrameOptions options;
-  double share_of_depths = 1;
+  double share_of_depths = 1;  // 1, every second or none
   bool exact_motion = false;
 };
 
 std::vector<Way> ways() {
   std::vector<Way> all(8);
   all[0].name = "as printed";
-  all[1].name = "epipolar, noise measured";
+  all[1].name = "without depths";
   all[2].name = "depth";
   all[3].name = "depth, at 0.1 0.2 0.3 M";
   all[4].name = "depth, noise not measured";
   all[5].name = "depth, all pairs in the box";
   all[6].name = "depth of every second pair";
   all[7].name = "depth, motion taken as exact";
+  all[0].options.coarse.flow.use_motion_up_to_scale = false;
   all[0].options.coarse.flow.use_depth = all[1].options.coarse.flow.use_depth = false;
   all[0].options.coarse.object.noise_factor = all[4].options.coarse.object.noise_factor = 0;
   all[0].options.coarse.object.positions = all[3].options.coarse.object.positions = {0.1, 0.2, 0.3};
@@ -208,11 +225,40 @@ void report(const char* name, const std::vector<Outcome>& outcomes, double thres
     most = count[0] / count[1];
     worst = cell;
   }
-  std::printf("%-28s %6.4f %6.2f %% %6.1f %%  ", name, area,
+  std::printf("%-38s %6.4f %6.2f %% %6.1f %%  ", name, area,
               100.0 * static_cast<double>(missed) / static_cast<double>(moving.size()), 100 * most);
   for (const auto& count : called) std::printf("%6.1f", 100 * count[0] / count[1]);
   std::printf(" %% %6.1f %%   %s\n", 100 * known / static_cast<double>(outcomes.size()),
               most > 0 && worst != nullptr ? worst->name().c_str() : "");
+}
+
+/// O of every cell, `repetitions` scenes each (at rest four times as many), as a row of the table.
+void judge(const char* name, const Way& way, const std::vector<Cell>& cells, const Room& room, double frame_s,
+           double wrong_depths, int repetitions, std::uint64_t seed) {
+  cfp::Random random(seed, "object_motion_study");
+  cfp::FrameState<double> state;
+  std::vector<Outcome> outcomes;
+  for (const Cell& cell : cells) {
+    for (int i = 0; i < repetitions * (cell.at_rest() ? 4 : 1); ++i) {
+      Scene scene = simulate(cell, room, frame_s, wrong_depths, random, random);
+      for (std::size_t k = 0; k < scene.depths.size(); ++k) {
+        if (static_cast<double>(k % 2) >= 2 * way.share_of_depths) scene.depths[k] = -1;
+      }
+      cfp::Frame<double> frame;
+      frame.flow = {scene.previous, scene.current, scene.depths};
+      if (way.exact_motion) give_motion(scene, frame);
+      state.boxes.resize(1);
+      state.boxes[0].box = scene.box;
+      estimate_objects(frame, camera, way.options, state);
+      outcomes.push_back({&cell, state.objects[0].static_probability, state.objects[0].status == cfp::Status::ok});
+    }
+  }
+  report(name, outcomes, way.options.object_threshold);
+}
+
+void print_head(const char* title) {
+  std::printf("\n%s\n%-38s %6s %8s %8s  %32s %8s\n", title, "O from", "AUC", "missed", "worst",
+              "static called moving at 0.1..0.4", "known");
 }
 
 /// O over time: a person walks for a second, rests for one and a half, walks again. Printed: boxes static within 1 s of
@@ -231,9 +277,9 @@ void follow(const char* name, const cfp::FrameOptions& options, const Room& room
           const bool walks = k < 30 || k >= 75;
           cfp::Random who(sequence, "person");
           const Cell cell{c, walks ? 1U : 0U, n, walks ? speed : 0};
-          const Scene scene = simulate(cell, room, 0.1, who, random);
+          const Scene scene = simulate(cell, room, 1 / 30.0, 0.1, who, random);
           cfp::Frame<double> frame;
-          frame.timestamp_s = k * frame_s;
+          frame.timestamp_s = k / 30.0;
           frame.flow = {scene.previous, scene.current, scene.depths};
           begin_frame(frame, state);
           state.boxes.resize(1);
@@ -284,44 +330,39 @@ int main(int argc, char** argv) {
   }
 
   std::printf("%d scenes per cell, seed %llu\n", repetitions, static_cast<unsigned long long>(seed));
-  for (const Room& room : rooms) {
+  for (std::size_t r = 0; r < rooms_with_depth; ++r) {
     for (const double wrong_depths : {0.0, 0.15}) {
-      std::printf("\n%s, %.0f %% wrong depths at the silhouettes\n%-28s %6s %8s %8s  %32s %8s\n", room.name,
-                  100 * wrong_depths, "O from", "AUC", "missed", "worst", "static called moving at 0.1..0.4", "known");
-      for (const Way& way : ways()) {
-        cfp::Random random(seed, "object_motion_study");
-        cfp::FrameState<double> state;
-        std::vector<Outcome> outcomes;
-        for (const Cell& cell : cells) {
-          for (int i = 0; i < repetitions * (cell.at_rest() ? 4 : 1); ++i) {
-            Scene scene = simulate(cell, room, wrong_depths, random, random);
-            for (std::size_t k = 0; k < scene.depths.size(); ++k) {
-              if (way.share_of_depths < 1 && k % 2 == 0) scene.depths[k] = -1;
-            }
-            cfp::Frame<double> frame;
-            frame.flow = {scene.previous, scene.current, scene.depths};
-            if (way.exact_motion) give_motion(scene, frame);
-            state.boxes.resize(1);
-            state.boxes[0].box = scene.box;
-            estimate_objects(frame, camera, way.options, state);
-            outcomes.push_back(
-                {&cell, state.objects[0].static_probability, state.objects[0].status == cfp::Status::ok});
-          }
-        }
-        report(way.name, outcomes, way.options.object_threshold);
+      char title[96];
+      std::snprintf(title, sizeof title, "%s, %.0f %% wrong depths at the silhouettes", rooms[r].name,
+                    100 * wrong_depths);
+      print_head(title);
+      for (const Way& way : ways()) judge(way.name, way, cells, rooms[r], 1 / 30.0, wrong_depths, repetitions, seed);
+    }
+  }
+
+  print_head("one camera, no depths; then F alone");
+  Way one_camera;
+  one_camera.share_of_depths = 0;
+  for (const Room& room : rooms) {
+    for (const double hz : {30.0, 10.0, 5.0}) {
+      for (const bool up_to_scale : {true, false}) {
+        char name[64];
+        std::snprintf(name, sizeof name, "%s, %.0f Hz%s", room.name, hz, up_to_scale ? "" : ", F");
+        one_camera.options.coarse.flow.use_motion_up_to_scale = up_to_scale;
+        judge(name, one_camera, cells, room, 1 / hz, 0, repetitions, seed);
       }
     }
   }
 
-  for (const Room& room : rooms) {
-    std::printf("\nover time, %s, 10 %% wrong depths\n%-28s %9s  %8s  %8s  %8s\n", room.name, "", "speed", "at rest",
-                "resting", "start");
+  for (std::size_t r = 0; r < rooms_with_depth; ++r) {
+    std::printf("\nover time, %s, 10 %% wrong depths\n%-28s %9s  %8s  %8s  %8s\n", rooms[r].name, "", "speed",
+                "at rest", "resting", "start");
     for (const Way& way : ways()) {
       for (const bool memory : {false, true}) {
         cfp::FrameOptions options = way.options;
         if (!memory) options.coarse.memory.time_constant_s = 0;
         for (const double speed : {0.2, 0.5, 1.0}) {
-          follow((std::string(way.name) + (memory ? ", remembered" : "")).c_str(), options, room, speed,
+          follow((std::string(way.name) + (memory ? ", remembered" : "")).c_str(), options, rooms[r], speed,
                  (repetitions + 3) / 4, seed);
         }
       }

@@ -77,7 +77,7 @@ constexpr double last_of(cfp::Stage) { return static_cast<double>(cfp::Stage::fi
 constexpr double last_of(cfp::KeypointLabel) { return static_cast<double>(cfp::KeypointLabel::invalid); }
 constexpr double last_of(cfp::WeightReason) { return static_cast<double>(cfp::WeightReason::fallback); }
 constexpr double last_of(cfp::Status) { return static_cast<double>(cfp::Status::invalid_input); }
-constexpr double last_of(cfp::FlowModelKind) { return static_cast<double>(cfp::FlowModelKind::homography); }
+constexpr double last_of(cfp::FlowModelKind) { return static_cast<double>(cfp::FlowModelKind::motion_up_to_scale); }
 constexpr double last_of(cfp::SecondStageRule) { return static_cast<double>(cfp::SecondStageRule::low_dynamic); }
 
 // Whether the column's type has this number, and if so, sets it.

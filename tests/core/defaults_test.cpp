@@ -31,7 +31,8 @@ TEST_CASE("The defaults of the flow and of objects", "[core]") {
   const cfp::CoarseOptions& o = frame.coarse;
   CHECK((o.use_object_probability && o.use_depth_foreground && o.soft_background && o.flow_radius_px == 10));
   const cfp::FlowModelOptions& flow = o.flow;
-  CHECK((flow.min_outside_pairs == 30 && flow.margin == 0.1 && flow.use_rotation_homography && flow.use_depth));
+  CHECK((flow.min_outside_pairs == 30 && flow.margin == 0.1 && flow.use_motion_up_to_scale && flow.use_depth));
+  CHECK((flow.nearer_than_room.inverse_mean == 2.5 && flow.nearer_than_room.inverse_sigma == 1));
   CHECK((flow.motion.min_pairs == 12 && flow.motion.min_inlier_share == 0.5));
   CHECK((flow.motion.min_sigma_px == 0.05 && flow.motion.max_sigma_px == 1));
   CHECK((o.object.score == cfp::ObjectScore::survival && o.object.degrees_of_freedom == 2));
@@ -157,7 +158,7 @@ TEST_CASE("A report that nothing was counted for counts nothing", "[core]") {
   CHECK((model.calculation_confidence == 0 && model.samples == 0 && model.status == cfp::Status::not_enough_data));
   const cfp::FlowModel<double> flow;
   CHECK((flow.kind == cfp::FlowModelKind::none && flow.support == cfp::FlowSupport::none && flow.sigma_px == 0));
-  CHECK((flow.status == cfp::RansacStatus::not_enough_data && flow.matrix.isZero(0)));
+  CHECK((flow.status == cfp::RansacStatus::not_enough_data && flow.F.isZero(0)));
   const cfp::FrameMemory<double> before;
   CHECK(
       (!before.known && before.timestamp_s == 0 && before.descriptor_bytes == 0 && before.descriptor_view().size == 0));

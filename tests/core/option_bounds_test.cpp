@@ -104,6 +104,8 @@ TEST_CASE("The ends of the ranges of a frame's options", "[core]") {
       CFP_FIELD(O, tracker.image_width, (Range{0, true, 1e6, true})),
       CFP_FIELD(O, tracker.image_height, (Range{0, true, 1e6, true})),
       CFP_FIELD(O, object_threshold, inside),
+      CFP_FIELD(O, coarse.flow.nearer_than_room.inverse_mean, positive),
+      CFP_FIELD(O, coarse.flow.nearer_than_room.inverse_sigma, not_negative),
       CFP_FIELD(O, coarse.flow.motion.min_inlier_share, share),
       CFP_FIELD(O, coarse.flow.motion.distance.depth_noise.constant_m, not_negative),
       CFP_FIELD(O, coarse.flow.motion.distance.depth_noise.quadratic, not_negative),

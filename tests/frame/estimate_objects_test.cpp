@@ -278,6 +278,29 @@ TEST_CASE("The motion that a far, bare wall gives does not make a near person at
   CHECK(called_moving[1] == seeds);
 }
 
+TEST_CASE("One camera before a wall tells who walks, and does not take the parallax of who is nearer for motion",
+          "[frame]") {
+  int called_moving[2] = {0, 0};
+  constexpr int seeds = 100;
+  for (const bool walks : {false, true}) {
+    for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+      cfp::Random random(seed, "one camera");
+      DynamicScene<double> scene;
+      scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.008, 0.002, 0.002, 0.001, -0.002, 0.001));
+      for (int k = 0; k < 150; ++k)
+        add_pair(scene, {random.uniform(20, 620), random.uniform(20, 460)}, 4.2, 0, 0.2, random);
+      for (int k = 0; k < 80; ++k)
+        add_pair(scene, {random.uniform(270, 370), random.uniform(120, 420)}, 1.8, walks ? 0.03 : 0, 0.2, random);
+      scene.boxes = {{250, 100, 390, 440}};
+      FrameRun<double> run(scene);
+      run.coarse({}, run.frame(), scene.camera);
+      called_moving[walks ? 1 : 0] += run.state.objects[0].static_probability <= 0.9 ? 1 : 0;
+    }
+  }
+  CHECK(called_moving[0] <= 10);
+  CHECK(called_moving[1] >= 90);
+}
+
 TEST_CASE("A person who fills the view of a camera without depths is unknown, not at rest", "[frame]") {
   cfp_test::DynamicSceneOptions crowded;
   crowded.people = 1;

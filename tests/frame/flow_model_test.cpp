@@ -3,6 +3,8 @@
 #include <array>
 #include <vector>
 
+#include <Eigen/Cholesky>
+
 #include "cfp/core/random.hpp"
 #include "support/catch.hpp"
 #include "support/engines.hpp"
@@ -15,14 +17,14 @@ struct Room {
   std::vector<std::array<double, 2>> previous, current;
   std::vector<char> outside;
 
-  Room(const cfp::SE3<double>& T, double noise_px, std::uint64_t seed) {
+  Room(const cfp::SE3<double>& T, double noise_px, std::uint64_t seed, double near_m = 1, double far_m = 5) {
     cfp::Random random(seed, "flow model");
     while (previous.size() < 400) {
       const cfp::Vector2<double> p(random.uniform(20, 620), random.uniform(20, 460));
       cfp::Vector3<double> ray;
       cfp::Vector2<double> q;
       REQUIRE(camera.unproject(p, ray));
-      if (!camera.project(T * cfp::Vector3<double>(random.uniform(1, 5) * ray), q)) continue;
+      if (!camera.project(T * cfp::Vector3<double>(random.uniform(near_m, far_m) * ray), q)) continue;
       previous.push_back({p.x(), p.y()});
       current.push_back({q.x() + noise_px * random.normal(), q.y() + noise_px * random.normal()});
     }
@@ -43,14 +45,14 @@ cfp::SE3<double> motion(double translation_m, double rotation_rad) {
 
 }  // namespace
 
-TEST_CASE("The noise of one coordinate is measured, across lines and around mapped points", "[frame]") {
+TEST_CASE("The noise of one coordinate is measured, across lines and around predicted points", "[frame]") {
   for (const double noise : {0.1, 0.2, 0.4}) {
     for (std::uint64_t seed = 1; seed <= 4; ++seed) {
       const cfp::FlowModel<double> moving = Room(motion(0.1, 0.02), noise, seed).model();
       REQUIRE(moving.kind == cfp::FlowModelKind::fundamental);
       CHECK_THAT(moving.sigma_px, WithinAbs(noise, 0.2 * noise));
       const cfp::FlowModel<double> turning = Room(motion(0, 0.02), noise, seed).model();
-      REQUIRE(turning.kind == cfp::FlowModelKind::homography);
+      REQUIRE(turning.kind == cfp::FlowModelKind::motion_up_to_scale);
       CHECK_THAT(turning.sigma_px, WithinAbs(noise, 0.2 * noise));
     }
   }
@@ -67,21 +69,58 @@ TEST_CASE("The measured noise is kept within its bounds", "[frame]") {
 
 TEST_CASE("Without a model no noise is measured", "[frame]") {
   cfp::FlowModelOptions options;
-  options.use_rotation_homography = false;
+  options.use_motion_up_to_scale = false;
   const cfp::FlowModel<double> turning = Room(motion(0, 0.02), 0.2, 1).model(options);
   CHECK(turning.kind == cfp::FlowModelKind::none);
   CHECK(turning.sigma_px == 0);
 }
 
+TEST_CASE("Before a wall the motion is known up to scale, and how well", "[frame]") {
+  double nees = 0;
+  constexpr int seeds = 50;
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    CAPTURE(seed);
+    const cfp::SE3<double> T = motion(0.02, 0.02);
+    const cfp::FlowModel<double> model = Room(T, 0.2, seed, 4, 4).model();
+    REQUIRE(model.kind == cfp::FlowModelKind::motion_up_to_scale);
+    CHECK(model.support == cfp::FlowSupport::outside_pairs);
+    CHECK(model.status != cfp::RansacStatus::ok);
+    const cfp::SE3<double> in_walls{T.rotation, T.translation / 4};
+    const cfp::Vector6<double> error = cfp::se3_log(in_walls * model.motion.T_cur_prev.inverse());
+    const Eigen::Matrix<double, 6, 6> covariance = model.motion.covariance;
+    nees += error.dot(covariance.llt().solve(error)) / seeds;
+  }
+  CHECK(nees > 4);
+  CHECK(nees < 9);
+}
+
+TEST_CASE("Depths that are too few for a motion do not enter one without scale", "[frame]") {
+  const Room room(motion(0, 0.02), 0.2, 7);
+  cfp::FlowModelWorkspace<double> workspace;
+  std::vector<double> depths(room.previous.size(), 0), with(depths.size()), without(depths.size());
+  depths[0] = depths[1] = 0.5;
+  const cfp::FlowPairs<double> flow{room.previous, room.current, depths};
+  const auto model = cfp::estimate_flow_model<double>(flow, room.outside, room.camera, {}, workspace);
+  REQUIRE(model.kind == cfp::FlowModelKind::motion_up_to_scale);
+  cfp::flow_distances(model, flow, room.camera, {}, cfp::span<double>(with));
+  cfp::flow_distances(model, {room.previous, room.current, {}}, room.camera, {}, cfp::span<double>(without));
+  CHECK(with == without);
+}
+
 TEST_CASE("Too few pairs outside the boxes, and no depths: no model, for what is judged is no judge", "[frame]") {
-  Room room(motion(0.1, 0.02), 0.2, 6);
-  for (const std::size_t outside : {30U, 29U}) {
+  using Kind = cfp::FlowModelKind;
+  const auto kind_of = [](Room room, std::size_t outside) {
     for (std::size_t i = 0; i < room.outside.size(); ++i) room.outside[i] = i < outside ? 1 : 0;
     const cfp::FlowModel<double> model = room.model();
-    const bool enough = outside == 30;
-    CHECK(model.kind == (enough ? cfp::FlowModelKind::fundamental : cfp::FlowModelKind::none));
-    CHECK(model.support == (enough ? cfp::FlowSupport::outside_pairs : cfp::FlowSupport::none));
-    CHECK(model.status == (enough ? cfp::RansacStatus::ok : cfp::RansacStatus::not_enough_data));
-    CHECK((model.sigma_px > 0) == enough);
-  }
+    CHECK(model.support == (model.kind == Kind::none ? cfp::FlowSupport::none : cfp::FlowSupport::outside_pairs));
+    CHECK((model.status == cfp::RansacStatus::ok) == (model.kind == Kind::fundamental));
+    CHECK((model.sigma_px > 0) == (model.kind != Kind::none));
+    return model.kind;
+  };
+  const Room parallax(motion(0.1, 0.02), 0.2, 6);
+  CHECK(kind_of(parallax, 30) == Kind::fundamental);
+  CHECK(kind_of(parallax, 29) == Kind::none);  // not of one depth either
+  const Room wall(motion(0.02, 0.02), 0.2, 6, 4, 4);
+  CHECK(kind_of(wall, 12) == Kind::motion_up_to_scale);
+  CHECK(kind_of(wall, 11) == Kind::none);
 }

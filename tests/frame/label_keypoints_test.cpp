@@ -155,20 +155,20 @@ TEST_CASE("Permuting the keypoints permutes the result", "[frame]") {
   }
 }
 
-TEST_CASE("A camera that only turns or rests judges people by a homography", "[frame]") {
+TEST_CASE("A camera without depths that only turns or rests judges people by its motion up to scale", "[frame]") {
   for (const double rotation : {0.0, 0.02}) {
     DynamicSceneOptions options = quiet();
     options.translation_m = 0;
     options.rotation_rad = rotation;
     FrameRun<double> moving(make_dynamic_scene<double>(options, 6));
-    CHECK(moving.coarse({}).flow_model == cfp::FlowModelKind::homography);
+    CHECK(moving.coarse({}).flow_model == cfp::FlowModelKind::motion_up_to_scale);
     for (const cfp::ObjectProbability& object : moving.state.objects) CHECK(object.static_probability < 0.5);
     options.person_motion_m = 0;
     FrameRun<double> still(make_dynamic_scene<double>(options, 6));
     still.coarse({});
     for (const cfp::ObjectProbability& object : still.state.objects) CHECK(object.static_probability > 0.9);
     cfp::FrameOptions without;
-    without.coarse.flow.use_rotation_homography = false;
+    without.coarse.flow.use_motion_up_to_scale = false;
     const cfp::FrameReport unknown = still.coarse(without);
     CHECK(unknown.unknown_objects == 2);
   }

@@ -47,7 +47,7 @@ template <typename Scalar>
   model.status = RansacStatus::ok;
   model.kind = frame.T_cur_prev ? FlowModelKind::motion : FlowModelKind::fundamental;
   if (frame.T_cur_prev) model.motion = frame.T_cur_prev->template cast<Scalar>();
-  if (frame.fundamental) model.matrix = *frame.fundamental;
+  if (frame.fundamental) model.F = *frame.fundamental;
   measure_sigma(undistorted_flow, outside, camera, options, model, state.scratch.flow.distances);
   return model;
 }

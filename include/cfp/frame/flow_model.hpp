@@ -1,6 +1,6 @@
 /// @file flow_model.hpp
 /// What optical-flow pairs are judged by (paper section IV-B, object stage): the camera's motion where depths are
-/// known, else a fundamental matrix, or a homography for a camera that has only turned or stood still.
+/// known, else a fundamental matrix, and the motion up to scale where there is none.
 #pragma once
 
 #include <algorithm>
@@ -11,22 +11,24 @@
 #include "cfp/frame/camera_motion.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/epipolar.hpp"
-#include "cfp/geometry/homography.hpp"
 #include "cfp/robust/fundamental_ransac.hpp"
 
 namespace cfp {
 
 struct FlowModelOptions {
   /// Pairs outside all boxes and, where depths tell, behind what is in them support the model: what is judged is no
-  /// judge. A two-view model wants at least this many (>= 8).
+  /// judge. A fundamental matrix wants at least this many (>= 8).
   std::size_t min_outside_pairs = 30;
   /// Pairs so near to a box, as a share of its size, support nothing unless their depth tells that they are behind its
   /// object: boxes seldom hold all of a person. Where objects are told from their background by depth; >= 0.
   double margin = 0.1;
-  /// A camera that turns without moving, or stands still, has no fundamental matrix, but maps every static point by one
-  /// homography; true: objects are judged by the distance from that (both coordinates count, not only the one across a
-  /// line). false: they are unknown. Not in the paper, whose F is then arbitrary.
-  bool use_rotation_homography = true;
+  /// Without parallax (a camera that turns, rests or looks at a plane) or with few pairs there is no fundamental
+  /// matrix; true: the camera's motion is then estimated as if all of the room were at one depth, and objects are
+  /// judged by it and its covariance. false: they are unknown. Not in the paper, whose F is then arbitrary.
+  bool use_motion_up_to_scale = true;
+  /// How much nearer than the room an object is taken to be then: the room's depth over the object's, a ratio without
+  /// unit. The default covers what is up to five times nearer.
+  UnknownDepth nearer_than_room{2.5, 1};
   /// true: where enough pairs have a depth, they are judged by the camera's motion and their depths. false: as the
   /// paper.
   bool use_depth = true;
@@ -35,10 +37,10 @@ struct FlowModelOptions {
 };
 
 enum class FlowModelKind : std::uint8_t {
-  none,         ///< nothing could be had: every object is unknown
-  motion,       ///< distances under the camera's motion, with what is known of the depths
-  fundamental,  ///< distances from epipolar lines
-  homography    ///< distances from the homography of a turning or resting camera
+  none,               ///< nothing could be had: every object is unknown
+  motion,             ///< distances under the camera's motion, with what is known of the depths
+  fundamental,        ///< distances from epipolar lines
+  motion_up_to_scale  ///< distances under the camera's motion, all depths unknown: see nearer_than_room
 };
 
 enum class FlowSupport : std::uint8_t {
@@ -52,9 +54,10 @@ template <typename Scalar>
 struct FlowModel {
   FlowModelKind kind = FlowModelKind::none;
   FlowSupport support = FlowSupport::none;
-  RansacStatus status = RansacStatus::not_enough_data;  ///< of the estimate; ok with the caller's matrix
-  Matrix3<Scalar> matrix = Matrix3<Scalar>::Zero();     ///< F or H, previous to current
-  UncertainMotion<Scalar> motion;                       ///< of kind motion; the caller's counts as exact
+  RansacStatus status = RansacStatus::not_enough_data;  ///< of kind none or motion_up_to_scale: why there is no F
+  Matrix3<Scalar> F = Matrix3<Scalar>::Zero();          ///< of kind fundamental, previous to current
+  /// Of both kinds of motion; up to scale, the room's depth is the unit of length. The caller's counts as exact.
+  UncertainMotion<Scalar> motion;
   Scalar sigma_px = Scalar(0);  ///< noise of one coordinate, measured on the pairs on no object; 0: not measured
 
   CFP_INLINE FlowModel() noexcept {}  // NOLINT(modernize-use-equals-default): inline
@@ -71,29 +74,38 @@ struct FlowModelWorkspace {
 namespace detail {
 inline namespace CFP_ISA {
 
-/// The fundamental matrix, or homography, of the pairs marked in `outside`; none of too few.
+/// The camera's motion as a model of the given kind; none where it is not known.
 template <typename Scalar>
-FlowModel<Scalar> estimate_two_view_model(const FlowPairs<Scalar>& flow, span<const char> outside,
-                                          const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
-                                          FlowModelWorkspace<Scalar>& workspace) {
-  const auto inside = static_cast<std::size_t>(std::count(outside.begin(), outside.end(), char(0)));
-  if (outside.size() - inside < options.min_outside_pairs) return {};
+FlowModel<Scalar> estimate_motion_model(FlowModelKind kind, const FlowPairs<Scalar>& flow, span<const char> outside,
+                                        const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
+                                        FlowModelWorkspace<Scalar>& workspace) {
+  FlowModel<Scalar> model;
+  const CameraMotion<Scalar> motion =
+      estimate_camera_motion(flow, outside, SE3<double>(), camera, options.motion, workspace.motion);
+  if (!motion.known) return model;
+  model.kind = kind;
+  model.support = FlowSupport::outside_pairs;
+  model.status = RansacStatus::ok;
+  model.motion = motion;
+  model.sigma_px = motion.sigma_px;
+  return model;
+}
+
+/// The fundamental matrix of the pairs marked in `outside`, if they have one.
+template <typename Scalar>
+FlowModel<Scalar> estimate_fundamental(const FlowPairs<Scalar>& flow, span<const char> outside,
+                                       const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
+                                       FlowModelWorkspace<Scalar>& workspace) {
+  FlowModel<Scalar> model;
   workspace.weights.clear();
   for (const char mark : outside) workspace.weights.push_back(mark == 0 ? Scalar(0) : Scalar(1));
   const FundamentalResult<Scalar> estimate = fundamental_ransac(
       PointPairs<Scalar>{flow.previous, flow.current, workspace.weights}, camera, options.ransac, workspace.ransac);
-
-  FlowModel<Scalar> model;
   model.status = estimate.status;
+  if (!estimate.found()) return model;
+  model.kind = FlowModelKind::fundamental;
   model.support = FlowSupport::outside_pairs;
-  const bool rotation = estimate.status == RansacStatus::no_motion || estimate.status == RansacStatus::pure_rotation;
-  if (estimate.found()) {
-    model.kind = FlowModelKind::fundamental;
-    model.matrix = estimate.F;
-  } else if (rotation && options.use_rotation_homography) {
-    model.kind = FlowModelKind::homography;
-    model.matrix = estimate.homography;
-  }
+  model.F = estimate.F;
   return model;
 }
 
@@ -122,6 +134,7 @@ inline namespace CFP_ISA {
 [[nodiscard]] inline OptionPath invalid_field(const FlowModelOptions& o) noexcept {
   if (o.min_outside_pairs < 8) return "min_outside_pairs";
   if (!detail::non_negative(o.margin)) return "margin";
+  if (const OptionPath field = nested("nearer_than_room", invalid_field(o.nearer_than_room))) return field;
   if (const OptionPath field = nested("motion", invalid_field(o.motion))) return field;
   return nested("ransac", invalid_field(o.ransac));
 }
@@ -130,23 +143,25 @@ inline namespace CFP_ISA {
 template <typename Scalar>
 void flow_distances(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow, const PinholeCamera<Scalar>& camera,
                     const FlowModelOptions& options, span<Scalar> out) noexcept {
+  MotionDistanceOptions distance = options.motion.distance;
+  if (model.kind == FlowModelKind::motion_up_to_scale) distance.unknown_depth = options.nearer_than_room;
   switch (model.kind) {
     case FlowModelKind::motion:
-      return motion_distances(flow.previous, flow.previous_depths, flow.current, model.motion, camera,
-                              model.sigma_px > Scalar(0) ? model.sigma_px : Scalar(options.motion.min_sigma_px),
-                              options.motion.distance, out);
+    case FlowModelKind::motion_up_to_scale:
+      return motion_distances(
+          flow.previous, model.kind == FlowModelKind::motion ? flow.previous_depths : span<const Scalar>(),
+          flow.current, model.motion, camera,
+          model.sigma_px > Scalar(0) ? model.sigma_px : Scalar(options.motion.min_sigma_px), distance, out);
     case FlowModelKind::fundamental:
-      return epipolar_distances(model.matrix, flow.previous, flow.current, out);
-    case FlowModelKind::homography:
-      return transfer_distances(model.matrix, flow.previous, flow.current, out);
+      return epipolar_distances(model.F, flow.previous, flow.current, out);
     case FlowModelKind::none:
       std::fill(out.begin(), out.end(), Scalar(no_distance<double>));
   }
 }
 
 /// What the pairs of the undistorted image are judged by, from those that `outside` marks as on no object: the
-/// camera's motion if enough of them have a depth and agree, else the two-view model. The camera is that of the
-/// undistorted image.
+/// camera's motion if enough of them have a depth and agree, else the fundamental matrix, else the motion up to scale.
+/// The camera is that of the undistorted image.
 template <typename Scalar>
 FlowModel<Scalar> estimate_flow_model(const FlowPairs<Scalar>& flow, span<const char> outside,
                                       const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
@@ -154,20 +169,21 @@ FlowModel<Scalar> estimate_flow_model(const FlowPairs<Scalar>& flow, span<const 
   CFP_ASSERT(flow.previous.size() == flow.current.size() && outside.size() == flow.current.size());
   CFP_ASSERT(detail::fits(flow.current.size(), flow.previous_depths));
   FlowModel<Scalar> model;
-  if (options.use_depth) {
-    const CameraMotion<Scalar> motion =
-        estimate_camera_motion(flow, outside, SE3<double>(), camera, options.motion, workspace.motion);
-    if (motion.known) {
-      model.kind = FlowModelKind::motion;
-      model.support = FlowSupport::outside_pairs;
-      model.status = RansacStatus::ok;
-      model.motion = motion;
-      model.sigma_px = motion.sigma_px;
-      return model;
-    }
-  }
-  model = detail::estimate_two_view_model(flow, outside, camera, options, workspace);
-  detail::measure_sigma(flow, outside, camera, options, model, workspace.distances);
+  if (options.use_depth)
+    model = detail::estimate_motion_model(FlowModelKind::motion, flow, outside, camera, options, workspace);
+  if (model.kind != FlowModelKind::none) return model;
+  const auto inside = static_cast<std::size_t>(std::count(outside.begin(), outside.end(), char(0)));
+  if (outside.size() - inside >= options.min_outside_pairs)
+    model = detail::estimate_fundamental(flow, outside, camera, options, workspace);
+  if (model.kind == FlowModelKind::fundamental)
+    detail::measure_sigma(flow, outside, camera, options, model, workspace.distances);
+  if (model.kind != FlowModelKind::none || !options.use_motion_up_to_scale) return model;
+  const RansacStatus status = model.status;
+  workspace.distances.assign(outside.size(), Scalar(1));
+  model = detail::estimate_motion_model(FlowModelKind::motion_up_to_scale,
+                                        FlowPairs<Scalar>{flow.previous, flow.current, workspace.distances}, outside,
+                                        camera, options, workspace);
+  model.status = status;
   return model;
 }
 
