@@ -7,6 +7,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "../slam/loop/options.hpp"
@@ -16,13 +17,14 @@ namespace cfp_slam {
 
 using OptionValues = std::map<std::string, double>;
 
-// visit(name, value) for every option that a file can set.
+// visit(name, value) for every option that a file can set: numbers, and what is 0 or 1.
 template <typename Visit>
 void for_each_option(Options& o, const Visit& visit) {
   cfp::FrameOptions& p = o.probability;
   visit("keypoint_sigma_px", o.keypoint_sigma_px);
   visit("baseline_fx", o.baseline_fx);
   visit("flow_edge_px", o.flow_edge_px);
+  visit("give_depths", o.give_depths);
   visit("unproven_share", o.unproven_share);
   visit("min_known_share", o.min_known_share);
   visit("features.room_share", o.features.room_share);
@@ -51,9 +53,9 @@ void for_each_option(Options& o, const Visit& visit) {
 // False: no option has this name.
 inline bool set_option(Options& options, const std::string& name, double value) {
   bool known = false;
-  for_each_option(options, [&](const char* option, double& field) {
+  for_each_option(options, [&](const char* option, auto& field) {
     if (name != option) return;
-    field = value;
+    field = static_cast<std::decay_t<decltype(field)>>(value);
     known = true;
   });
   return known;

@@ -256,7 +256,8 @@ TEMPLATE_TEST_CASE("After a first call the stage allocates nothing and repeats i
   CHECK(run.state.static_probability == before);
 }
 
-TEST_CASE("The flow at a keypoint's place is the score of the next pair in its box that has a depth", "[frame]") {
+TEST_CASE("The flow at a keypoint's place is the score of the next pair in its box, with a depth or without",
+          "[frame]") {
   FrameRun<double> run(make_dynamic_scene<double>(quiet(), 12));
   const std::size_t pairs = run.scene.previous_depths.size();
   for (std::size_t p = 0; p < pairs; p += 3)
@@ -276,7 +277,7 @@ TEST_CASE("The flow at a keypoint's place is the score of the next pair in its b
         const double x = frame.flow.current(p, 0), y = frame.flow.current(p, 1);
         const double apart = std::hypot(x - run.scene.keypoints[i][0], y - run.scene.keypoints[i][1]);
         if (!cfp::contains(run.state.boxes[std::size_t(run.state.box[i])].box, x, y) || !(apart < nearest) ||
-            !cfp::is_valid_depth(run.scene.previous_depths[p]) || run.state.flow_distances[p] < 0)
+            run.state.flow_distances[p] < 0)
           continue;
         nearest = apart, expected = cfp::object_score(run.state.flow_distances[p], scored);
       }

@@ -13,6 +13,13 @@
 
 namespace cfp_test {
 
+/// The first stage's evidence comes from the objects alone, not from the flow at each keypoint.
+inline cfp::FrameOptions by_objects_alone() {
+  cfp::FrameOptions options;
+  options.coarse.flow_radius_px = 0;
+  return options;
+}
+
 template <typename Scalar>
 struct FrameRun {
   explicit FrameRun(DynamicScene<Scalar> s) : scene(std::move(s)), m(scene.keypoints.size(), Scalar(1)) {

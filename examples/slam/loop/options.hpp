@@ -39,6 +39,7 @@ struct Options {
   std::uint64_t seed = 1;
   bool threads = true;            // false: everything on one thread; the trajectory is the same, bit for bit
   std::size_t max_frames = 0;     // 0: all
+  bool give_depths = true;        // false: cfp gets none, as from a host with one camera; the loop keeps its own
   cfp::FrameOptions probability;  // before the variant switches parts of it off
   cfp_examples::FeatureOptions features;
   cfp::OpticalFlowOptions flow;

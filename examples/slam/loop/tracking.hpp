@@ -122,9 +122,12 @@ class Tracking {
     cfp::Frame<float> frame;
     frame.timestamp_s = input.frame.time_s;
     frame.keypoints = cfp::view(input.frame.keypoints);
-    frame.depths = input.frame.depths_m;
     if (input.detections) frame.detections = detector_.believed(*input.detections, probability_.state(), record);
-    frame.flow = {cfp::view(input.flow_from), cfp::view(input.flow_to), input.flow_depths_m};
+    frame.flow = {cfp::view(input.flow_from), cfp::view(input.flow_to)};
+    if (options_.give_depths) {
+      frame.depths = input.frame.depths_m;
+      frame.flow.previous_depths = input.flow_depths_m;
+    }
     frame.map_point_probability = input.frame.map_point_probability;
     frame.image_motion = localization_.image_motion();
     const Part part(observer_, Module::coarse);

@@ -170,8 +170,8 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   state.flow_distances.resize(n);
   scratch.scratch.resize(n);
   flow_distances(model, flow, pinhole, coarse.flow, span<Scalar>(state.flow_distances));
-  const ObjectProbabilityOptions scored = scaled_to_noise(coarse.object, static_cast<double>(model.sigma_px),
-                                                          model.kind == FlowModelKind::fundamental ? 1 : 2);
+  const ObjectProbabilityOptions scored =
+      scaled_to_noise(coarse.object, static_cast<double>(model.sigma_px), detail::coordinates_of(model.kind));
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     // What lies behind an object says nothing of it, and a pair on its silhouette may have either depth.
     scratch.samples.clear();

@@ -132,7 +132,8 @@ template <typename Scalar>
 /// The same in a line per decision.
 [[nodiscard]] inline std::string to_text(const KeypointExplanation& e) {
   using detail::number;
-  constexpr const char* models[] = {"nothing", "the camera's motion", "epipolar lines", "the camera's motion up to scale"};
+  constexpr const char* models[] = {"nothing", "the camera's motion", "epipolar lines",
+                                    "the camera's motion up to scale"};
   constexpr const char* rules[] = {"the object was not there in the frame before", "not matched, on the object",
                                    "not matched, behind the object", "moving object: K^T K^F, both must agree",
                                    "resting object: mean of K^T and K^F by their confidences"};

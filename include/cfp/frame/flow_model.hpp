@@ -74,6 +74,11 @@ struct FlowModelWorkspace {
 namespace detail {
 inline namespace CFP_ISA {
 
+/// How many coordinates of a pixel the distances see: across a line one of two.
+[[nodiscard]] constexpr int coordinates_of(FlowModelKind kind) noexcept {
+  return kind == FlowModelKind::fundamental ? 1 : 2;
+}
+
 /// The camera's motion as a model of the given kind; none where it is not known.
 template <typename Scalar>
 FlowModel<Scalar> estimate_motion_model(FlowModelKind kind, const FlowPairs<Scalar>& flow, span<const char> outside,
@@ -120,8 +125,7 @@ void measure_sigma(const FlowPairs<Scalar>& flow, span<const char> outside, cons
     if (outside[i] != 0 && has_distance(distances[i])) distances[kept++] = distances[i];
   }
   if (kept < options.min_outside_pairs) return;
-  const Scalar sigma =
-      robust_sigma(span<Scalar>(distances.data(), kept), model.kind == FlowModelKind::fundamental ? 1 : 2);
+  const Scalar sigma = robust_sigma(span<Scalar>(distances.data(), kept), coordinates_of(model.kind));
   model.sigma_px =
       (std::min)((std::max)(sigma, Scalar(options.motion.min_sigma_px)), Scalar(options.motion.max_sigma_px));
 }

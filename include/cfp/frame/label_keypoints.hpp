@@ -16,21 +16,22 @@ namespace cfp {
 namespace detail {
 inline namespace CFP_ISA {
 
-/// Sets state.flow_probability: the score of the flow pair next to the keypoint, among the pairs in its box. Only the
-/// camera's motion judges a pair with depth well enough for that; after estimate_objects.
+/// Sets state.flow_probability: the score of the flow pair next to the keypoint, among the pairs in its box; after
+/// estimate_objects.
 template <typename Scalar>
 void score_flow_at_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   const Scalar radius_px = static_cast<Scalar>(options.coarse.flow_radius_px);
-  if (radius_px <= 0 || state.report.flow_model != FlowModelKind::motion || frame.flow.previous_depths.empty()) return;
-  const ObjectProbabilityOptions scored = scaled_to_noise(options.coarse.object, state.report.flow_sigma_px, 2);
+  const FlowModelKind model = state.report.flow_model;
+  if (radius_px <= 0 || model == FlowModelKind::none) return;
+  const ObjectProbabilityOptions scored =
+      scaled_to_noise(options.coarse.object, state.report.flow_sigma_px, coordinates_of(model));
   FrameScratch<Scalar>& scratch = state.scratch;
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     scratch.points.clear();
     scratch.samples.clear();
     for (std::size_t p = 0; p < frame.flow.current.size(); ++p) {
       const Scalar x = frame.flow.current(p, 0), y = frame.flow.current(p, 1);
-      if (!has_distance(state.flow_distances[p]) || !is_valid_depth(frame.flow.previous_depths[p])) continue;
-      if (!contains(state.boxes[b].box, x, y)) continue;
+      if (!has_distance(state.flow_distances[p]) || !contains(state.boxes[b].box, x, y)) continue;
       scratch.points.push_back({x, y});
       scratch.samples.push_back(state.flow_distances[p]);
     }
