@@ -344,7 +344,7 @@ int main(int argc, char** argv) {
   Way one_camera;
   one_camera.share_of_depths = 0;
   for (const Room& room : rooms) {
-    for (const double hz : {30.0, 10.0, 5.0}) {
+    for (const double hz : smoke ? std::vector<double>{30} : std::vector<double>{30, 10, 5}) {
       for (const bool up_to_scale : {true, false}) {
         char name[64];
         std::snprintf(name, sizeof name, "%s, %.0f Hz%s", room.name, hz, up_to_scale ? "" : ", F");
@@ -361,7 +361,7 @@ int main(int argc, char** argv) {
       for (const bool memory : {false, true}) {
         cfp::FrameOptions options = way.options;
         if (!memory) options.coarse.memory.time_constant_s = 0;
-        for (const double speed : {0.2, 0.5, 1.0}) {
+        for (const double speed : smoke ? std::vector<double>{0.5} : std::vector<double>{0.2, 0.5, 1.0}) {
           follow((std::string(way.name) + (memory ? ", remembered" : "")).c_str(), options, rooms[r], speed,
                  (repetitions + 3) / 4, seed);
         }

@@ -40,6 +40,7 @@ template <typename Camera>
 std::vector<float> run(FuzzInput in, const Camera& camera) {
   cfp::FrameOptions options;
   options.coarse.flow.use_depth = in.flag();
+  options.coarse.flow.use_motion_up_to_scale = in.flag();
   options.tracker.image_width = in.flag() ? 640 : 0;
   options.tracker.image_height = 480;
   if (in.flag()) {
@@ -56,6 +57,8 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
                        &options.coarse.flow_radius_px,
                        &options.coarse.memory.time_constant_s,
                        &options.coarse.memory.evidence_limit,
+                       &flow.nearer_than_room.inverse_mean,
+                       &flow.nearer_than_room.inverse_sigma,
                        &flow.motion.min_inlier_share,
                        &flow.motion.min_sigma_px,
                        &flow.motion.max_sigma_px,
