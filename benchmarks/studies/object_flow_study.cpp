@@ -7,9 +7,8 @@
 // near widened by 6 px, as stereo matching does; or there is none, as with one camera. --masks gives the people's
 // pixels in the place of boxes, cut (below 0) or grown by so many px, as networks do.
 //   cfp_object_flow_study [--depth late|shifted|widened|none] [--masks PX] [--smoke | --frames N | TUM_FOLDER...]
-//   instead
-// of rendering, folders of cfp_synthetic; one without labels, with a detections.txt, gives times and mean O alone (as
-// "partly")
+// Instead of rendering it takes folders of cfp_synthetic; one without labels, with a detections.txt, gives times and
+// mean O alone (as "partly").
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -380,7 +379,7 @@ int main(int argc, char** argv) {
   }
   std::printf(
       "processor ms per frame on one core (medians; ratio of sums to the first line), AUC of O, share with O > 0.9, "
-      "mean O\n");
+      "mean O; frames judged by a motion or F, by a motion up to scale (T~), by nothing\n");
   print(all);
   return 0;
 }

@@ -47,7 +47,7 @@ enum class FlowSupport : std::uint8_t {
   none,             ///< no model was estimated
   caller,           ///< the caller's motion or fundamental matrix
   outside_pairs,    ///< the pairs on no object, of which min_outside_pairs or more are outside all boxes
-  background_pairs  ///< the same, but fewer are outside: it rests on what lies behind the objects in the boxes
+  background_pairs  ///< the same, but fewer are outside: it rests on what lies behind the objects in the boxes, if any
 };
 
 template <typename Scalar>
