@@ -153,7 +153,7 @@ Scene simulate(const Cell& cell, const Room& room, double frame_s, double wrong_
 struct Way {
   const char* name = "";
   cfp::FrameOptions options;
-  double share_of_depths = 1;  // 1, every second or none
+  std::size_t depth_of_every = 1;  // so many pairs; 0: none, as with one camera
   bool exact_motion = false;
 };
 
@@ -172,7 +172,7 @@ std::vector<Way> ways() {
   all[0].options.coarse.object.noise_factor = all[4].options.coarse.object.noise_factor = 0;
   all[0].options.coarse.object.positions = all[3].options.coarse.object.positions = {0.1, 0.2, 0.3};
   all[5].options.coarse.use_depth_foreground = false;
-  all[6].share_of_depths = 0.5;
+  all[6].depth_of_every = 2;
   all[7].exact_motion = true;
   return all;
 }
@@ -242,10 +242,11 @@ void judge(const char* name, const Way& way, const std::vector<Cell>& cells, con
     for (int i = 0; i < repetitions * (cell.at_rest() ? 4 : 1); ++i) {
       Scene scene = simulate(cell, room, frame_s, wrong_depths, random, random);
       for (std::size_t k = 0; k < scene.depths.size(); ++k) {
-        if (static_cast<double>(k % 2) >= 2 * way.share_of_depths) scene.depths[k] = -1;
+        if (way.depth_of_every > 0 && k % way.depth_of_every != 0) scene.depths[k] = -1;
       }
       cfp::Frame<double> frame;
-      frame.flow = {scene.previous, scene.current, scene.depths};
+      frame.flow = {scene.previous, scene.current};
+      if (way.depth_of_every > 0) frame.flow.previous_depths = scene.depths;
       if (way.exact_motion) give_motion(scene, frame);
       state.boxes.resize(1);
       state.boxes[0].box = scene.box;
@@ -342,7 +343,7 @@ int main(int argc, char** argv) {
 
   print_head("one camera, no depths; then F alone");
   Way one_camera;
-  one_camera.share_of_depths = 0;
+  one_camera.depth_of_every = 0;
   for (const Room& room : rooms) {
     for (const double hz : smoke ? std::vector<double>{30} : std::vector<double>{30, 10, 5}) {
       for (const bool up_to_scale : {true, false}) {

@@ -34,6 +34,12 @@ template <typename Scalar>
   return options.coarse.use_depth_foreground && is_non_rigid(box.class_id, options);
 }
 
+/// The options on the scale of the noise of this frame's flow.
+[[nodiscard]] inline ObjectProbabilityOptions scaled_to_flow(const ObjectProbabilityOptions& options,
+                                                             const FrameReport& report) noexcept {
+  return scaled_to_noise(options, report.flow_sigma_px, coordinates_of(report.flow_model));
+}
+
 /// What the flow pairs are judged by: the host's motion or F, or the model of the pairs outside all boxes.
 template <typename Scalar>
 [[nodiscard]] FlowModel<Scalar> flow_model(const Frame<Scalar>& frame, const FlowPairs<Scalar>& undistorted_flow,
@@ -170,8 +176,7 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   state.flow_distances.resize(n);
   scratch.scratch.resize(n);
   flow_distances(model, flow, pinhole, coarse.flow, span<Scalar>(state.flow_distances));
-  const ObjectProbabilityOptions scored =
-      scaled_to_noise(coarse.object, static_cast<double>(model.sigma_px), detail::coordinates_of(model.kind));
+  const ObjectProbabilityOptions scored = detail::scaled_to_flow(coarse.object, report);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     // What lies behind an object says nothing of it, and a pair on its silhouette may have either depth.
     scratch.samples.clear();

@@ -96,24 +96,6 @@ FlowModel<Scalar> estimate_motion_model(FlowModelKind kind, const FlowPairs<Scal
   return model;
 }
 
-/// The fundamental matrix of the pairs marked in `outside`, if they have one.
-template <typename Scalar>
-FlowModel<Scalar> estimate_fundamental(const FlowPairs<Scalar>& flow, span<const char> outside,
-                                       const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
-                                       FlowModelWorkspace<Scalar>& workspace) {
-  FlowModel<Scalar> model;
-  workspace.weights.clear();
-  for (const char mark : outside) workspace.weights.push_back(mark == 0 ? Scalar(0) : Scalar(1));
-  const FundamentalResult<Scalar> estimate = fundamental_ransac(
-      PointPairs<Scalar>{flow.previous, flow.current, workspace.weights}, camera, options.ransac, workspace.ransac);
-  model.status = estimate.status;
-  if (!estimate.found()) return model;
-  model.kind = FlowModelKind::fundamental;
-  model.support = FlowSupport::outside_pairs;
-  model.F = estimate.F;
-  return model;
-}
-
 /// Measures the noise of the pairs marked in `outside` under the model, if enough of them have a distance.
 template <typename Scalar>
 void measure_sigma(const FlowPairs<Scalar>& flow, span<const char> outside, const PinholeCamera<Scalar>& camera,
@@ -128,6 +110,27 @@ void measure_sigma(const FlowPairs<Scalar>& flow, span<const char> outside, cons
   const Scalar sigma = robust_sigma(span<Scalar>(distances.data(), kept), coordinates_of(model.kind));
   model.sigma_px =
       (std::min)((std::max)(sigma, Scalar(options.motion.min_sigma_px)), Scalar(options.motion.max_sigma_px));
+}
+
+/// The fundamental matrix of the pairs marked in `outside` and their noise; none of too few, or if they have none.
+template <typename Scalar>
+FlowModel<Scalar> estimate_fundamental(const FlowPairs<Scalar>& flow, span<const char> outside,
+                                       const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
+                                       FlowModelWorkspace<Scalar>& workspace) {
+  FlowModel<Scalar> model;
+  const auto inside = static_cast<std::size_t>(std::count(outside.begin(), outside.end(), char(0)));
+  if (outside.size() - inside < options.min_outside_pairs) return model;
+  workspace.weights.clear();
+  for (const char mark : outside) workspace.weights.push_back(mark == 0 ? Scalar(0) : Scalar(1));
+  const FundamentalResult<Scalar> estimate = fundamental_ransac(
+      PointPairs<Scalar>{flow.previous, flow.current, workspace.weights}, camera, options.ransac, workspace.ransac);
+  model.status = estimate.status;
+  if (!estimate.found()) return model;
+  model.kind = FlowModelKind::fundamental;
+  model.support = FlowSupport::outside_pairs;
+  model.F = estimate.F;
+  measure_sigma(flow, outside, camera, options, model, workspace.distances);
+  return model;
 }
 
 }  // namespace CFP_ISA
@@ -147,20 +150,16 @@ inline namespace CFP_ISA {
 template <typename Scalar>
 void flow_distances(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow, const PinholeCamera<Scalar>& camera,
                     const FlowModelOptions& options, span<Scalar> out) noexcept {
+  if (model.kind == FlowModelKind::none) return std::fill(out.begin(), out.end(), Scalar(no_distance<double>));
+  if (model.kind == FlowModelKind::fundamental) return epipolar_distances(model.F, flow.previous, flow.current, out);
   MotionDistanceOptions distance = options.motion.distance;
-  if (model.kind == FlowModelKind::motion_up_to_scale) distance.unknown_depth = options.nearer_than_room;
-  switch (model.kind) {
-    case FlowModelKind::motion:
-    case FlowModelKind::motion_up_to_scale:
-      return motion_distances(
-          flow.previous, model.kind == FlowModelKind::motion ? flow.previous_depths : span<const Scalar>(),
-          flow.current, model.motion, camera,
-          model.sigma_px > Scalar(0) ? model.sigma_px : Scalar(options.motion.min_sigma_px), distance, out);
-    case FlowModelKind::fundamental:
-      return epipolar_distances(model.F, flow.previous, flow.current, out);
-    case FlowModelKind::none:
-      std::fill(out.begin(), out.end(), Scalar(no_distance<double>));
+  span<const Scalar> depths = flow.previous_depths;
+  if (model.kind == FlowModelKind::motion_up_to_scale) {
+    distance.unknown_depth = options.nearer_than_room;
+    depths = {};
   }
+  const Scalar sigma_px = model.sigma_px > Scalar(0) ? model.sigma_px : Scalar(options.motion.min_sigma_px);
+  motion_distances(flow.previous, depths, flow.current, model.motion, camera, sigma_px, distance, out);
 }
 
 /// What the pairs of the undistorted image are judged by, from those that `outside` marks as on no object: the
@@ -175,12 +174,8 @@ FlowModel<Scalar> estimate_flow_model(const FlowPairs<Scalar>& flow, span<const 
   FlowModel<Scalar> model;
   if (options.use_depth)
     model = detail::estimate_motion_model(FlowModelKind::motion, flow, outside, camera, options, workspace);
-  if (model.kind != FlowModelKind::none) return model;
-  const auto inside = static_cast<std::size_t>(std::count(outside.begin(), outside.end(), char(0)));
-  if (outside.size() - inside >= options.min_outside_pairs)
+  if (model.kind == FlowModelKind::none)
     model = detail::estimate_fundamental(flow, outside, camera, options, workspace);
-  if (model.kind == FlowModelKind::fundamental)
-    detail::measure_sigma(flow, outside, camera, options, model, workspace.distances);
   if (model.kind != FlowModelKind::none || !options.use_motion_up_to_scale) return model;
   const RansacStatus status = model.status;
   workspace.distances.assign(outside.size(), Scalar(1));

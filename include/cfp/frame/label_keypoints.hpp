@@ -21,10 +21,8 @@ inline namespace CFP_ISA {
 template <typename Scalar>
 void score_flow_at_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   const Scalar radius_px = static_cast<Scalar>(options.coarse.flow_radius_px);
-  const FlowModelKind model = state.report.flow_model;
-  if (radius_px <= 0 || model == FlowModelKind::none) return;
-  const ObjectProbabilityOptions scored =
-      scaled_to_noise(options.coarse.object, state.report.flow_sigma_px, coordinates_of(model));
+  if (radius_px <= 0 || state.report.flow_model == FlowModelKind::none) return;
+  const ObjectProbabilityOptions scored = scaled_to_flow(options.coarse.object, state.report);
   FrameScratch<Scalar>& scratch = state.scratch;
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     scratch.points.clear();
