@@ -3,8 +3,9 @@
 // of scoring: AUC; moving people missed at 5 % false alarms, over all and in the worst cell from 0.5 m/s on; static
 // people called moving (O <= O_Th) at each noise; share of the frames in which O is known.
 // Then the same in a bare room, whose motion says little of a person who is near; "motion taken as exact" leaves its
-// covariance out. Then with one camera, no depths at all, in five kinds of scene and at three frame rates: with the
-// fundamental matrix alone, and with the motion up to scale where there is none.
+// covariance out; "a host's motion" is the true one with errors of 3 mm and 1 mrad, and these as its sigmas. Then with
+// one camera, no depths at all, in five kinds of scene and at three frame rates: with the fundamental matrix alone, and
+// with the motion up to scale where there is none.
 //   cfp_object_motion_study [N per cell, default 20] [seed, default 1] | --smoke
 //
 // The simulator: 640 x 480 at 30 Hz, f = 535 px. Camera: still; sideways or forward 0.3 m/s; rotating 20 deg/s; both;
@@ -54,6 +55,7 @@ struct Scene {
   std::vector<std::array<double, 2>> previous, current;
   std::vector<double> depths;
   cfp::Box<double> box;
+  cfp::SE3<double> T_cur_prev;
 };
 
 /// Camera velocity (m/s) and turn rate (rad/s).
@@ -114,6 +116,7 @@ Scene simulate(const Cell& cell, const Room& room, double frame_s, double wrong_
   cfp::Vector6<double> twist;
   twist << -velocity * frame_s, -turn * frame_s;
   const cfp::SE3<double> T_cur_prev = cfp::se3_exp(twist);
+  scene.T_cur_prev = T_cur_prev;
   const cfp::DepthNoise depth_noise;
   const auto add = [&](const V2& p, double z, const V3& step, double other_depth) {
     V3 ray;
@@ -155,10 +158,13 @@ struct Way {
   cfp::FrameOptions options;
   std::size_t depth_of_every = 1;  // so many pairs; 0: none, as with one camera
   bool exact_motion = false;
+  bool host_motion = false, host_sigmas = false;
 };
 
+constexpr double host_error_m = 0.003, host_error_rad = 0.001;
+
 std::vector<Way> ways() {
-  std::vector<Way> all(8);
+  std::vector<Way> all(10);
   all[0].name = "as printed";
   all[1].name = "without depths";
   all[2].name = "depth";
@@ -167,6 +173,8 @@ std::vector<Way> ways() {
   all[5].name = "depth, all pairs in the box";
   all[6].name = "depth of every second pair";
   all[7].name = "depth, motion taken as exact";
+  all[8].name = "depth, a host's motion as exact";
+  all[9].name = "depth, a host's motion";
   all[0].options.coarse.flow.use_motion_up_to_scale = false;
   all[0].options.coarse.flow.use_depth = all[1].options.coarse.flow.use_depth = false;
   all[0].options.coarse.object.noise_factor = all[4].options.coarse.object.noise_factor = 0;
@@ -174,6 +182,7 @@ std::vector<Way> ways() {
   all[5].options.coarse.use_depth_foreground = false;
   all[6].depth_of_every = 2;
   all[7].exact_motion = true;
+  all[8].host_motion = all[9].host_motion = all[9].host_sigmas = true;
   return all;
 }
 
@@ -184,7 +193,15 @@ void give_motion(const Scene& scene, cfp::Frame<double>& frame) {
   cfp::CameraMotionWorkspace<double> workspace;
   const auto motion = cfp::estimate_camera_motion(frame.flow, outside, cfp::SE3<double>(), camera,
                                                   cfp::CameraMotionOptions(), workspace);
-  if (motion.known) frame.T_cur_prev = motion.T_cur_prev;
+  if (motion.known) frame.T_cur_prev = {motion.T_cur_prev, 0, 0};
+}
+
+/// The true motion with the errors of a host's prediction.
+void predict_motion(const Scene& scene, bool with_sigmas, cfp::Random& random, cfp::Frame<double>& frame) {
+  cfp::Vector6<double> error;
+  for (int k = 0; k < 6; ++k) error[k] = (k < 3 ? host_error_m : host_error_rad) * random.normal();
+  const cfp::SE3<double> T = cfp::se3_exp(error) * scene.T_cur_prev;
+  frame.T_cur_prev = {T, with_sigmas ? host_error_m : 0, with_sigmas ? host_error_rad : 0};
 }
 
 struct Outcome {
@@ -235,7 +252,7 @@ void report(const char* name, const std::vector<Outcome>& outcomes, double thres
 /// O of every cell, `repetitions` scenes each (at rest four times as many), as a row of the table.
 void judge(const char* name, const Way& way, const std::vector<Cell>& cells, const Room& room, double frame_s,
            double wrong_depths, int repetitions, std::uint64_t seed) {
-  cfp::Random random(seed, "object_motion_study");
+  cfp::Random random(seed, "object_motion_study"), host(seed, "host");
   cfp::FrameState<double> state;
   std::vector<Outcome> outcomes;
   for (const Cell& cell : cells) {
@@ -248,6 +265,7 @@ void judge(const char* name, const Way& way, const std::vector<Cell>& cells, con
       frame.flow = {scene.previous, scene.current};
       if (way.depth_of_every > 0) frame.flow.previous_depths = scene.depths;
       if (way.exact_motion) give_motion(scene, frame);
+      if (way.host_motion) predict_motion(scene, way.host_sigmas, host, frame);
       state.boxes.resize(1);
       state.boxes[0].box = scene.box;
       estimate_objects(frame, camera, way.options, state);
@@ -341,7 +359,7 @@ int main(int argc, char** argv) {
     }
   }
 
-  print_head("one camera, no depths; then F alone");
+  print_head("one camera, no depths; then F alone; a host's motion");
   Way one_camera;
   one_camera.depth_of_every = 0;
   for (const Room& room : rooms) {
@@ -352,6 +370,10 @@ int main(int argc, char** argv) {
         one_camera.options.coarse.flow.use_motion_up_to_scale = up_to_scale;
         judge(name, one_camera, cells, room, 1 / hz, 0, repetitions, seed);
       }
+      Way host = one_camera;
+      host.options = {};
+      host.host_motion = host.host_sigmas = true;
+      judge("  a host's motion", host, cells, room, 1 / hz, 0, repetitions, seed);
     }
   }
 

@@ -175,3 +175,31 @@ TEST_CASE("The robust scale of few distances is by their median", "[frame][camer
     CHECK_THAT(cfp::robust_sigma(cfp::span(point), 2), WithinAbs(median / per_point, 1e-12));
   }
 }
+
+TEST_CASE("Two estimates of a motion join: the surer leads, an exact one stays, what is not finite is left out",
+          "[frame]") {
+  cfp::Random random(7, "joined");
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (int run = 0; run < 100; ++run) {
+    const auto near = [&](const cfp::SE3<double>& T, double sigma) {
+      cfp::Vector6<double> xi;
+      for (int k = 0; k < 6; ++k) xi[k] = sigma * random.normal();
+      return cfp::se3_exp(xi) * T;
+    };
+    const cfp::SE3<double> truth = near({}, 0.1), T = near(truth, 0.002);
+    const cfp::UncertainMotion<double> measured(near(truth, 0.001), 0.001, 0.001);
+    const auto error = [&](const cfp::UncertainMotion<double>& motion, const cfp::SE3<double>& from) {
+      return cfp::se3_log(motion.T_cur_prev * from.inverse()).norm();
+    };
+    CHECK(error(cfp::joined({T, 0, 0}, measured), T) < 1e-12);
+    CHECK(cfp::joined({T, 0, 0}, measured).covariance.isZero(0));
+    const auto equal = cfp::joined({T, 0.001, 0.001}, measured);  // half way
+    CHECK(std::abs(error(equal, T) - error(equal, measured.T_cur_prev)) < 1e-5);
+    CHECK(equal.covariance.isApprox(measured.covariance / 2, 1e-9));
+    CHECK(error(cfp::joined({T, 1, 1}, measured), measured.T_cur_prev) < 1e-6);
+    CHECK(cfp::joined({T, nan, 1}, measured).T_cur_prev.translation == measured.T_cur_prev.translation);
+    cfp::SE3<double> bad = T;
+    bad.translation[run % 3] = nan;
+    CHECK(cfp::joined({bad, 1, 1}, measured).T_cur_prev.translation == measured.T_cur_prev.translation);
+  }
+}

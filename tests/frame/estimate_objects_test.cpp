@@ -52,16 +52,57 @@ TEST_CASE("The host's motion is taken as it is", "[frame]") {
   FrameRun<double> run(scene);
   cfp::Frame<double> frame = run.frame();
   frame.flow.previous_depths = scene.previous_depths;
-  frame.T_cur_prev = scene.T_cur_prev;
+  frame.T_cur_prev = {scene.T_cur_prev, 0, 0};
   const cfp::FrameReport report = run.coarse({}, frame, scene.camera);
   CHECK(report.flow_model == cfp::FlowModelKind::motion);
   CHECK(report.flow_support == cfp::FlowSupport::caller);
   CHECK(report.unknown_objects == 0);
   const std::vector<cfp::ObjectProbability> objects = run.state.objects;
-  frame.T_cur_prev = scene.T_cur_prev.inverse();
+  frame.T_cur_prev = {scene.T_cur_prev.inverse(), 0, 0};
   FrameRun<double> other(scene);
   other.coarse({}, frame, scene.camera);
   CHECK(other.state.objects[0].static_probability < objects[0].static_probability);
+}
+
+TEST_CASE("A host's motion that errs as it says makes nobody who stands move", "[frame]") {
+  cfp_test::DynamicSceneOptions standing;
+  standing.person_motion_m = 0;
+  const cfp::Vector6<double> error = (cfp::Vector6<double>() << 0.01, -0.01, 0.01, 0.003, 0.003, -0.003).finished();
+  int as_exact = 0, with_sigmas = 0, one_camera = 0;
+  for (const int seed : {61, 62, 63, 64, 65}) {
+    const DynamicScene<double> scene = make_dynamic_scene<double>(standing, static_cast<std::uint64_t>(seed));
+    const auto called_static = [&](double sigma_m, double sigma_rad, bool depths) {
+      FrameRun<double> run(scene);
+      cfp::Frame<double> frame = run.frame();
+      if (depths) frame.flow.previous_depths = scene.previous_depths;
+      frame.T_cur_prev = {cfp::se3_exp(error) * scene.T_cur_prev, sigma_m, sigma_rad};
+      const cfp::FrameReport report = run.coarse({}, frame, scene.camera);
+      CHECK(report.unknown_objects == 0);
+      CHECK((report.flow_support == cfp::FlowSupport::caller) == (sigma_m == 0));
+      return run.state.objects[0].static_probability > cfp::FrameOptions().object_threshold ? 1 : 0;
+    };
+    as_exact += called_static(0, 0, true);
+    with_sigmas += called_static(0.01, 0.003, true);
+    one_camera += called_static(0.01, 0.003, false);
+  }
+  CHECK(as_exact == 0);
+  CHECK(with_sigmas == 5);
+  CHECK(one_camera == 5);
+}
+
+TEST_CASE("A host's motion stands in where the flow tells none", "[frame]") {
+  const DynamicScene<double> scene = make_dynamic_scene<double>({}, 61);
+  FrameRun<double> run(scene);
+  cfp::FrameOptions options;
+  options.coarse.flow.use_depth = options.coarse.flow.use_motion_up_to_scale = false;
+  options.coarse.flow.min_outside_pairs = 100000;  // no F
+  cfp::Frame<double> frame = run.frame();
+  frame.flow.previous_depths = scene.previous_depths;
+  frame.T_cur_prev = {scene.T_cur_prev, 0.001, 0.0001};
+  const cfp::FrameReport report = run.coarse(options, frame, scene.camera);
+  CHECK(report.flow_model == cfp::FlowModelKind::motion);
+  CHECK(report.flow_support == cfp::FlowSupport::caller);
+  CHECK(run.state.objects[0].static_probability < options.object_threshold);
 }
 
 TEST_CASE("What is known of an object fades with the time between two frames, whatever the clock says", "[frame]") {

@@ -126,7 +126,7 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
       for (auto& d : a.descriptors) d = in.byte();
       frame.descriptors = {a.descriptors.data(), n, 32, 32};
     }
-    if (in.byte() < 32) frame.T_cur_prev = motion(in);
+    if (in.byte() < 32) frame.T_cur_prev = {motion(in), in.number(0, 0.02), in.number(0, 0.01)};
     if (in.byte() < 32) {
       cfp::Matrix3<float> H = cfp::Matrix3<float>::Identity();
       for (int k = 0; k < 9; ++k) H.data()[k] += FuzzInput::to<float>(in.number(-0.01, 0.01));

@@ -123,7 +123,7 @@ CFP_PROPERTIES(
      [](Random& random) {
        return zero_for_truth(random,
                              [](const auto& camera, const auto& T, const auto& prev, const auto& cur, double depth) {
-                               return cfp::motion_distance(prev, depth, cur, T, camera, 1.0, {});
+                               return cfp::motion_distance(prev, depth, cur, cfp::UncertainMotion(T), camera, 1.0, {});
                              });
      }},
     {"an unsure depth never raises the motion distance, and it never exceeds the reprojection's", 300,
@@ -134,8 +134,9 @@ CFP_PROPERTIES(
        cfp::MotionDistanceOptions sure, unsure;
        sure.depth_noise.quadratic = random.uniform(0, 0.01);
        unsure.depth_noise.quadratic = sure.depth_noise.quadratic + random.uniform(0, 0.05);
-       const double depth = random.uniform(0.5, 5), a = cfp::motion_distance(prev, depth, cur, T, camera, 1.0, sure),
-                    b = cfp::motion_distance(prev, depth, cur, T, camera, 1.0, unsure);
+       const double depth = random.uniform(0.5, 5),
+                    a = cfp::motion_distance(prev, depth, cur, cfp::UncertainMotion(T), camera, 1.0, sure),
+                    b = cfp::motion_distance(prev, depth, cur, cfp::UncertainMotion(T), camera, 1.0, unsure);
        Vector3<double> ray;
        Vector2<double> u;
        if (!camera.unproject(prev, ray) || !camera.project(T * Vector3<double>(depth * ray), u)) return a == b;

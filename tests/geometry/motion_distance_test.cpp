@@ -45,8 +45,9 @@ TEST_CASE("With an exact depth the motion distance is the reprojection distance"
     const cfp::SE3<double> T = any_motion(random);
     const Pair p = pair(random);
     const double expected = cfp::reprojection_distance(p.previous, p.depth, p.current, T, camera);
-    CHECK_THAT(cfp::motion_distance(p.previous, p.depth, p.current, T, camera, 0.2, exact_depth()),
-               WithinAbs(expected, 1e-9 * (1 + expected)));
+    CHECK_THAT(
+        cfp::motion_distance(p.previous, p.depth, p.current, cfp::UncertainMotion(T), camera, 0.2, exact_depth()),
+        WithinAbs(expected, 1e-9 * (1 + expected)));
   }
 }
 
@@ -61,7 +62,7 @@ TEST_CASE("With a depth of which nothing is known the motion distance is the epi
     const double expected = cfp::epipolar_distance(cfp::fundamental_from_pose(camera, T), p.previous, p.current);
     for (const double depth :
          {0.0, -1.0, std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
-      CHECK_THAT(cfp::motion_distance(p.previous, depth, p.current, T, camera, 0.2, options),
+      CHECK_THAT(cfp::motion_distance(p.previous, depth, p.current, cfp::UncertainMotion(T), camera, 0.2, options),
                  WithinAbs(expected, 1e-5));
     }
   }
@@ -88,7 +89,8 @@ TEST_CASE("The motion distance is the Mahalanobis distance under pixel and depth
     const double a = sigma * sigma + sigma_z * sigma_z * J.x() * J.x(), b = sigma_z * sigma_z * J.x() * J.y(),
                  d = sigma * sigma + sigma_z * sigma_z * J.y() * J.y();
     const double s = (d * r.x() * r.x() - 2 * b * r.x() * r.y() + a * r.y() * r.y()) / (a * d - b * b);
-    CHECK_THAT(cfp::motion_distance(p.previous, p.depth, p.current, T, lens, sigma, cfp::MotionDistanceOptions{}),
+    CHECK_THAT(cfp::motion_distance(p.previous, p.depth, p.current, cfp::UncertainMotion(T), lens, sigma,
+                                    cfp::MotionDistanceOptions{}),
                Catch::Matchers::WithinRel(sigma * std::sqrt(s), 1e-6));
   }
 }
@@ -99,7 +101,7 @@ TEST_CASE("What the motion's own error explains counts for nothing in a motion d
   const cfp::MotionDistanceOptions options;
   const double sigma = 0.2;
   for (int i = 0; i < 500; ++i) {
-    cfp::UncertainMotion<double> motion = any_motion(random);
+    cfp::UncertainMotion<double> motion(any_motion(random));
     Eigen::Matrix<double, 6, 6> root;
     for (int k = 0; k < 36; ++k) root(k / 6, k % 6) = 0.002 * random.normal();
     motion.covariance = root * root.transpose();
@@ -131,7 +133,8 @@ TEST_CASE("What the motion's own error explains counts for nothing in a motion d
     const double mahalanobis_sq = (S(1, 1) * r[0] * r[0] - 2 * S(0, 1) * r[0] * r[1] + S(0, 0) * r[1] * r[1]) / det;
     const double d = cfp::motion_distance(p.previous, p.depth, p.current, motion, camera, sigma, options);
     CHECK_THAT(d, WithinAbs(sigma * std::sqrt(mahalanobis_sq), 1e-5 * (1 + d)));
-    CHECK(d <= cfp::motion_distance(p.previous, p.depth, p.current, motion.T_cur_prev, camera, sigma, options));
+    CHECK(d <= cfp::motion_distance(p.previous, p.depth, p.current, cfp::UncertainMotion(motion.T_cur_prev), camera,
+                                    sigma, options));
   }
 }
 
@@ -144,7 +147,8 @@ TEST_CASE("A motion distance never grows with the depth's noise", "[geometry][mo
     for (const double noise : {0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0}) {
       cfp::MotionDistanceOptions options;
       options.depth_noise = {noise, 0, 0};
-      const double d = cfp::motion_distance(p.previous, p.depth, p.current, T, camera, 0.2, options);
+      const double d =
+          cfp::motion_distance(p.previous, p.depth, p.current, cfp::UncertainMotion(T), camera, 0.2, options);
       CHECK(d <= last * (1 + 1e-12));
       last = d;
     }
@@ -156,12 +160,15 @@ TEST_CASE("Pairs that have no distance get none, and float is near double", "[ge
   const cfp::SE3<double> identity;
   const cfp::MotionDistanceOptions options;
   for (const double bad : {nan, inf, -inf}) {
-    CHECK(cfp::motion_distance({bad, 1.0}, 2.0, {1.0, 1.0}, identity, camera, 0.2, options) == -1);
-    CHECK(cfp::motion_distance({1.0, 1.0}, 2.0, {1.0, bad}, identity, camera, 0.2, options) == -1);
+    CHECK(cfp::motion_distance({bad, 1.0}, 2.0, {1.0, 1.0}, cfp::UncertainMotion(identity), camera, 0.2, options) ==
+          -1);
+    CHECK(cfp::motion_distance({1.0, 1.0}, 2.0, {1.0, bad}, cfp::UncertainMotion(identity), camera, 0.2, options) ==
+          -1);
   }
   cfp::SE3<double> behind;
   behind.translation.z() = -3;
-  CHECK(cfp::motion_distance({300.0, 200.0}, 2.0, {300.0, 200.0}, behind, camera, 0.2, options) == -1);
+  CHECK(cfp::motion_distance({300.0, 200.0}, 2.0, {300.0, 200.0}, cfp::UncertainMotion(behind), camera, 0.2, options) ==
+        -1);
 
   cfp::Random random(5, "float");
   std::vector<std::array<float, 2>> previous, current;
@@ -174,15 +181,19 @@ TEST_CASE("Pairs that have no distance get none, and float is near double", "[ge
     current.push_back({float(p.current.x()), float(p.current.y())});
     depths.push_back(i % 3 == 0 ? -1.0F : float(p.depth));
     expected.push_back(cfp::motion_distance({double(previous[i][0]), double(previous[i][1])}, double(depths[i]),
-                                            {double(current[i][0]), double(current[i][1])}, T, camera, 0.2, options));
+                                            {double(current[i][0]), double(current[i][1])}, cfp::UncertainMotion(T),
+                                            camera, 0.2, options));
   }
-  cfp::motion_distances(previous, depths, current, T.cast<float>(), camera.cast<float>(), 0.2F, options, out);
+  cfp::motion_distances(previous, depths, current, cfp::UncertainMotion(T.cast<float>()), camera.cast<float>(), 0.2F,
+                        options, out);
   for (std::size_t i = 0; i < out.size(); ++i)
     CHECK_THAT(double(out[i]), WithinAbs(expected[i], 1e-2 + 1e-4 * expected[i]));
 
   const std::vector<float> none_known(out.size(), 0.0F);
   std::vector<float> without(out.size());
-  cfp::motion_distances(previous, none_known, current, T.cast<float>(), camera.cast<float>(), 0.2F, options, out);
-  cfp::motion_distances(previous, {}, current, T.cast<float>(), camera.cast<float>(), 0.2F, options, without);
+  cfp::motion_distances(previous, none_known, current, cfp::UncertainMotion(T.cast<float>()), camera.cast<float>(),
+                        0.2F, options, out);
+  cfp::motion_distances(previous, {}, current, cfp::UncertainMotion(T.cast<float>()), camera.cast<float>(), 0.2F,
+                        options, without);
   CHECK(without == out);
 }

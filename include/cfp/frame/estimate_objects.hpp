@@ -40,19 +40,25 @@ template <typename Scalar>
   return scaled_to_noise(options, report.flow_sigma_px, coordinates_of(report.flow_model));
 }
 
-/// What the flow pairs are judged by: the host's motion or F, or the model of the pairs outside all boxes.
+/// What the flow pairs are judged by: the host's motion if it is exact, or its F; else the model of the pairs outside
+/// all boxes, joined with the host's motion where it is one of known depths, and that motion alone where there is none.
 template <typename Scalar>
 [[nodiscard]] FlowModel<Scalar> flow_model(const Frame<Scalar>& frame, const FlowPairs<Scalar>& undistorted_flow,
                                            const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
                                            FrameState<Scalar>& state) {
   const span<const char> outside(state.scratch.outside);
-  if (!frame.T_cur_prev && !frame.fundamental)
-    return estimate_flow_model(undistorted_flow, outside, camera, options, state.scratch.flow);
+  const auto& given = frame.T_cur_prev;
+  const bool exact = given && given->covariance.isZero(0);
   FlowModel<Scalar> model;
+  if (!exact && !frame.fundamental) {
+    model = estimate_flow_model(undistorted_flow, outside, camera, options, state.scratch.flow);
+    if (given && model.kind == FlowModelKind::motion) model.motion = joined(*given, model.motion);
+    if (!given || model.kind != FlowModelKind::none) return model;
+  }
   model.support = FlowSupport::caller;
   model.status = RansacStatus::ok;
-  model.kind = frame.T_cur_prev ? FlowModelKind::motion : FlowModelKind::fundamental;
-  if (frame.T_cur_prev) model.motion = frame.T_cur_prev->template cast<Scalar>();
+  model.kind = exact || !frame.fundamental ? FlowModelKind::motion : FlowModelKind::fundamental;
+  if (given) model.motion = given->template cast<Scalar>();
   if (frame.fundamental) model.F = *frame.fundamental;
   measure_sigma(undistorted_flow, outside, camera, options, model, state.scratch.flow.distances);
   return model;

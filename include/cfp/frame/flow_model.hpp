@@ -56,7 +56,7 @@ struct FlowModel {
   FlowSupport support = FlowSupport::none;
   RansacStatus status = RansacStatus::not_enough_data;  ///< of kind none or motion_up_to_scale: why there is no F
   Matrix3<Scalar> F = Matrix3<Scalar>::Zero();          ///< of kind fundamental, previous to current
-  /// Of both kinds of motion; up to scale, the room's depth is the unit of length. The caller's counts as exact.
+  /// Of both kinds of motion; up to scale, the room's depth is the unit of length.
   UncertainMotion<Scalar> motion;
   Scalar sigma_px = Scalar(0);  ///< noise of one coordinate, measured on the pairs on no object; 0: not measured
 

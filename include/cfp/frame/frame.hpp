@@ -10,6 +10,7 @@
 #include "cfp/detection/box_tracker_types.hpp"
 #include "cfp/frame/descriptor_matching.hpp"
 #include "cfp/frame/label_image.hpp"
+#include "cfp/geometry/motion_distance.hpp"
 #include "cfp/math/se3.hpp"
 
 namespace cfp {
@@ -54,8 +55,11 @@ struct Frame {
   span<const std::int32_t> object_of_keypoint;
   LabelImage labels;           ///< the same as an image: label v belongs to detection v - 1
   DescriptorSpan descriptors;  ///< binary, one per keypoint: `fine` then matches what lies in boxes by itself
-  span<const Scalar> map_point_probability;     ///< M per keypoint if matches are known by now, negative: no map point
-  std::optional<SE3<double>> T_cur_prev;        ///< the camera's motion since frame k-1, if the host knows it by now
+  span<const Scalar> map_point_probability;  ///< M per keypoint if matches are known by now, negative: no map point
+  /// The camera's motion since frame k-1, if the host knows it by now, and its standard deviations in metres and
+  /// radians: {T, 0.003, 0.001}. Flow with depths is joined with it, without depths comes before it. {T, 0, 0} is
+  /// exact: a millimetre that it errs then counts as the motion of whoever stands near.
+  std::optional<UncertainMotion<double>> T_cur_prev;
   std::optional<Matrix3<Scalar>> fundamental;   ///< F of the undistorted flow pairs, if the host has one
   std::optional<Matrix3<Scalar>> image_motion;  ///< homography from the previous image, moves the predicted boxes
 };
