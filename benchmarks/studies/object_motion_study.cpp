@@ -115,13 +115,12 @@ Scene simulate(const Cell& cell, const Room& room, double frame_s, double wrong_
   if (cell.person == 4) walk = velocity;
   cfp::Vector6<double> twist;
   twist << -velocity * frame_s, -turn * frame_s;
-  const cfp::SE3<double> T_cur_prev = cfp::se3_exp(twist);
-  scene.T_cur_prev = T_cur_prev;
+  scene.T_cur_prev = cfp::se3_exp(twist);
   const cfp::DepthNoise depth_noise;
   const auto add = [&](const V2& p, double z, const V3& step, double other_depth) {
     V3 ray;
     V2 q;
-    if (!camera.unproject(p, ray) || !camera.project(T_cur_prev * V3(z * ray + step), q)) return;
+    if (!camera.unproject(p, ray) || !camera.project(scene.T_cur_prev * V3(z * ray + step), q)) return;
     if (q.x() < 5 || q.y() < 5 || q.x() > 634 || q.y() > 474) return;
     q += noises[cell.noise] * V2(random.normal(), random.normal());
     if (random.uniform() < 0.04) q += V2(random.uniform(-6, 6), random.uniform(-6, 6));
@@ -153,12 +152,14 @@ Scene simulate(const Cell& cell, const Room& room, double frame_s, double wrong_
   return scene;
 }
 
+/// What a host hands over as the camera's motion.
+enum class Given { nothing, pairs_as_exact, prediction_as_exact, prediction };
+
 struct Way {
   const char* name = "";
   cfp::FrameOptions options;
   std::size_t depth_of_every = 1;  // so many pairs; 0: none, as with one camera
-  bool exact_motion = false;
-  bool host_motion = false, host_sigmas = false;
+  Given given = Given::nothing;
 };
 
 constexpr double host_error_m = 0.003, host_error_rad = 0.001;
@@ -181,27 +182,28 @@ std::vector<Way> ways() {
   all[0].options.coarse.object.positions = all[3].options.coarse.object.positions = {0.1, 0.2, 0.3};
   all[5].options.coarse.use_depth_foreground = false;
   all[6].depth_of_every = 2;
-  all[7].exact_motion = true;
-  all[8].host_motion = all[9].host_motion = all[9].host_sigmas = true;
+  all[7].given = Given::pairs_as_exact;
+  all[8].given = Given::prediction_as_exact;
+  all[9].given = Given::prediction;
   return all;
 }
 
-/// The motion that cfp finds in the pairs outside the box, as a host would hand it over.
-void give_motion(const Scene& scene, cfp::Frame<double>& frame) {
-  std::vector<char> outside;
-  for (const auto& p : scene.current) outside.push_back(contains(cfp::widened(scene.box, 0.1), p[0], p[1]) ? 0 : 1);
-  cfp::CameraMotionWorkspace<double> workspace;
-  const auto motion = cfp::estimate_camera_motion(frame.flow, outside, cfp::SE3<double>(), camera,
-                                                  cfp::CameraMotionOptions(), workspace);
-  if (motion.known) frame.T_cur_prev = {motion.T_cur_prev, 0, 0};
-}
-
-/// The true motion with the errors of a host's prediction.
-void predict_motion(const Scene& scene, bool with_sigmas, cfp::Random& random, cfp::Frame<double>& frame) {
+/// Hands over the motion that cfp finds in the pairs outside the box, or the true one with the errors of a prediction.
+void give_motion(Given given, const Scene& scene, cfp::Random& random, cfp::Frame<double>& frame) {
+  if (given == Given::nothing) return;
+  if (given == Given::pairs_as_exact) {
+    std::vector<char> outside;
+    for (const auto& p : scene.current) outside.push_back(contains(cfp::widened(scene.box, 0.1), p[0], p[1]) ? 0 : 1);
+    cfp::CameraMotionWorkspace<double> workspace;
+    const auto motion = cfp::estimate_camera_motion(frame.flow, outside, cfp::SE3<double>(), camera,
+                                                    cfp::CameraMotionOptions(), workspace);
+    if (motion.known) frame.T_cur_prev = {motion.T_cur_prev, 0, 0};
+    return;
+  }
   cfp::Vector6<double> error;
   for (int k = 0; k < 6; ++k) error[k] = (k < 3 ? host_error_m : host_error_rad) * random.normal();
-  const cfp::SE3<double> T = cfp::se3_exp(error) * scene.T_cur_prev;
-  frame.T_cur_prev = {T, with_sigmas ? host_error_m : 0, with_sigmas ? host_error_rad : 0};
+  const double known = given == Given::prediction ? 1 : 0;
+  frame.T_cur_prev = {cfp::se3_exp(error) * scene.T_cur_prev, known * host_error_m, known * host_error_rad};
 }
 
 struct Outcome {
@@ -264,8 +266,7 @@ void judge(const char* name, const Way& way, const std::vector<Cell>& cells, con
       cfp::Frame<double> frame;
       frame.flow = {scene.previous, scene.current};
       if (way.depth_of_every > 0) frame.flow.previous_depths = scene.depths;
-      if (way.exact_motion) give_motion(scene, frame);
-      if (way.host_motion) predict_motion(scene, way.host_sigmas, host, frame);
+      give_motion(way.given, scene, host, frame);
       state.boxes.resize(1);
       state.boxes[0].box = scene.box;
       estimate_objects(frame, camera, way.options, state);
@@ -372,7 +373,7 @@ int main(int argc, char** argv) {
       }
       Way host = one_camera;
       host.options = {};
-      host.host_motion = host.host_sigmas = true;
+      host.given = Given::prediction;
       judge("  a host's motion", host, cells, room, 1 / hz, 0, repetitions, seed);
     }
   }

@@ -65,6 +65,7 @@
 #include "cfp/math/order_statistic.hpp"
 #include "cfp/math/se3.hpp"
 #include "cfp/math/so3.hpp"
+#include "cfp/math/uncertain_motion.hpp"
 #include "cfp/optimization/bundle/bundle_adjustment.hpp"
 #include "cfp/optimization/bundle/bundle_problem.hpp"
 #include "cfp/optimization/least_squares.hpp"

@@ -116,22 +116,5 @@ template <typename Scalar>
   return motion;
 }
 
-/// Two independent estimates of one motion as one, to first order in what they differ by; the given one if it is exact.
-/// The measured one where the covariances have no common inverse, or anything is not finite.
-template <typename Scalar>
-[[nodiscard]] UncertainMotion<Scalar> joined(const UncertainMotion<double>& given,
-                                             const UncertainMotion<Scalar>& measured) noexcept {
-  const UncertainMotion<double> of_pairs = measured.template cast<double>();
-  Matrix6<double> inverse;
-  if (!invert_normal_equations<6>(Matrix6<double>(given.covariance + of_pairs.covariance), 1e-12, inverse))
-    return measured;
-  const Matrix6<double> gain = given.covariance.lazyProduct(inverse);
-  const Vector6<double> correction = gain.lazyProduct(se3_log(of_pairs.T_cur_prev * given.T_cur_prev.inverse()));
-  if (!correction.allFinite()) return measured;
-  UncertainMotion<double> result(se3_exp(correction) * given.T_cur_prev);
-  result.covariance = gain.lazyProduct(of_pairs.covariance);
-  return result.template cast<Scalar>();
-}
-
 }  // namespace CFP_ISA
 }  // namespace cfp

@@ -10,8 +10,8 @@
 #include "cfp/detection/box_tracker_types.hpp"
 #include "cfp/frame/descriptor_matching.hpp"
 #include "cfp/frame/label_image.hpp"
-#include "cfp/geometry/motion_distance.hpp"
 #include "cfp/math/se3.hpp"
+#include "cfp/math/uncertain_motion.hpp"
 
 namespace cfp {
 
@@ -57,8 +57,8 @@ struct Frame {
   DescriptorSpan descriptors;  ///< binary, one per keypoint: `fine` then matches what lies in boxes by itself
   span<const Scalar> map_point_probability;  ///< M per keypoint if matches are known by now, negative: no map point
   /// The camera's motion since frame k-1, if the host knows it by now, and its standard deviations in metres and
-  /// radians: {T, 0.003, 0.001}. Flow with depths is joined with it, without depths comes before it. {T, 0, 0} is
-  /// exact: a millimetre that it errs then counts as the motion of whoever stands near.
+  /// radians: {T, 0.003, 0.001}. Flow with depths is joined with it; an F, of the flow or the host's, comes before it.
+  /// {T, 0, 0} is exact: a millimetre that it errs then counts as the motion of whoever stands near.
   std::optional<UncertainMotion<double>> T_cur_prev;
   std::optional<Matrix3<Scalar>> fundamental;   ///< F of the undistorted flow pairs, if the host has one
   std::optional<Matrix3<Scalar>> image_motion;  ///< homography from the previous image, moves the predicted boxes

@@ -13,38 +13,13 @@
 #include "cfp/geometry/depth_noise.hpp"
 #include "cfp/geometry/distance.hpp"
 #include "cfp/math/se3.hpp"
+#include "cfp/math/uncertain_motion.hpp"
 
 namespace cfp {
 
 struct MotionDistanceOptions {
   DepthNoise depth_noise;      ///< of a measured depth
   UnknownDepth unknown_depth;  ///< of all others
-};
-
-/// A motion of the camera, and how well it is known.
-template <typename Scalar>
-struct UncertainMotion {
-  SE3<Scalar> T_cur_prev;
-  /// Of xi = (translation, rotation) in exp(xi) T_cur_prev: m^2, m rad, rad^2; zero: the motion is exact.
-  Eigen::Matrix<Scalar, 6, 6, Eigen::DontAlign> covariance = Eigen::Matrix<Scalar, 6, 6, Eigen::DontAlign>::Zero();
-
-  // Inline: a default one may stand out of line, and what zeroes a matrix must not be shared by units of other flags.
-  CFP_INLINE UncertainMotion() noexcept {}  // NOLINT(modernize-use-equals-default)
-  CFP_INLINE explicit UncertainMotion(const SE3<Scalar>& exact) noexcept : T_cur_prev(exact) {}
-  /// Standard deviations of each coordinate of the translation, m, and of the rotation, rad.
-  CFP_INLINE UncertainMotion(const SE3<Scalar>& T, Scalar translation_sigma_m, Scalar rotation_sigma_rad) noexcept
-      : T_cur_prev(T) {
-    for (int k = 0; k < 6; ++k) {
-      const Scalar sigma = k < 3 ? translation_sigma_m : rotation_sigma_rad;
-      covariance(k, k) = sigma * sigma;
-    }
-  }
-  template <typename Other>
-  [[nodiscard]] CFP_INLINE UncertainMotion<Other> cast() const noexcept {
-    UncertainMotion<Other> result(T_cur_prev.template cast<Other>());
-    for (int k = 0; k < 36; ++k) result.covariance.data()[k] = static_cast<Other>(covariance.data()[k]);
-    return result;
-  }
 };
 
 inline namespace CFP_ISA {
