@@ -127,7 +127,6 @@ class Tracking {
       if (!mCurrentFrame.mvpMapPoints[i] || mCurrentFrame.mvbOutlier[i]) continue;
       if (!mpWeights || mpWeights->CountsAsInlier(mCurrentFrame, i)) ++mnMatchesInliers;  // cfp
     }
-    if (mpWeights) mpWeights->Learn(mCurrentFrame);  // cfp: M of all that it saw
     return mnMatchesInliers >= 30;
   }
 
