@@ -43,9 +43,8 @@ struct DenseBoxFilter {
   }
   [[nodiscard]] bool predict(double dt, const cfp::BoxMotionOptions& o) {
     Matrix8 Q = Matrix8::Zero();
-    const double w = std::exp(state.mean[2]), h = std::exp(state.mean[3]);
-    const std::array<double, 4> q{o.centre_acceleration * w, o.centre_acceleration * h, o.size_acceleration,
-                                  o.size_acceleration};
+    const double centre = o.centre_acceleration * std::exp(state.mean[2]);
+    const std::array<double, 4> q{centre, centre, o.size_acceleration, o.size_acceleration};
     for (int i = 0; i < 4; ++i) {
       const double d = q[static_cast<std::size_t>(i)] * q[static_cast<std::size_t>(i)];
       Q(i, i) = d * dt * dt * dt / 3;

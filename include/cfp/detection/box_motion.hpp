@@ -3,7 +3,8 @@
 /// width and height positive however long a box is predicted. The paper (IV-A) names an EKF and leaves state, noise and
 /// time open.
 ///
-/// Motion: constant rates, white noise on the accelerations (RateFilter).
+/// Motion: constant rates, white noise on the accelerations (RateFilter), as large across as up and down: a box that is
+/// higher than wide does not move faster up and down for that.
 /// Measurement: the four edges, h = (u - w/2, u + w/2, v - h/2, v + h/2) with w = exp(log width): not linear, hence an
 /// EKF. The noise of an edge is proportional to the box, s_x = edge_noise * w for the vertical edges and s_y =
 /// edge_noise * h for the horizontal ones, w and h of the prediction.
@@ -29,9 +30,9 @@ namespace cfp {
 /// Defaults from benchmarks/studies/tracker_study.cpp (TUD-Stadtmitte and simulated walkers).
 struct BoxMotionOptions {
   double edge_noise = 0.07;          ///< standard deviation of an edge / size of the box, in (0, 1]
-  double centre_acceleration = 1.0;  ///< q of the centre / size of the box, s^-1.5, >= 0
+  double centre_acceleration = 1.0;  ///< q of the centre, both ways, / width of the box, s^-1.5, >= 0
   double size_acceleration = 0.2;    ///< q of the log size, s^-1.5, >= 0
-  double initial_centre_rate = 2.0;  ///< standard deviation of a new box's velocity / size, per second, > 0
+  double initial_centre_rate = 2.0;  ///< standard deviation of a new box's velocity / width, per second, > 0
   double initial_size_rate = 0.2;    ///< the same of the log size rate, per second, > 0
 };
 
@@ -125,11 +126,10 @@ template <typename Scalar>
 [[nodiscard]] BoxFilter<Scalar> make_box_filter(const Box<Scalar>& box, const BoxMotionOptions& options) noexcept {
   const Scalar w = box.width(), h = box.height(), zero(0);
   const Scalar noise = Scalar(options.edge_noise) * Scalar(options.edge_noise);
-  const Scalar rate_u = Scalar(options.initial_centre_rate) * w, rate_v = Scalar(options.initial_centre_rate) * h;
-  const Scalar size_rate = Scalar(options.initial_size_rate);
+  const Scalar centre_rate = Scalar(options.initial_centre_rate) * w, size_rate = Scalar(options.initial_size_rate);
   BoxFilter<Scalar> filter;
-  filter.u = {Scalar(0.5) * (box.x1 + box.x2), zero, noise * w * w / Scalar(2), zero, rate_u * rate_u};
-  filter.v = {Scalar(0.5) * (box.y1 + box.y2), zero, noise * h * h / Scalar(2), zero, rate_v * rate_v};
+  filter.u = {Scalar(0.5) * (box.x1 + box.x2), zero, noise * w * w / Scalar(2), zero, centre_rate * centre_rate};
+  filter.v = {Scalar(0.5) * (box.y1 + box.y2), zero, noise * h * h / Scalar(2), zero, centre_rate * centre_rate};
   filter.log_width = {Scalar(std::log(w)), zero, Scalar(2) * noise, zero, size_rate * size_rate};
   filter.log_height = {Scalar(std::log(h)), zero, Scalar(2) * noise, zero, size_rate * size_rate};
   detail::confine(filter);
@@ -141,9 +141,10 @@ template <typename Scalar>
 /// up to there.
 template <typename Scalar>
 void predict_box(BoxFilter<Scalar>& filter, non_deduced<Scalar> dt_s, const BoxMotionOptions& options) noexcept {
-  const Scalar q = Scalar(options.centre_acceleration), q_size = Scalar(options.size_acceleration);
-  filter.u.predict(dt_s, q * std::exp(filter.log_width.value));
-  filter.v.predict(dt_s, q * std::exp(filter.log_height.value));
+  const Scalar q = Scalar(options.centre_acceleration) * std::exp(filter.log_width.value);
+  const Scalar q_size = Scalar(options.size_acceleration);
+  filter.u.predict(dt_s, q);
+  filter.v.predict(dt_s, q);
   filter.log_width.predict(dt_s, q_size);
   filter.log_height.predict(dt_s, q_size);
   detail::confine(filter);
