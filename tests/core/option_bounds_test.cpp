@@ -98,6 +98,7 @@ TEST_CASE("The ends of the ranges of a frame's options", "[core]") {
       CFP_FIELD(O, tracker.motion.initial_centre_rate, (Range{0, false, 1e6, true})),
       CFP_FIELD(O, tracker.motion.initial_size_rate, (Range{0, false, 1e6, true})),
       CFP_FIELD(O, tracker.min_iou, below_one),
+      CFP_FIELD(O, tracker.restart_gate, (Range{0, true, 1e6, true})),
       CFP_FIELD(O, tracker.coast_per_hit, positive),
       CFP_FIELD(O, tracker.min_visible, share),
       CFP_FIELD(O, tracker.max_gap_s, (Range{0, false, 1e6, true})),

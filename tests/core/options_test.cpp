@@ -49,6 +49,7 @@ TEST_CASE("Every option of a frame is refused by its full, unique name", "[core]
       {"tracker.motion.initial_centre_rate", [&](auto& o) { o.tracker.motion.initial_centre_rate = nan; }},
       {"tracker.motion.initial_size_rate", [&](auto& o) { o.tracker.motion.initial_size_rate = nan; }},
       {"tracker.min_iou", [&](auto& o) { o.tracker.min_iou = nan; }},
+      {"tracker.restart_gate", [&](auto& o) { o.tracker.restart_gate = nan; }},
       {"tracker.min_score", [&](auto& o) { o.tracker.min_score = nan; }},
       {"tracker.birth_threshold", [&](auto& o) { o.tracker.birth_threshold = nan; }},
       {"tracker.confirm_hits", [](auto& o) { o.tracker.confirm_hits = 0; }},

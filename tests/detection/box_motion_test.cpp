@@ -56,8 +56,10 @@ TEMPLATE_TEST_CASE("Four two-state filters are the eight-state EKF on edges", "[
       const double s = 0.05 * start.width();
       const cfp::Box<double> seen{start.x1 + 3 * k + s * random.normal(), start.y1 + s * random.normal(),
                                   start.x2 + 3 * k + s * random.normal(), start.y2 + s * random.normal()};
+      const auto distance_sq = static_cast<double>(cfp::box_distance_sq(split, cast(seen), options));
       cfp::correct_box(split, cast(seen), options);
       REQUIRE(dense.correct(seen, options));
+      REQUIRE_THAT(distance_sq, WithinAbs(dense.distance_sq, 10 * tolerance * (1 + dense.distance_sq)));
       require_equal(split, dense, tolerance);
     }
   }

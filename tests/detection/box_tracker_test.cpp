@@ -179,6 +179,54 @@ TEST_CASE("Scores: below min_score ignored, below birth_threshold only extends",
   CHECK((result.ignored == 1 && result.compensated == 1));
 }
 
+TEST_CASE("Who comes back beside the prediction keeps the id, and has to be seen again to be compensated",
+          "[detection]") {
+  const Box start{100, 100, 180, 340};
+  const auto expected = [&](int k) { return shifted(start, 30 * k); };
+  const Box turned = shifted(expected(8), -60);
+  REQUIRE(cfp::iou(expected(8), turned) < 0.3);
+  const auto tracked = [&](const cfp::BoxTrackerOptions& options, const cfp::Detection<double>& seen) {
+    cfp::BoxTracker<double> tracker(options);
+    for (int k = 0; k < 8; ++k)
+      tracker.track(k < 6 ? Detections{{expected(k), 0, 1}} : Detections{}, k == 0 ? 0.0 : 0.2);
+    const Boxes boxes = copy(tracker.track(Detections{seen}, 0.2));
+    return std::make_pair(boxes, tracker.track({}, 0.2).compensated);
+  };
+  const auto [boxes, compensated_after] = tracked({}, {turned, 0, 1});
+  REQUIRE(boxes.size() == 1);
+  CHECK((boxes[0].id == 1 && boxes[0].detection == 0 && boxes[0].associated && boxes[0].age == 0));
+  CHECK((boxes[0].rate_x == 0 && boxes[0].box.x1 == turned.x1));
+  CHECK(compensated_after == 0);
+
+  const auto is_somebody_new = [](const auto& result) {
+    const Boxes& b = result.first;
+    return b.size() == 2 && b[0].id == 1 && b[0].compensated() && b[1].id == 2 && !b[1].associated;
+  };
+  cfp::BoxTrackerOptions options;
+  options.restart_gate = 0;
+  CHECK(is_somebody_new(tracked(options, {turned, 0, 1})));
+  CHECK(is_somebody_new(tracked({}, {turned, 1, 1})));                            // of another class
+  CHECK(is_somebody_new(tracked({}, {shifted(expected(8), 400), 0, 1})));         // too far
+  CHECK(is_somebody_new(tracked({}, {{turned.x1, 100, turned.x2, 150}, 0, 1})));  // of another shape
+  options = {};
+  options.birth_threshold = 0.6;
+  const auto [unsure, after] = tracked(options, {turned, 0, 0.5});  // starts nothing, nor anything anew
+  CHECK((unsure.size() == 1 && unsure[0].compensated() && after == 1));
+}
+
+TEST_CASE("Of two tracks without a detection the nearer one starts anew", "[detection]") {
+  for (const double side : {-1.0, 1.0}) {
+    cfp::BoxTracker<double> tracker;
+    const Box a{100, 100, 180, 340}, b{190, 100, 270, 340};
+    for (int k = 0; k < 5; ++k) tracker.track(Detections{{a, 0, 1}, {b, 0, 1}}, 0.2);
+    tracker.track({}, 0.4);
+    const auto result = tracker.track(Detections{{side < 0 ? shifted(a, -55) : shifted(b, 55), 0, 1}}, 0.4);
+    REQUIRE(result.boxes.size() == 2);
+    CHECK(result.boxes[side < 0 ? 0 : 1].detection == 0);
+    CHECK(result.boxes[side < 0 ? 1 : 0].compensated());
+  }
+}
+
 TEST_CASE("A box is used up to 1e6 px on each side and skipped beyond", "[detection]") {
   const double beyond = std::nextafter(1e6, 2e6);
   double Box::*const edges[] = {&Box::x1, &Box::y1, &Box::x2, &Box::y2};
@@ -350,7 +398,7 @@ TEST_CASE("A hundred thousand frames: ids grow, ages and memory stay bounded", "
       if (age_of_id.size() <= static_cast<std::size_t>(box.id))
         age_of_id.resize(static_cast<std::size_t>(box.id) + 1, -1);
       int& age = age_of_id[static_cast<std::size_t>(box.id)];
-      REQUIRE(box.age > age);
+      REQUIRE((box.age > age || (box.age == 0 && box.detection >= 0)));  // or it started anew
       age = box.age;
       REQUIRE((box.missed >= 0 && box.missed <= 6 && cfp::is_proper(box.box)));
     }

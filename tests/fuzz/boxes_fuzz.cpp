@@ -69,8 +69,8 @@ void tracker(FuzzInput& in) {
   cfp::BoxMotionOptions& m = options.motion;
   cfp_fuzz::disturb(in, options,
                     {&m.edge_noise, &m.centre_acceleration, &m.size_acceleration, &m.initial_centre_rate,
-                     &m.initial_size_rate, &options.min_iou, &options.min_score, &options.birth_threshold,
-                     &options.coast_per_hit, &options.min_visible, &options.max_gap_s});
+                     &m.initial_size_rate, &options.min_iou, &options.restart_gate, &options.min_score,
+                     &options.birth_threshold, &options.coast_per_hit, &options.min_visible, &options.max_gap_s});
   const double largest = in.byte() < 32 ? 1e5 : 640;
   cfp::BoxTracker<Scalar> tracker(options);
   std::int64_t newest = 0;

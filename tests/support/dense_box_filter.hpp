@@ -27,6 +27,7 @@ struct DenseBoxFilter {
   using Vector8 = Eigen::Matrix<double, 8, 1>;
   using Matrix8 = Eigen::Matrix<double, 8, 8>;
   cfp_testing::EkfState<double, 8> state;
+  double distance_sq = 0;  // Mahalanobis, of the last measurement
 
   template <typename Scalar>
   explicit DenseBoxFilter(const cfp::BoxFilter<Scalar>& f) {
@@ -63,7 +64,9 @@ struct DenseBoxFilter {
     const Eigen::Matrix4d R = Eigen::Vector4d(sx * sx, sx * sx, sy * sy, sy * sy).asDiagonal();
     const Eigen::Vector4d z(b.x1, b.x2, b.y1, b.y2);
     const auto measure = [](const Vector8& m, Eigen::Matrix<double, 4, 8>& H) { return box_edges(m, H); };
-    return cfp_testing::ekf_update(state, z, measure, R).status == cfp::Status::ok;
+    const cfp_testing::EkfUpdate update = cfp_testing::ekf_update(state, z, measure, R);
+    distance_sq = update.mahalanobis_sq;
+    return update.status == cfp::Status::ok;
   }
 };
 

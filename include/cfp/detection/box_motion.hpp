@@ -116,6 +116,18 @@ void confine(BoxFilter<Scalar>& filter) noexcept {
   confine(filter.log_height, Scalar(0), Scalar(box_largest_log), Scalar(1e3));
 }
 
+// Calls visit(part, innovation, variance of its measurement) for each of the four filters.
+template <typename Filter, typename Scalar, typename Visit>
+CFP_INLINE void for_each_innovation(Filter& filter, const Box<Scalar>& measured, const BoxMotionOptions& options,
+                                    const Visit& visit) noexcept {
+  const Scalar w = std::exp(filter.log_width.value), h = std::exp(filter.log_height.value);
+  const Scalar noise = Scalar(options.edge_noise) * Scalar(options.edge_noise);
+  visit(filter.u, Scalar(0.5) * (measured.x1 + measured.x2) - filter.u.value, noise * w * w / Scalar(2));
+  visit(filter.v, Scalar(0.5) * (measured.y1 + measured.y2) - filter.v.value, noise * h * h / Scalar(2));
+  visit(filter.log_width, (measured.width() - w) / w, Scalar(2) * noise);
+  visit(filter.log_height, (measured.height() - h) / h, Scalar(2) * noise);
+}
+
 }  // namespace CFP_ISA
 }  // namespace detail
 
@@ -154,13 +166,23 @@ void predict_box(BoxFilter<Scalar>& filter, non_deduced<Scalar> dt_s, const BoxM
 template <typename Scalar>
 void correct_box(BoxFilter<Scalar>& filter, const Box<Scalar>& measured, const BoxMotionOptions& options) noexcept {
   if (!is_proper(measured)) return;
-  const Scalar w = std::exp(filter.log_width.value), h = std::exp(filter.log_height.value);
-  const Scalar noise = Scalar(options.edge_noise) * Scalar(options.edge_noise);
-  filter.u.correct(Scalar(0.5) * (measured.x1 + measured.x2) - filter.u.value, noise * w * w / Scalar(2));
-  filter.v.correct(Scalar(0.5) * (measured.y1 + measured.y2) - filter.v.value, noise * h * h / Scalar(2));
-  filter.log_width.correct((measured.width() - w) / w, Scalar(2) * noise);
-  filter.log_height.correct((measured.height() - h) / h, Scalar(2) * noise);
+  detail::for_each_innovation(
+      filter, measured, options,
+      [](RateFilter<Scalar>& part, Scalar innovation, Scalar variance) { part.correct(innovation, variance); });
   detail::confine(filter);
+}
+
+/// Squared Mahalanobis distance of a detected box (proper) from the predicted one, >= 0: chi-squared with four degrees
+/// of freedom if it is the same object. Not finite where numbers overflow.
+template <typename Scalar>
+[[nodiscard]] Scalar box_distance_sq(const BoxFilter<Scalar>& filter, const Box<Scalar>& measured,
+                                     const BoxMotionOptions& options) noexcept {
+  Scalar sum(0);
+  detail::for_each_innovation(filter, measured, options,
+                              [&](const RateFilter<Scalar>& part, Scalar innovation, Scalar variance) {
+                                sum += innovation * innovation / (part.var_value + variance);
+                              });
+  return sum;
 }
 
 /// Where an image motion takes the filter: `H` (homography; affine when its last row is 0 0 1) maps pixels of the frame

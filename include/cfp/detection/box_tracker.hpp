@@ -30,15 +30,18 @@ class BoxTracker {
 
   /// The next frame, dt_s seconds after the one before (0 for the first). Every detection that counts is output, from
   /// its first frame on; a track with at least confirm_hits detections is compensated for up to max_coast frames; one
-  /// with fewer ends with the first miss. image_motion, when given, maps pixels of the frame before to this one (see
-  /// `warp_box`) and is applied to the predictions: hand it over when the camera turns fast.
+  /// with fewer ends with the first miss. A detection that no track takes by its overlap, but that is within
+  /// restart_gate of one without a detection, starts that track anew, with its id. image_motion, when given, maps
+  /// pixels of the frame before to this one (see `warp_box`) and is applied to the predictions: hand it over when the
+  /// camera turns fast.
   BoxTrackerResult<Scalar> track(span<const Detection<Scalar>> detections, Scalar dt_s,
                                  const Matrix3<Scalar>* image_motion = nullptr) {
     BoxTrackerResult<Scalar> result = advance(dt_s, image_motion);
     select(detections, result);
     partner_.resize(tracks_.size());
-    associate_boxes(tracks_, candidates_, options_.min_iou, workspace_, partner_);
+    const std::size_t pairs = associate_boxes(tracks_, candidates_, options_.min_iou, workspace_, partner_).pairs;
     extend_tracks();
+    if (pairs < (std::min)(tracks_.size(), candidates_.size())) restart_tracks();
     start_tracks(result);
     output(result, true);
     return result;
@@ -122,20 +125,46 @@ class BoxTracker {
     track.hits = next(track.hits);
   }
 
-  void extend_tracks() {
+  template <typename Take>
+  void take_partners(const Take& take) {
     for (std::size_t i = 0; i < tracks_.size(); ++i) {
       if (partner_[i] == unassigned) continue;
       Candidate& candidate = candidates_[static_cast<std::size_t>(partner_[i])];
-      correct_box(tracks_[i].filter, candidate.box, options_.motion);
+      take(tracks_[i], candidate);
       show(candidate, tracks_[i]);
       candidate.free = false;
     }
   }
 
+  void extend_tracks() {
+    take_partners([this](Track& track, const Candidate& candidate) {
+      correct_box(track.filter, candidate.box, options_.motion);
+    });
+  }
+
+  // Who turned is not where he is predicted: to go on with the prediction would put a box beside him. The object is the
+  // same; its motion is not, and has to be seen again before it is compensated.
+  void restart_tracks() {
+    const auto distance_sq = [this](const Track& track, const Candidate& candidate) {
+      const bool open = track.compensated() && candidate.free && starts(candidate);
+      return open ? static_cast<double>(box_distance_sq(track.filter, candidate.box, options_.motion))
+                  : detail::infinity;
+    };
+    associate(tracks_, candidates_, distance_sq, options_.restart_gate * options_.restart_gate, workspace_, partner_);
+    take_partners([this](Track& track, const Candidate& candidate) {
+      track.filter = make_box_filter(candidate.box, options_.motion);
+      track.hits = track.age = 0;
+    });
+  }
+
+  [[nodiscard]] bool starts(const Candidate& candidate) const noexcept {
+    return static_cast<double>(candidate.score) >= options_.birth_threshold;
+  }
+
   void start_tracks(BoxTrackerResult<Scalar>& result) {
     for (const Candidate& candidate : candidates_) {
       if (!candidate.free) continue;
-      if (!(static_cast<double>(candidate.score) >= options_.birth_threshold)) {
+      if (!starts(candidate)) {
         ++result.ignored;
         continue;
       }

@@ -21,13 +21,13 @@ struct Detection {
 /// One box of the tracker's output.
 template <typename Scalar>
 struct TrackedBox {
-  Box<Scalar> box;  ///< as detected, or as predicted and clipped to the image when compensated
+  Box<Scalar> box;            ///< as detected, or as predicted and clipped to the image when compensated
   Scalar rate_x{}, rate_y{};  ///< of its centre, px/s, without the image motion that the caller handed over
   int class_id = 0;
   Scalar score{};       ///< of the last detection
   std::int64_t id = 0;  ///< 1, 2, 3, ...; never used twice between resets
   int detection = -1;   ///< index among this frame's detections; -1: compensated, the detector missed it
-  int age = 0;          ///< frames since the first detection
+  int age = 0;          ///< frames since the first detection, or the one that started the track anew
   int missed = 0;       ///< frames since the last detection; 0 when detected
   /// this object had an output box in frame k-1; false: its foreground gets K = 0 (paper IV-D)
   bool associated = false;
@@ -39,7 +39,10 @@ struct TrackedBox {
 /// it).
 struct BoxTrackerOptions {
   BoxMotionOptions motion;
-  double min_iou = 0.3;       ///< gate of the association: a pair needs more than this IoU, in [0, 1)
+  double min_iou = 0.3;  ///< gate of the association: a pair needs more than this IoU, in [0, 1)
+  /// gate of what starts a track anew: a detection that no track takes, and a track without one, closer than this by
+  /// `box_distance_sq`, in standard deviations, >= 0 (0: such a detection is somebody new)
+  double restart_gate = 4;
   double min_score = -1e300;  ///< detections below are ignored
   /// detections below extend a track but start none (and are not output when they extend none)
   double birth_threshold = -1e300;
@@ -56,6 +59,7 @@ struct BoxTrackerOptions {
 [[nodiscard]] inline OptionPath invalid_field(const BoxTrackerOptions& o) noexcept {
   if (const OptionPath field = nested("motion", invalid_field(o.motion))) return field;
   if (!(o.min_iou >= 0 && o.min_iou < 1)) return "min_iou";
+  if (!(o.restart_gate >= 0 && o.restart_gate <= 1e6)) return "restart_gate";
   if (!is_finite(o.min_score)) return "min_score";
   if (!is_finite(o.birth_threshold)) return "birth_threshold";
   if (!(o.confirm_hits >= 1)) return "confirm_hits";
