@@ -138,8 +138,8 @@
   CFP_LAYOUT(cfp::CameraMotionOptions, pose)                             \
   CFP_LAYOUT(cfp::CameraMotion<float>, sigma_px)                         \
   CFP_LAYOUT(cfp::CameraMotion<double>, sigma_px)                        \
-  CFP_LAYOUT(cfp::CameraMotionWorkspace<float>, pose)                    \
-  CFP_LAYOUT(cfp::CameraMotionWorkspace<double>, pose)                   \
+  CFP_LAYOUT(cfp::CameraMotionWorkspace<float>, search)                  \
+  CFP_LAYOUT(cfp::CameraMotionWorkspace<double>, search)                 \
   CFP_LAYOUT(cfp::UnknownDepth, inverse_sigma)                           \
   CFP_LAYOUT(cfp::MotionDistanceOptions, unknown_depth)                  \
   CFP_LAYOUT(cfp::ObjectMemoryOptions, evidence_limit)                   \
@@ -160,6 +160,7 @@
   CFP_LAYOUT(cfp::DescriptorMatchWorkspace<float>, holders) \
   CFP_LAYOUT(cfp::DescriptorMatchWorkspace<double>, holders) \
   CFP_LAYOUT(cfp::CoarseOptions, foreground) \
+  CFP_LAYOUT(cfp::UnreportedOptions, max_share) \
   CFP_LAYOUT(cfp::FineOptions, matching) \
   CFP_LAYOUT(cfp::FrameOptions, min_inlier_weight) \
   CFP_LAYOUT(cfp::ConstraintReport, confidence) \

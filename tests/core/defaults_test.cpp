@@ -31,11 +31,13 @@ TEST_CASE("The defaults of the flow and of objects", "[core]") {
   const cfp::FrameOptions frame;
   const cfp::CoarseOptions& o = frame.coarse;
   CHECK((o.use_object_probability && o.use_depth_foreground && o.soft_background && o.flow_radius_px == 10));
+  CHECK((o.unreported.radius_px == 30 && o.unreported.min_pairs == 6 && o.unreported.max_share == 0.4));
   const cfp::FlowModelOptions& flow = o.flow;
   CHECK((flow.min_outside_pairs == 30 && flow.margin == 0.1 && flow.use_motion_up_to_scale && flow.use_depth));
   CHECK((flow.nearer_than_room.inverse_mean == 2.5 && flow.nearer_than_room.inverse_sigma == 1));
   CHECK((flow.motion.min_pairs == 12 && flow.motion.min_inlier_share == 0.5));
   CHECK((flow.motion.min_sigma_px == 0.05 && flow.motion.max_sigma_px == 1));
+  CHECK(flow.motion.search_above_px == 0.25);
   CHECK((o.object.score == cfp::ObjectScore::survival && o.object.degrees_of_freedom == 2));
   CHECK((o.object.sigma_px == 1 && o.object.noise_factor == 5.8 && o.object.min_pairs == 10));
   CHECK((o.object.positions == std::array<double, 3>{0.2, 0.3, 0.4}));

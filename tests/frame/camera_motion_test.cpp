@@ -203,3 +203,29 @@ TEST_CASE("Two estimates of a motion join: the surer leads, an exact one stays, 
     CHECK(cfp::joined({bad, 1, 1}, measured).T_cur_prev.translation == measured.T_cur_prev.translation);
   }
 }
+
+TEST_CASE("A third of the pairs that move together neither turn the camera's motion nor hide in its noise",
+          "[frame][camera_motion]") {
+  cfp::Random random(8, "walker");
+  cfp::CameraMotionWorkspace<double> workspace;
+  cfp::CameraMotionOptions without;
+  without.search_above_px = 1e9;
+  int misled = 0;
+  for (const double moves_px : {2.5, 4.0, 8.0}) {
+    for (int i = 0; i < 20; ++i) {
+      const cfp::SE3<double> T = motion(0.01, 0.005, random);
+      const Flow f = flow(300, T, 0.1, 3, random, moves_px);
+      const cfp::CameraMotion<double> found =
+          cfp::estimate_camera_motion<double>(f.pairs(), f.outside, cfp::SE3<double>(), camera, {}, workspace);
+      REQUIRE(found.known);
+      CHECK((T.inverse() * found.T_cur_prev).translation.norm() < 0.005);
+      CHECK(found.sigma_px < 0.25);
+      misled +=
+          cfp::estimate_camera_motion<double>(f.pairs(), f.outside, cfp::SE3<double>(), camera, without, workspace)
+                      .sigma_px > 0.25
+              ? 1
+              : 0;
+    }
+  }
+  CHECK(misled >= 10);
+}

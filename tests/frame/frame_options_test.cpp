@@ -15,6 +15,10 @@ TEST_CASE("Frame options outside their range are named by their whole path", "[f
   };
   CHECK(named([](auto& o) { o.coarse.flow.ransac.confidence = 2; }) == "coarse.flow.ransac.confidence");
   CHECK(named([](auto& o) { o.coarse.flow_radius_px = -1; }) == "coarse.flow_radius_px");
+  CHECK(named([](auto& o) { o.coarse.unreported.radius_px = -1; }) == "coarse.unreported.radius_px");
+  CHECK(named([](auto& o) { o.coarse.unreported.min_pairs = 0; }) == "coarse.unreported.min_pairs");
+  CHECK(named([](auto& o) { o.coarse.unreported.max_share = 1.1; }) == "coarse.unreported.max_share");
+  CHECK(named([](auto& o) { o.coarse.flow.motion.search_above_px = 0; }) == "coarse.flow.motion.search_above_px");
   CHECK(named([](auto& o) { o.fine.min_parallax = -1; }) == "fine.min_parallax");
   CHECK(named([](auto& o) { o.fine.epipolar.quantile = 2; }) == "fine.epipolar.quantile");
   CHECK(named([](auto& o) { o.fine.matching.max_ratio = 0; }) == "fine.matching.max_ratio");

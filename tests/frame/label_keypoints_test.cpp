@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include "cfp/core/options.hpp"
@@ -285,5 +286,62 @@ TEST_CASE("The flow at a keypoint's place is the score of the next pair in its b
       ++(expected < 0 ? none : found);
     }
     CHECK((found > 50 && none > 50));
+  }
+}
+
+TEST_CASE("What moves and nobody reported loses its weight by the flow around it, and makes no map points", "[frame]") {
+  cfp_test::DynamicSceneOptions scene;
+  scene.pixel_noise_px = 0.15;
+  for (const std::uint64_t seed : {90U, 91U, 92U}) {
+    FrameRun<double> run(make_dynamic_scene<double>(scene, seed));
+    const auto people = std::exchange(run.scene.boxes, {});
+    const auto beside_people = [&](std::size_t i) {  // whose points are seen through by the wall's
+      const auto& [x, y] = run.scene.keypoints[i];
+      return std::any_of(people.begin(), people.end(), [x = x, y = y](const cfp::Box<double>& box) {
+        return cfp::contains(cfp::Box<double>{box.x1 - 30, box.y1 - 30, box.x2 + 30, box.y2 + 30}, x, y);
+      });
+    };
+    cfp::Frame<double> frame = run.frame();
+    frame.flow.previous_depths = run.scene.previous_depths;
+    cfp::FrameOptions options;
+    run.coarse(options, frame, run.scene.camera);
+    REQUIRE(run.state.report.flow_model == cfp::FlowModelKind::motion);
+    std::array<int, 2> marked{}, all{};
+    for (std::size_t i = 0; i < run.m.size(); ++i) {
+      const bool moves = run.scene.is_static[i] == 0, mark = run.state.flow_probability[i] >= 0;
+      CHECK(run.label(i) == KeypointLabel::outside);
+      if (!moves && beside_people(i)) continue;
+      marked[moves] += mark ? 1 : 0;
+      ++all[moves];
+      const double weight = cfp::model_weight(i, 0.98, options, run.state);
+      if (!mark) CHECK(weight == 0.98);
+      if (!mark || !moves) continue;
+      CHECK(weight < 0.6);
+      CHECK_FALSE(cfp::may_create_map_point(cfp::model_weight(i, -1.0, options, run.state), options));
+    }
+    CHECK(marked[1] > 0.8 * all[1]);  // at their edges most of what is near rests
+    CHECK((all[0] > 300 && marked[0] < 0.01 * all[0]));
+    CHECK(run.state.report.unreported >= static_cast<std::size_t>(marked[1]));
+
+    run.fine(options);  // M learns
+    for (std::size_t i = 0; i < run.m.size(); ++i) {
+      if (run.state.flow_probability[i] >= 0 && run.scene.is_static[i] == 0) CHECK(run.m[i] < 0.97);
+      if (run.state.flow_probability[i] < 0) CHECK(run.m[i] >= 0.98);
+    }
+
+    // Off, with the printed weights, and where so much moves that it may as well be the camera: nothing is said.
+    const auto says_nothing = [&](const auto& change) {
+      cfp::FrameOptions changed;
+      change(changed);
+      run.coarse(changed, frame, run.scene.camera);
+      return run.state.report.unreported == 0 &&
+             std::all_of(run.state.flow_probability.begin(), run.state.flow_probability.end(),
+                         [](double p) { return p < 0; });
+    };
+    CHECK(says_nothing([](auto& o) { o.coarse.unreported.radius_px = 0; }));
+    CHECK(says_nothing([](auto& o) { o.map_point.weight = cfp::WeightRule::product; }));
+    CHECK(says_nothing([](auto& o) { o.coarse.unreported.max_share = 0.1; }));
+    CHECK(says_nothing([](auto& o) { o.coarse.unreported.min_pairs = 1000; }));
+    CHECK(says_nothing([](auto& o) { o.use_boxes = false; }));
   }
 }

@@ -14,6 +14,7 @@
 #include "cfp/geometry/motion_distance.hpp"
 #include "cfp/math/order_statistic.hpp"
 #include "cfp/optimization/pose/pose_refinement.hpp"
+#include "cfp/robust/pnp_ransac.hpp"
 
 namespace cfp {
 
@@ -23,6 +24,9 @@ struct CameraMotionOptions {
   double min_inlier_share = 0.5;
   double min_sigma_px = 0.05;  ///< the noise of the flow is measured and kept in these bounds, > 0
   double max_sigma_px = 1;     ///< >= min_sigma_px
+  /// More noise than this may be something that moves and no box holds: the motion is then searched by pnp_ransac,
+  /// which a third of such pairs do not mislead; px, > 0.
+  double search_above_px = 0.25;
   MotionDistanceOptions distance;
   PoseOptions pose;
 };
@@ -41,6 +45,7 @@ struct CameraMotionWorkspace {
   std::vector<std::array<Scalar, 3>> points;  // of the pairs, in the previous camera; NaN: takes no part
   std::vector<Scalar> sigmas, distances;
   PoseWorkspace<Scalar> pose;
+  PnpRansacWorkspace search;
 };
 
 inline namespace CFP_ISA {
@@ -50,6 +55,7 @@ inline namespace CFP_ISA {
   if (!(o.min_inlier_share >= 0 && o.min_inlier_share <= 1)) return "min_inlier_share";
   if (!detail::positive(o.min_sigma_px)) return "min_sigma_px";
   if (!(o.max_sigma_px >= o.min_sigma_px) || !is_finite(o.max_sigma_px)) return "max_sigma_px";
+  if (!detail::positive(o.search_above_px)) return "search_above_px";
   if (const OptionPath field = nested("distance", invalid_field(o.distance))) return field;
   return nested("pose", invalid_field(o.pose));
 }
@@ -63,6 +69,30 @@ template <typename Scalar>
   const Scalar median = order_statistic(distances.subspan(0, n), quantile_rank(0.5, n) - 1);
   return median / Scalar(degrees_of_freedom == 1 ? 0.674489750196082 : 1.177410022515475);
 }
+
+}  // namespace CFP_ISA
+
+namespace detail {
+inline namespace CFP_ISA {
+
+/// The motion that most of workspace.points agree to; false, and T untouched, without one.
+template <typename Scalar>
+[[nodiscard]] bool search_camera_motion(const PointSpan<Scalar, 2>& current, const PinholeCamera<Scalar>& camera,
+                                        const CameraMotionOptions& options, CameraMotionWorkspace<Scalar>& workspace,
+                                        SE3<double>& T) {
+  PnpRansacOptions search;
+  search.threshold_px = options.max_sigma_px;
+  search.max_iterations = 100;
+  const PnpRansacResult<Scalar> found =
+      pnp_ransac(PointSpan<Scalar, 3>(workspace.points), current, {}, camera, search, workspace.search);
+  if (found.found()) T = found.T_cam_world.template cast<double>();
+  return found.found();
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
+
+inline namespace CFP_ISA {
 
 /// The motion of the camera from the pairs of the undistorted image that `outside` marks as on no object and whose
 /// depth is known: weighted robust pose refinement (refine_pose) from `start`, once with the largest noise and once
@@ -87,22 +117,8 @@ template <typename Scalar>
   if (taken < options.min_pairs) return motion;
 
   workspace.distances.resize(outside.size());
-  SE3<double> T = start;
-  Matrix6<double> covariance;
-  motion.sigma_px = Scalar(options.max_sigma_px);
-  for (int pass = 0; pass < 2; ++pass) {
-    workspace.sigmas.assign(outside.size(), motion.sigma_px);
-    PoseObservations<Scalar> observations;
-    observations.points = workspace.points;
-    observations.pixels = flow.current;
-    observations.sigmas = workspace.sigmas;
-    const PoseResult refined = refine_pose(observations, camera, T, options.pose, workspace.pose);
-    if (!is_solved(refined.status) ||
-        static_cast<double>(refined.inliers) < options.min_inlier_share * static_cast<double>(taken) ||
-        !invert_normal_equations<6>(refined.information, 1e-12, covariance))
-      return motion;
-    T = refined.T_cam_world;
-    motion.T_cur_prev = T.template cast<Scalar>();
+  const auto believe = [&](const SE3<double>& T_cur_prev) {
+    motion.T_cur_prev = T_cur_prev.template cast<Scalar>();
     motion_distances(flow.previous, flow.previous_depths, flow.current, UncertainMotion<Scalar>(motion.T_cur_prev),
                      camera, motion.sigma_px, options.distance, workspace.distances);
     for (std::size_t i = 0; i < outside.size(); ++i) {
@@ -110,6 +126,30 @@ template <typename Scalar>
     }
     const Scalar sigma = robust_sigma(span<Scalar>(workspace.distances), 2);
     motion.sigma_px = (std::min)((std::max)(sigma, Scalar(options.min_sigma_px)), Scalar(options.max_sigma_px));
+  };
+  SE3<double> T = start;
+  PoseOptions rounds = options.pose;
+  Matrix6<double> covariance;
+  motion.sigma_px = Scalar(options.max_sigma_px);
+  for (int pass = 0; pass < 2; ++pass) {
+    if (pass > 0 && motion.sigma_px > Scalar(options.search_above_px) &&
+        detail::search_camera_motion(flow.current, camera, options, workspace, T)) {
+      believe(T);
+      rounds.rounds[0] = rounds.rounds[rounds.round_count - 1];  // a wide loss would lose it again
+      rounds.round_count = 1;
+    }
+    workspace.sigmas.assign(outside.size(), motion.sigma_px);
+    PoseObservations<Scalar> observations;
+    observations.points = workspace.points;
+    observations.pixels = flow.current;
+    observations.sigmas = workspace.sigmas;
+    const PoseResult refined = refine_pose(observations, camera, T, rounds, workspace.pose);
+    if (!is_solved(refined.status) ||
+        static_cast<double>(refined.inliers) < options.min_inlier_share * static_cast<double>(taken) ||
+        !invert_normal_equations<6>(refined.information, 1e-12, covariance))
+      return motion;
+    T = refined.T_cam_world;
+    believe(T);
   }
   motion.covariance = covariance.template cast<Scalar>();
   motion.known = true;

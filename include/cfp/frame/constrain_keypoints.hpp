@@ -62,7 +62,7 @@ template <typename Scalar>
   const auto fit = [&](bool inside) {
     scratch.samples.clear();
     for (std::size_t i = 0; i < distances.size(); ++i) {
-      if (state.label[i] == KeypointLabel::outside ||
+      if ((state.label[i] == KeypointLabel::outside && !is_unreported(i, state)) ||
           (inside && model_weight(i, map_point_probability[i], options, state) >= Scalar(0.5)))
         scratch.samples.push_back(distances[i]);
     }

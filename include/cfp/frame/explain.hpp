@@ -100,6 +100,7 @@ template <typename Scalar>
   e.box = state.box[i];
   e.match = state.match[i];
   e.coarse_probability = e.label == KeypointLabel::invalid ? 0 : 1;
+  e.flow_probability = static_cast<double>(state.flow_probability[i]);
   if (e.box != no_box) {
     const auto b = static_cast<std::size_t>(e.box);
     const bool foreground = e.label == KeypointLabel::foreground;
@@ -110,7 +111,6 @@ template <typename Scalar>
     e.high_dynamic = is_high_dynamic(e.object.static_probability, options.object_threshold);
     e.flow_model = state.report.flow_model;
     e.flow_sigma_px = state.report.flow_sigma_px;
-    e.flow_probability = static_cast<double>(state.flow_probability[i]);
     if (foreground || options.coarse.soft_background)
       e.coarse_probability = static_cast<double>(first_stage_probability(
           static_cast<Scalar>(e.object.static_probability), foreground, static_cast<Scalar>(options.object_threshold)));
@@ -141,7 +141,10 @@ template <typename Scalar>
                                      "raised, too few static observations in this frame"};
   std::string text = "keypoint " + std::to_string(e.keypoint);
   if (e.label == KeypointLabel::invalid) text += ": no pixel\n";
-  if (e.label == KeypointLabel::outside) text += ": outside all boxes, static\n";
+  if (e.label == KeypointLabel::outside)
+    text += e.flow_probability < 0
+                ? ": outside all boxes, static\n"
+                : ": outside all boxes, but the flow around it moves: " + number(e.flow_probability) + "\n";
   if (e.box != no_box) {
     text += e.label == KeypointLabel::foreground ? ": on the object" : ": behind the object";
     text += " of track " + std::to_string(e.track) + (e.compensated ? ", predicted" : ", detected") +

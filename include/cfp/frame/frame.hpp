@@ -17,7 +17,7 @@ namespace cfp {
 
 /// How a keypoint stands to the objects of its frame.
 enum class KeypointLabel : std::uint8_t {
-  outside,     ///< on no object: K = 1, never changed
+  outside,     ///< on no object that was reported: K = 1, never changed
   foreground,  ///< on the object of its box
   background,  ///< inside its box, behind the object
   invalid      ///< its pixel is not finite: K = 0, and no evidence for or against a map point

@@ -23,6 +23,14 @@ struct ObjectClass {
   bool non_rigid = true;  ///< people, animals: told from the background by depth; rigid: all inside is foreground
 };
 
+/// What moves and no detector reports. WeightRule::posterior: a keypoint in no box counts as on a moving object where
+/// most flow pairs around it move. Not in the paper, for which all outside of boxes is static.
+struct UnreportedOptions {
+  double radius_px = 30;      ///< around the keypoint, >= 0; 0: nothing of this
+  std::size_t min_pairs = 6;  ///< there, on no object, >= 1
+  double max_share = 0.4;     ///< of all pairs on no object: if more move, nothing is said of any, in [0, 1]
+};
+
 /// The paper's first stage: objects and depth (sections IV-B and IV-C).
 struct CoarseOptions {
   bool use_object_probability = true;  ///< false: O of every object is unknown (the paper's CFP-SLAM-)
@@ -31,6 +39,7 @@ struct CoarseOptions {
   /// WeightRule::posterior: a keypoint in a box is judged by the flow pair nearest to it, if one lies within; by
   /// its object else. >= 0; 0: always by its object.
   double flow_radius_px = 10;
+  UnreportedOptions unreported;
   FlowModelOptions flow;
   ObjectProbabilityOptions object;
   ObjectMemoryOptions memory;
@@ -77,8 +86,15 @@ enum class Variant : std::uint8_t {
 
 inline namespace CFP_ISA {
 
+[[nodiscard]] constexpr OptionPath invalid_field(const UnreportedOptions& o) noexcept {
+  if (!detail::non_negative(o.radius_px)) return "radius_px";
+  if (o.min_pairs < 1) return "min_pairs";
+  return o.max_share >= 0 && o.max_share <= 1 ? OptionPath() : "max_share";
+}
+
 [[nodiscard]] inline OptionPath invalid_field(const CoarseOptions& o) noexcept {
   if (!detail::non_negative(o.flow_radius_px)) return "flow_radius_px";
+  if (const OptionPath field = nested("unreported", invalid_field(o.unreported))) return field;
   if (const OptionPath field = nested("flow", invalid_field(o.flow))) return field;
   if (const OptionPath field = nested("object", invalid_field(o.object))) return field;
   if (const OptionPath field = nested("memory", invalid_field(o.memory))) return field;

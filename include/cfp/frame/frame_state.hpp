@@ -43,6 +43,7 @@ struct FrameReport {
   std::size_t unknown_objects = 0;                           ///< boxes whose O is not known
   // keypoints
   std::size_t outside = 0, foreground = 0, background = 0, invalid = 0;  ///< by label
+  std::size_t unreported = 0;             ///< keypoints on no object around which the flow moves: see UnreportedOptions
   std::size_t undecided_foregrounds = 0;  ///< boxes that the depths could not separate: all inside is foreground
   // constraints
   ConstraintReport projection, epipolar;
@@ -104,7 +105,8 @@ struct FrameState {
   std::vector<std::int32_t> match;                    ///< per keypoint: index in the frame before, or no_match
   std::vector<SecondStageKeypoint<Scalar>> evidence;  ///< per keypoint in a box: what the fine stage knew of it
   std::vector<Scalar> flow_distances;      ///< per flow pair, px, as the flow's model has them; empty: there is none
-  std::vector<Scalar> flow_probability;    ///< per keypoint in a box: score of the flow at its place, negative: none
+  std::vector<Scalar> flow_probability;    ///< per keypoint: score of the flow at its place, negative: none; outside of
+                                           ///< boxes where it moves alone
   std::vector<Scalar> static_probability;  ///< per keypoint: K
   std::vector<Scalar> weight;              ///< per keypoint: what the pose is to use
   FrameReport report;

@@ -1,6 +1,6 @@
 /// @file label_keypoints.hpp
 /// The step from boxes and depths to the coarse K of every keypoint (paper section IV-C): foreground and background of
-/// each object, and K by the first stage's rule. And what the flow says of the keypoint alone.
+/// each object, and K by the first stage's rule. And what the flow says of the keypoint alone, in boxes and outside.
 #pragma once
 
 #include <algorithm>
@@ -48,6 +48,49 @@ void score_flow_at_keypoints(const Frame<Scalar>& frame, const FrameOptions& opt
   }
 }
 
+/// Sets state.flow_probability of the keypoints on no object around which the flow moves: the median score of the pairs
+/// on no object nearby, as of an object that nobody reported. Of all others it stays as it is.
+template <typename Scalar>
+void score_flow_outside(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
+  const UnreportedOptions& unreported = options.coarse.unreported;
+  const Scalar radius_px = static_cast<Scalar>(unreported.radius_px), radius_sq = radius_px * radius_px;
+  if (!looks_for_unreported(options) || state.flow_distances.empty()) return;
+  const ObjectProbabilityOptions scored = scaled_to_flow(options.coarse.object, state.report);
+  const Scalar threshold = static_cast<Scalar>(options.object_threshold);
+  FrameScratch<Scalar>& scratch = state.scratch;
+  scratch.points.clear();  // of the pairs on no object; those that move come first
+  scratch.samples.clear();
+  std::size_t moving = 0;
+  for (std::size_t p = 0; p < frame.flow.current.size(); ++p) {
+    if (scratch.outside[p] == 0 || !has_distance(state.flow_distances[p])) continue;
+    scratch.points.push_back({frame.flow.current(p, 0), frame.flow.current(p, 1)});
+    scratch.samples.push_back(object_score(state.flow_distances[p], scored));
+    if (!(scratch.samples.back() < threshold)) continue;
+    std::swap(scratch.points.back(), scratch.points[moving]);
+    std::swap(scratch.samples.back(), scratch.samples[moving++]);
+  }
+  // Too many: what moves may as well be the camera.
+  if (static_cast<double>(moving) > unreported.max_share * static_cast<double>(scratch.points.size())) return;
+  const auto is_near = [&](std::size_t p, const std::array<Scalar, 2>& keypoint) {
+    const Scalar dx = scratch.points[p][0] - keypoint[0], dy = scratch.points[p][1] - keypoint[1];
+    return dx * dx + dy * dy < radius_sq;
+  };
+  for (std::size_t i = 0; i < state.size(); ++i) {
+    if (state.label[i] != KeypointLabel::outside) continue;
+    scratch.scratch.clear();  // scores nearby
+    for (std::size_t p = 0; p < scratch.points.size(); ++p) {
+      if (p == moving && 2 * scratch.scratch.size() < unreported.min_pairs) break;
+      if (is_near(p, state.current.keypoints[i])) scratch.scratch.push_back(scratch.samples[p]);
+    }
+    const std::size_t n = scratch.scratch.size();
+    if (n < unreported.min_pairs) continue;
+    const Scalar median = order_statistic(span<Scalar>(scratch.scratch), n / 2);
+    if (!(median < threshold)) continue;
+    state.flow_probability[i] = median;
+    ++state.report.unreported;
+  }
+}
+
 }  // namespace CFP_ISA
 }  // namespace detail
 
@@ -57,7 +100,7 @@ inline namespace CFP_ISA {
 /// smallest of their K, and that box decides for it from then on (ties: foreground before background, then the lower
 /// index). Keypoints on no object keep K = 1. What a mask or object_of_keypoint gives an object is its foreground;
 /// depth then only tells where it stands, for the next frame and for boxes without a mask. O(keypoints x boxes), and
-/// keypoints x flow pairs within each box.
+/// keypoints x flow pairs within each box. Outside of boxes the flow is asked as UnreportedOptions say.
 template <typename Scalar>
 void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   CFP_ASSERT(state.objects.size() == state.boxes.size());
@@ -102,6 +145,7 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
     }
   }
   detail::score_flow_at_keypoints(frame, options, state);
+  detail::score_flow_outside(frame, options, state);
   const auto count = [&](KeypointLabel label) {
     return static_cast<std::size_t>(std::count(state.label.begin(), state.label.end(), label));
   };

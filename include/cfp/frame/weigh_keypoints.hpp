@@ -21,11 +21,24 @@ template <typename Scalar>
   return state.label[i] == KeypointLabel::foreground && !state.boxes[static_cast<std::size_t>(state.box[i])].associated;
 }
 
-/// E of keypoint i, which must be in a box: first_stage_evidence of the flow at its place or, without, of its object.
+/// Whether a keypoint is in no box, and the flow around it moves all the same: something that nobody reported.
+template <typename Scalar>
+[[nodiscard]] bool is_unreported(std::size_t i, const FrameState<Scalar>& state) noexcept {
+  return state.box[i] == no_box && state.flow_probability[i] >= Scalar(0);
+}
+
+/// Whether a keypoint is on an object that may move, reported or not.
+template <typename Scalar>
+[[nodiscard]] bool is_on_object(std::size_t i, const FrameState<Scalar>& state) noexcept {
+  return state.label[i] == KeypointLabel::foreground || is_unreported(i, state);
+}
+
+/// E of keypoint i: first_stage_evidence of the flow at its place or, without, of its object; 1/2 on none.
 template <typename Scalar>
 [[nodiscard]] Scalar first_stage_evidence(std::size_t i, const FrameOptions& options,
                                           const FrameState<Scalar>& state) noexcept {
-  const double o = state.objects[static_cast<std::size_t>(state.box[i])].static_probability;
+  const double o =
+      state.box[i] != no_box ? state.objects[static_cast<std::size_t>(state.box[i])].static_probability : 1;
   return static_cast<Scalar>(first_stage_evidence(static_cast<double>(state.flow_probability[i]), o,
                                                   state.label[i] == KeypointLabel::foreground,
                                                   options.object_threshold));
@@ -37,10 +50,10 @@ template <typename Scalar>
 [[nodiscard]] Scalar unknown_map_point(std::size_t i, const FrameOptions& options,
                                        const FrameState<Scalar>& state) noexcept {
   const MapPointOptions& o = options.map_point;
-  if (o.weight != WeightRule::posterior || state.box[i] == no_box) return Scalar(1);
-  const bool foreground = state.label[i] == KeypointLabel::foreground;
+  const bool on_object = is_on_object(i, state);
+  if (o.weight != WeightRule::posterior || (state.box[i] == no_box && !on_object)) return Scalar(1);
   const Scalar e = (std::max)(first_stage_evidence(i, options, state), Scalar(0.5));
-  return posterior_probability(Scalar(0.5), e, Scalar(foreground ? o.foreground_prior : o.background_prior), o);
+  return posterior_probability(Scalar(0.5), e, Scalar(on_object ? o.foreground_prior : o.background_prior), o);
 }
 
 /// The weight by Bayes' rule, before any fallback. Outside all boxes it is M. In one, E can only lower it,
@@ -51,11 +64,11 @@ template <typename Scalar>
                                       const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
   const Scalar m =
       map_point_probability >= Scalar(0) ? Scalar(map_point_probability) : unknown_map_point(i, options, state);
-  if (state.box[i] == no_box) return state.label[i] == KeypointLabel::invalid ? Scalar(0) : clamp_probability(m);
+  if (state.label[i] == KeypointLabel::invalid) return Scalar(0);
+  if (state.box[i] == no_box && !is_unreported(i, state)) return clamp_probability(m);
   if (state.report.stage == Stage::fine && came_from_nowhere(i, state)) return Scalar(0);
   const Scalar e = (std::min)(first_stage_evidence(i, options, state), Scalar(0.5));
-  const bool foreground = state.label[i] == KeypointLabel::foreground;
-  const Scalar k = keypoint_evidence(state.static_probability[i], e, foreground);
+  const Scalar k = keypoint_evidence(state.static_probability[i], e, is_on_object(i, state));
   return posterior_probability(state.report.constrained > 0 ? k : Scalar(0.5), e, m, options.map_point);
 }
 
@@ -104,7 +117,7 @@ template <typename Scalar>
   Scalar k = state.static_probability[i];
   if (options.map_point.weight == WeightRule::posterior && state.flow_probability[i] >= Scalar(0)) {
     const Scalar e = (std::min)(first_stage_evidence(i, options, state), Scalar(0.5));
-    k = keypoint_evidence(k, e, state.label[i] == KeypointLabel::foreground);
+    k = keypoint_evidence(k, e, is_on_object(i, state));
     k = posterior_probability(Scalar(0.5), e, k, options.map_point);
   }
   return updated_map_point(k, map_point_probability, options.map_point);
