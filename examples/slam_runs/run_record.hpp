@@ -9,6 +9,8 @@
 
 #include "../slam/loop/record.hpp"
 #include "cfp/evaluation/trajectory_error.hpp"
+#include "cfp/frame/health.hpp"
+#include "cfp/geometry/box.hpp"
 #include "decisions.hpp"
 
 namespace cfp_slam {
@@ -22,7 +24,18 @@ struct BoxKeypoint {
   [[nodiscard]] float static_probability() const { return fine >= 0 ? fine : coarse; }
 };
 
+struct BoxRecord {
+  std::int64_t id = 0;
+  cfp::Box<float> box;
+  bool compensated = false;
+  double object_probability = 0;
+  bool object_known = false;  // false: O is the value for "unknown"
+  std::size_t flow_pairs = 0;
+};
+
 struct RunFrame : FrameRecord {
+  cfp::FrameHealth health;
+  std::vector<BoxRecord> boxes;
   cfp::SE3<double> T_world_cam;  // for tracked and relocalised frames
   bool fallback = false;         // the weights were given up
   std::vector<BoxKeypoint> box_keypoints;

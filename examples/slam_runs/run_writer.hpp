@@ -16,6 +16,7 @@
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -84,7 +85,14 @@ class RunWriter final : public Observer {
 
   void weighted(const cfp::StageResult<float>& result, const cfp::FrameState<float>& state,
                 const Frame& frame) override {
+    health_ = result.report.health;
     if (result.report.stage == cfp::Stage::coarse) {
+      for (std::size_t b = 0; b < state.boxes.size(); ++b) {
+        const auto& [box, object] = std::tie(state.boxes[b], state.objects[b]);
+        boxes_ << frame_ << ' ' << box.id << ' ' << box.box.x1 << ' ' << box.box.y1 << ' ' << box.box.x2 << ' '
+               << box.box.y2 << ' ' << box.compensated() << ' ' << (object.status == cfp::Status::ok) << ' '
+               << object.static_probability << ' ' << object.pairs << '\n';
+      }
       for (std::size_t i = 0; i < frame.size(); ++i) {
         const bool foreground = state.label[i] == cfp::KeypointLabel::foreground;
         if (foreground || state.label[i] == cfp::KeypointLabel::background)
@@ -122,15 +130,12 @@ class RunWriter final : public Observer {
     write_frame(record);
     decisions_ << decided_;
     decided_.clear();
-    for (const BoxRecord& b : record.boxes) {
-      boxes_ << frame_ << ' ' << b.id << ' ' << b.box.x1 << ' ' << b.box.y1 << ' ' << b.box.x2 << ' ' << b.box.y2 << ' '
-             << b.compensated << ' ' << b.object_known << ' ' << b.object_probability << ' ' << b.flow_pairs << '\n';
-    }
     for (const Inside& k : inside_) {
       keypoints_ << frame_ << ' ' << k.keypoint.pt.x << ' ' << k.keypoint.pt.y << ' ' << k.keypoint.size << ' '
                  << k.foreground << ' ' << k.coarse << ' ' << k.fine << ' ' << k.map_point << ' ' << k.weight << '\n';
     }
     inside_.clear();
+    health_ = {};
     listen(record, said_);
     progress_(++frame_);
   }
@@ -173,8 +178,8 @@ class RunWriter final : public Observer {
 
   void write_frame(const FrameRecord& f) {
     frames_ << cfp_examples::fixed(f.time_s, 6) << ' ' << f.image << ' ' << to_string(f.outcome) << ' ' << f.keyframe
-            << ' ' << f.keypoints << ' ' << f.matches << ' ' << f.inliers << ' ' << f.health.effective_points << ' '
-            << f.health.box_share << ' ' << (f.health.fallback != cfp::WeightFallback::none) << ' '
+            << ' ' << f.keypoints << ' ' << f.matches << ' ' << f.inliers << ' ' << health_.effective_points << ' '
+            << health_.box_share << ' ' << (health_.fallback != cfp::WeightFallback::none) << ' '
             << f.pose.inlier_share << ' ' << f.pose.spread << ' '
             << (cfp::is_finite(f.pose.position_sigma_m) ? f.pose.position_sigma_m : -1);
     for (std::size_t m = 0; m < module_count; ++m) frames_ << ' ' << clock_.take_ms(static_cast<Module>(m));
@@ -187,6 +192,7 @@ class RunWriter final : public Observer {
   std::ofstream frames_, boxes_, keypoints_, decisions_;
   std::string decided_;         // lines of the frame under way
   std::vector<Inside> inside_;  // the keypoints in boxes of the frame under way
+  cfp::FrameHealth health_;     // of its last weights
   std::size_t frame_ = 0;
   Said said_;
 };

@@ -60,7 +60,7 @@ inline std::vector<double> aligned_errors(const std::vector<cfp::StampedPose<dou
 }  // namespace detail
 
 // Collects what the loop says.
-class StressObserver final : public Observer {
+class StressObserver : public Observer {
  public:
   void finished(const FrameRecord& record) override { records.push_back(record); }
   std::vector<FrameRecord> records;

@@ -244,9 +244,9 @@ class Room {
     const bool followed = c.seen_in + 1 == number_ && random_.uniform() < 0.9;
     if (followed) {
       const bool wrong = random_.uniform() < 0.03;
-      result.flow_from.push_back(noisy(c.pixel, 0.1));
-      result.flow_to.push_back(noisy(pixel, wrong ? 5 : 0.1));
-      result.flow_depths_m.push_back(float(c.depth_m));
+      result.flow.from.push_back(noisy(c.pixel, 0.1));
+      result.flow.to.push_back(noisy(pixel, wrong ? 5 : 0.1));
+      result.flow.depths_m.push_back(float(c.depth_m));
     }
     c.depth_m = measured(in_camera.z());
     c.seen_in = number_;
@@ -323,6 +323,16 @@ class Watcher : public Observer {
   std::int64_t newest = -1;
   bool finite = true, ids_grow = true;
 
+  void weighted(const cfp::StageResult<float>& result, const cfp::FrameState<float>& state, const Frame&) override {
+    if (result.report.stage != cfp::Stage::coarse) return;
+    const std::int64_t newest_before = newest;
+    for (const auto& box : state.boxes) {
+      const auto [last, is_new] = seen_in_.try_emplace(box.id, frames);
+      ids_grow = ids_grow && (is_new ? box.id > newest_before : frames - last->second <= longest_unseen);
+      last->second = frames;
+      newest = std::max(newest, box.id);
+    }
+  }
   void decided(const cfp::StaticProbability<Camera>&, const Frame& frame, const Map& map) override {
     finite = finite && (!frame.has_pose || frame.T_cam_world.translation.allFinite());
     points = map.alive_points();
@@ -333,13 +343,6 @@ class Watcher : public Observer {
     ++frames;
     poses += record.outcome <= Outcome::relocalised ? 1 : 0;
     maps += record.keyframe && (maps == 0 || record.note.find("new map") != std::string::npos) ? 1 : 0;
-    const std::int64_t newest_before = newest;
-    for (const BoxRecord& box : record.boxes) {
-      const auto [last, is_new] = seen_in_.try_emplace(box.id, frames);
-      ids_grow = ids_grow && (is_new ? box.id > newest_before : frames - last->second <= longest_unseen);
-      last->second = frames;
-      newest = std::max(newest, box.id);
-    }
   }
 
  private:
@@ -435,14 +438,14 @@ TEST_CASE("A long run over a wall with everything that goes wrong: each frame is
   options.threads = false;
   options.features.count = 300;
   options.min_initial_points = 60;
-  options.mapping.max_keyframes = 20;
+  options.max_keyframes = 20;
   Passers passers;
   Watcher watcher;
   const RunResult result = run_slam(source, passers, options, watcher);
   CHECK(watcher.frames == frames);
   CHECK(watcher.finite);
   CHECK(watcher.poses > frames / 2);
-  CHECK(watcher.largest_keyframes <= options.mapping.max_keyframes);  // a loss begins a map; the old ones stay or go
+  CHECK(watcher.largest_keyframes <= options.max_keyframes);  // a loss begins a map; the old ones stay or go
   CHECK(result.trajectory.size() > frames / 2);
   for (const auto& pose : result.trajectory) REQUIRE(pose.T_world_cam.translation.allFinite());
 }
@@ -453,7 +456,7 @@ TEST_CASE("A day in a room where all goes wrong: each frame is answered, and wha
   const std::size_t frames = asked != nullptr ? std::strtoul(asked, nullptr, 10) : 4000;
   Options chosen;
   chosen.threads = false;
-  if (asked == nullptr) chosen.mapping.max_keyframes = 40;
+  if (asked == nullptr) chosen.max_keyframes = 40;
   const FrameSource source = Room::source();
   const Options options = fitted(chosen, source, Passers());
   const View view = view_of(source, options);
@@ -484,7 +487,7 @@ TEST_CASE("A day in a room where all goes wrong: each frame is answered, and wha
   CHECK(judge.frames == frames);
   CHECK(judge.tracked > frames / 2);
   CHECK(judge.longest_wrong <= 5);
-  CHECK(judge.largest_keyframes <= options.mapping.max_keyframes);
+  CHECK(judge.largest_keyframes <= options.max_keyframes);
   CHECK(result.trajectory.size() > frames / 2);
   for (const auto& pose : result.trajectory) REQUIRE(pose.T_world_cam.translation.allFinite());
 }

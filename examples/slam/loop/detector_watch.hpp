@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <iterator>
 #include <optional>
 #include <string>
 
@@ -18,18 +17,15 @@ namespace cfp_slam {
 class DetectorWatch {
  public:
   explicit DetectorWatch(const Options& options)
-      : options_(options.detector_health),
-        max_idle_(options.max_idle),
-        health_(options.detector_health),
-        lag_(options.detector_lag) {}
+      : options_(options), health_(options.detector_health), lag_(options.detector_lag) {}
 
   // Nothing, as if it had not run, of a detector that is silent or stuck: its boxes are carried on. Where they have
-  // left the view, nothing is left to be seen. `before` is of the last frame.
-  std::optional<cfp::span<const cfp::Detection<float>>> believed(const cfp_examples::Detections& detections,
+  // left the view, nothing is left to be seen. Absurd boxes are taken out. `before` is of the last frame.
+  std::optional<cfp::span<const cfp::Detection<float>>> believed(cfp_examples::Detections& detections,
                                                                  const cfp::FrameState<float>& before,
                                                                  FrameRecord& record) {
     cfp::DetectorStatus status = health_.update(detections);
-    const bool left = before.boxes.empty() && int(before.report.frames_since_detector) < max_idle_;
+    const bool left = before.boxes.empty() && int(before.report.frames_since_detector) < options_.max_idle;
     if (status == cfp::DetectorStatus::silent && left) {
       health_.reset();
       status = cfp::DetectorStatus::ok;
@@ -37,10 +33,9 @@ class DetectorWatch {
     if (status != cfp::DetectorStatus::ok) record.add_note(std::string("detector ") + cfp::to_string(status));
     ok_ = status == cfp::DetectorStatus::ok || status == cfp::DetectorStatus::absurd;
     if (!ok_) return std::nullopt;
-    believed_.clear();
-    std::copy_if(detections.begin(), detections.end(), std::back_inserter(believed_),
-                 [&](const auto& d) { return !cfp::is_absurd(d, options_); });
-    return believed_;
+    const auto is_absurd = [&](const auto& d) { return cfp::is_absurd(d, options_.detector_health); };
+    detections.erase(std::remove_if(detections.begin(), detections.end(), is_absurd), detections.end());
+    return detections;
   }
 
   // After the coarse stage: whether its boxes are of an older image.
@@ -55,11 +50,9 @@ class DetectorWatch {
   [[nodiscard]] bool ok() const { return ok_; }
 
  private:
-  cfp::DetectorHealthOptions options_;
-  int max_idle_;
+  Options options_;
   cfp::DetectorHealth<float> health_;
   cfp::DetectorLag<float> lag_;
-  cfp_examples::Detections believed_;
   bool ok_ = true;
 };
 

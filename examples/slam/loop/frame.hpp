@@ -28,6 +28,7 @@ struct View {
   std::vector<float> scales;    // of the pyramid's levels
   float keypoint_sigma_px = 1;  // standard deviation of one coordinate, at level 0
   double baseline_fx = 0;       // of the depth camera seen as a stereo camera, pixels times metres
+  float scale_factor = 1.2F;    // between two levels
 
   [[nodiscard]] float scale(const cv::KeyPoint& keypoint) const {
     return scales[static_cast<std::size_t>(keypoint.octave)];

@@ -23,8 +23,10 @@ namespace cfp_slam {
 
 struct FrontEndResult {
   Frame frame;  // keypoints and depths; nothing of it is known
-  std::vector<cv::Point2f> flow_from, flow_to;
-  std::vector<float> flow_depths_m;                    // of flow_from
+  struct Flow {
+    std::vector<cv::Point2f> from, to;
+    std::vector<float> depths_m;  // of `from`
+  } flow;
   std::optional<cfp_examples::Detections> detections;  // none: the detector did not run
 };
 
@@ -45,29 +47,25 @@ class FrontEnd {
     cv::cvtColor(images.bgr, gray, cv::COLOR_BGR2GRAY);
     const auto launch = options_.threads ? std::launch::async : std::launch::deferred;
     std::future<void> detection, flow;
-    if (options_.use_detector())
+    if (options_.probability.use_boxes)
       detection = std::async(launch, [&] {
         const Part part(observer_, Module::detection);
         result.detections = detector.detect(images.bgr, images.time_s);
       });
-    if (options_.use_flow())
+    if (options_.probability.use_boxes && options_.probability.coarse.use_object_probability)
       flow = std::async(launch, [&] {
         const Part part(observer_, Module::flow);
         cfp_examples::room_mask(gray.size(), last_depth_, metres_per_unit_, last_people_, flow_room_);
         flow_.track(gray, last_keypoints_, last_boxes_, flow_room_);
+        result.flow = {flow_.previous(), flow_.current(), std::vector<float>(flow_.previous().size())};
+        cfp::sample_depth(last_depth_, cfp::view(result.flow.from), metres_per_unit_, result.flow.depths_m,
+                          options_.flow_edge_px);
       });
     {
       const Part part(observer_, Module::features);
       extract(gray, images.depth, result.frame);
     }
-    if (flow.valid()) {
-      flow.get();
-      result.flow_from = flow_.previous();
-      result.flow_to = flow_.current();
-      result.flow_depths_m.resize(result.flow_from.size());
-      cfp::sample_depth(last_depth_, cfp::view(result.flow_from), metres_per_unit_, result.flow_depths_m,
-                        options_.flow_edge_px);
-    }
+    if (flow.valid()) flow.get();
     if (detection.valid()) detection.get();
     last_keypoints_ = result.frame.keypoints;
     last_depth_ = images.depth;
@@ -76,12 +74,12 @@ class FrontEnd {
 
   // The boxes of the frame just made, as the tracker has them: the next call's flow starts in them, and its keypoints
   // are taken outside of them and behind what is in them as far as possible.
-  void set_boxes(const std::vector<BoxRecord>& boxes) {
+  void set_boxes(const cfp::FrameState<float>& state) {
     last_boxes_.clear();
     last_people_.clear();
-    for (const BoxRecord& box : boxes) {
+    for (const auto& box : state.boxes) {
       last_boxes_.push_back(box.box);
-      last_people_.push_back({box.box, box.depth_m});
+      last_people_.push_back({box.box, cfp::object_depth(state.current, box.id)});
     }
   }
 

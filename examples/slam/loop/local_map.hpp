@@ -7,22 +7,17 @@
 #include <vector>
 
 #include "matching.hpp"
-#include "options.hpp"
 
 namespace cfp_slam {
 
 class LocalMap {
  public:
-  explicit LocalMap(const cfp_examples::FeatureOptions& features) : features_(features) {}
-
   // The frame needs a pose. `wide`: it is new, and may be less exact.
   void search(Frame& frame, const KeypointGrid& grid, Map& map, const View& view, bool wide) {
     collect(frame, map);
-    expect(frame, map, view, wide ? 5.0F : 3.0F);
-    match_expected(
-        frame, grid, expected_, far_descriptor, 0.8F, [&](std::size_t i) { return !map.is_alive(frame.map_point[i]); },
-        matches_);
-    for (const Match& m : matches_) frame.map_point[m.keypoint] = m.index;
+    const auto is_free = [&](std::size_t i) { return !map.is_alive(frame.map_point[i]); };
+    for (const Match& m : match_expected(frame, grid, expect(frame, map, view, wide ? 5.0F : 3.0F), 0.8F, is_free))
+      frame.map_point[m.keypoint] = m.index;
   }
 
   // The keyframe that shares most points with the last frame searched, or a newer one.
@@ -40,62 +35,57 @@ class LocalMap {
     if (!keyframes.empty()) reference_ = keyframes.front();
     if (keyframes.size() > nearest) keyframes.resize(nearest);
     for (std::size_t k = 0, direct = keyframes.size(); k < direct && keyframes.size() < most; ++k) {
-      for (const int neighbour : map.keyframe(keyframes[k]).neighbours) {
-        if (std::find(keyframes.begin(), keyframes.end(), neighbour) != keyframes.end()) continue;
-        keyframes.push_back(neighbour);
-        break;
-      }
+      const std::vector<int>& neighbours = map.keyframe(keyframes[k]).neighbours;
+      const auto added = std::find_if(neighbours.begin(), neighbours.end(), [&](int neighbour) {
+        return std::find(keyframes.begin(), keyframes.end(), neighbour) == keyframes.end();
+      });
+      if (added != neighbours.end()) keyframes.push_back(*added);
     }
     points_.clear();
-    seen_.assign(map.points.size(), 0);
+    std::vector<bool> known(map.points.size());
     for (const int k : keyframes) {
       for (const int p : map.keyframe(k).frame.map_point) {
-        if (!map.is_alive(p) || seen_[static_cast<std::size_t>(p)] != 0) continue;
-        seen_[static_cast<std::size_t>(p)] = 1;
+        if (!map.is_alive(p) || known[static_cast<std::size_t>(p)]) continue;
+        known[static_cast<std::size_t>(p)] = true;
         points_.push_back(p);
       }
     }
   }
 
   // The points in view; how near they are tells the level of the pyramid.
-  void expect(const Frame& frame, Map& map, const View& view, float widening) {
-    seen_.assign(map.points.size(), 0);
+  std::vector<Expected> expect(const Frame& frame, Map& map, const View& view, float widening) {
+    std::vector<bool> seen(map.points.size());
     for (const int p : frame.map_point) {
-      if (map.is_alive(p)) seen_[static_cast<std::size_t>(p)] = 1;
+      if (map.is_alive(p)) seen[static_cast<std::size_t>(p)] = true;
     }
     const cfp::Vector3<double> centre = frame.T_cam_world.inverse().translation;
-    const double log_scale = std::log(static_cast<double>(features_.scale_factor));
-    expected_.clear();
+    const int levels = static_cast<int>(view.scales.size());
+    const double log_scale = std::log(static_cast<double>(view.scale_factor));
+    std::vector<Expected> expected;
     expected_proven_ = 0;
     for (const int p : points_) {
       MapPoint& point = map.point(p);
-      if (seen_[static_cast<std::size_t>(p)] != 0) {
-        ++point.in_view;
-        expected_proven_ += map.is_proven(p) ? 1U : 0U;
-        continue;
+      if (!seen[static_cast<std::size_t>(p)]) {
+        cfp::Vector2<double> pixel;
+        if (!view.sees(frame.T_cam_world * point.position, pixel)) continue;
+        const cfp::Vector3<double> ray = point.position - centre;
+        const double distance = ray.norm(), cosine = ray.dot(point.normal) / distance;
+        const int level =
+            static_cast<int>(std::ceil(std::log(static_cast<double>(point.max_distance) / distance) / log_scale - 0.5));
+        if (cosine < 0.5 || level < -1 || level > levels) continue;
+        const int clamped = std::clamp(level, 0, levels - 1);
+        const float radius = (cosine > 0.998 ? 2.5F : 4.0F) * widening * view.scales[static_cast<std::size_t>(clamped)];
+        expected.push_back({float(pixel.x()), float(pixel.y()), clamped, radius, &point.descriptor, -1, p});
       }
-      cfp::Vector2<double> pixel;
-      if (!view.sees(frame.T_cam_world * point.position, pixel)) continue;
-      const cfp::Vector3<double> ray = point.position - centre;
-      const double distance = ray.norm(), cosine = ray.dot(point.normal) / distance;
-      const int level =
-          static_cast<int>(std::ceil(std::log(static_cast<double>(point.max_distance) / distance) / log_scale - 0.5));
-      if (cosine < 0.5 || level < -1 || level > features_.levels) continue;
       ++point.in_view;
-      expected_proven_ += map.is_proven(p) ? 1U : 0U;
-      const int clamped = std::clamp(level, 0, features_.levels - 1);
-      const float radius = (cosine > 0.998 ? 2.5F : 4.0F) * widening * view.scales[static_cast<std::size_t>(clamped)];
-      expected_.push_back({float(pixel.x()), float(pixel.y()), clamped, radius, &point.descriptor, -1, p});
+      expected_proven_ += map.is_proven(point) ? 1U : 0U;
     }
+    return expected;
   }
 
-  cfp_examples::FeatureOptions features_;
   int reference_ = 0;
   std::size_t expected_proven_ = 0;
   std::vector<int> points_;
-  std::vector<char> seen_;
-  std::vector<Expected> expected_;
-  std::vector<Match> matches_;
 };
 
 }  // namespace cfp_slam

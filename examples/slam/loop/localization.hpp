@@ -2,13 +2,13 @@
 // map alone.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "cfp/frame/static_probability.hpp"
+#include "cfp/geometry/homography.hpp"
 #include "last_frame_matching.hpp"
 #include "local_map.hpp"
 #include "motion.hpp"
@@ -29,41 +29,43 @@ class Localization {
         probability_(probability),
         observer_(observer),
         refine_pose_(options),
-        relocalize_(options.seed) {}
+        relocalize_(map, probability, options.seed, view.camera) {}
 
   // First of all: where the frame should be, and what it sees of the last one from there.
   void begin(Frame& frame, const Frame& last) {
-    predicted_ = motion_.predict(last, frame.time_s, view_);
+    motion_since_last_ = motion_.predict(last, frame.time_s);
+    frame.T_cam_world = motion_since_last_ ? *motion_since_last_ * last.T_cam_world : last.T_cam_world;
     const Part part(observer_, Module::matching);
     grid_.build(frame, view_);
-    match_last(frame, last, predicted_.T_cam_world);
+    from_last_ = match_last_frame(frame, grid_, last, map_, view_);
   }
   // Last of all.
   void learn(const Frame& last, const Frame& frame) { motion_.learn(last, frame); }
 
   // From the last frame's points or, when those do not give it and over a gap, from the map. `believed`: the last pose
-  // that was, if any. Returns whether it was the map alone.
-  bool first_pose(Frame& frame, const Frame& last, const LocalMap& local_map, cfp::span<const float> weight,
-                  const std::optional<BelievedPose>& believed, RefinedPose& pose) {
+  // that was, if any.
+  RefinedPose first_pose(Frame& frame, const Frame& last, const LocalMap& local_map, cfp::span<const float> weight,
+                         const std::optional<BelievedPose>& believed) {
     const Part part(observer_, Module::pose);
+    RefinedPose pose;
     const auto from_last = [&](const std::optional<BelievedPose>& near) {
-      return refine(frame, weight, from_last_.expected_proven, false, options_.first_health, near);
+      pose = refine(frame, weight, from_last_.expected_proven, false, options_.first_health, near);
+      frame.has_pose = pose.health.ok();
     };
-    frame.T_cam_world = predicted_.T_cam_world;
-    if (last.has_pose) pose = from_last(believed);
-    frame.has_pose = pose.health.ok();
-    if (frame.has_pose || !relocalize_(frame, map_, local_map.points(), probability_, view_.camera)) return false;
-    match_last(frame, last, frame.T_cam_world);
-    pose = from_last(std::nullopt);
-    frame.has_pose = pose.health.ok();
-    return true;
+    if (last.has_pose) from_last(believed);
+    if (frame.has_pose || !relocalize_(frame, local_map.points())) return pose;
+    from_last_ = match_last_frame(frame, grid_, last, map_, view_);
+    from_last(std::nullopt);
+    pose.from_map = true;
+    return pose;
   }
 
   // With the local map.
   RefinedPose second_pose(Frame& frame, LocalMap& local_map, cfp::span<const float> weight, bool relocalised,
                           const std::optional<BelievedPose>& believed) {
-    const RefinedPose pose = relocalised ? from_map(frame, local_map, weight)
-                                         : from_local_map(frame, local_map, weight, false, options_.health, believed);
+    RefinedPose pose = relocalised ? from_map(frame, local_map, weight)
+                                   : from_local_map(frame, local_map, weight, false, options_.health, believed);
+    pose.from_map = relocalised;
     frame.has_pose = pose.health.ok();
     return pose;
   }
@@ -77,9 +79,8 @@ class Localization {
   std::optional<Elsewhere> find_elsewhere(const Frame& frame, int world) {
     constexpr int keyframes = 3;  // tried at a time
     Elsewhere found{frame, {}, 0};
-    if (!relocalize_.from_keyframes(found.frame, map_, keyframes, world, probability_, view_.camera))
-      return std::nullopt;
-    LocalMap around(options_.features);
+    if (!relocalize_.from_keyframes(found.frame, keyframes, world)) return std::nullopt;
+    LocalMap around;
     std::vector<std::int32_t> unmatched(frame.size(), cfp::no_match);  // the last frame is of the frame's own world
     from_last_.match.swap(unmatched);
     found.pose = from_map(found.frame, around, frame.static_probability);
@@ -88,21 +89,20 @@ class Localization {
     return found.pose.health.ok() ? std::optional(std::move(found)) : std::nullopt;
   }
 
-  [[nodiscard]] const std::optional<cfp::Matrix3<float>>& image_motion() const { return predicted_.image_motion; }
+  // Homography from the last image; none without a velocity.
+  [[nodiscard]] std::optional<cfp::Matrix3<float>> image_motion() const {
+    if (!motion_since_last_) return std::nullopt;
+    return cfp::rotation_homography(view_.camera, motion_since_last_->rotation.cast<float>());
+  }
   // Keypoint of the last frame, per keypoint.
   [[nodiscard]] const std::vector<std::int32_t>& match() const { return from_last_.match; }
   [[nodiscard]] const KeypointGrid& grid() const { return grid_; }
 
  private:
-  void match_last(Frame& frame, const Frame& last, const cfp::SE3<double>& T_cam_world) {
-    match_last_(frame, grid_, last, map_, T_cam_world, view_, options_.search_radius, options_.enough_matches,
-                from_last_);
-  }
-
   // What is new is searched for twice: a wide search finds many a wrong match, a narrow one from there tells what the
   // pose is worth.
   RefinedPose from_map(Frame& frame, LocalMap& local_map, cfp::span<const float> weight) {
-    (void)from_local_map(frame, local_map, weight, true, options_.relocalised_health, std::nullopt);
+    from_local_map(frame, local_map, weight, true, options_.relocalised_health, std::nullopt);
     return from_local_map(frame, local_map, weight, false, options_.relocalised_health, std::nullopt);
   }
 
@@ -119,12 +119,12 @@ class Localization {
   // The stage's weights hold M of what the last frame saw; that of points which joined since comes on top.
   RefinedPose refine(Frame& frame, cfp::span<const float> weight, std::size_t expected, bool prune,
                      const cfp::PoseHealthOptions& health, const std::optional<BelievedPose>& believed) {
-    weights_.assign(weight.begin(), weight.end());
+    std::vector<float> weights(weight.begin(), weight.end());
     for (std::size_t i = 0; i < frame.size(); ++i) {
-      if (map_.is_alive(frame.map_point[i]))
-        weights_[i] = probability_.weight(i, map_.point(frame.map_point[i]).static_probability);
+      if (const MapPoint* const point = map_.find(frame.map_point[i]))
+        weights[i] = probability_.weight(i, point->static_probability);
     }
-    return refine_pose_(frame, from_last_, map_, weights_, view_, expected, prune, health, believed);
+    return refine_pose_(frame, from_last_, map_, weights, view_, expected, prune, health, believed);
   }
 
   Options options_;
@@ -133,13 +133,11 @@ class Localization {
   const cfp::StaticProbability<Camera>& probability_;
   Observer& observer_;
   MotionModel motion_;
-  MotionModel::Prediction predicted_;
+  std::optional<cfp::SE3<double>> motion_since_last_;
   KeypointGrid grid_;
-  LastFrameMatching match_last_;
   LastFrameMatches from_last_;
   PoseSolver refine_pose_;
   Relocalization relocalize_;
-  std::vector<float> weights_;
 };
 
 }  // namespace cfp_slam

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <iterator>
 #include <map>
 #include <unordered_map>
 #include <utility>
@@ -38,6 +39,10 @@ struct Keyframe {
   cfp::SE3<double> T_of_parent;  // from whose camera to its own this goes
 };
 
+inline void erase_from(std::vector<int>& list, int value) {
+  list.erase(std::remove(list.begin(), list.end(), value), list.end());
+}
+
 class Map {
  public:
   std::vector<MapPoint> points;
@@ -48,8 +53,8 @@ class Map {
     return point != no_point && points[static_cast<std::size_t>(point)].alive;
   }
   // Whether keyframes agree about it, as soon as there are some in its world.
-  [[nodiscard]] bool is_proven(int index) const {
-    return keyframes.size() < first_of_world_.back() + 3 || point(index).observations.size() >= 2;
+  [[nodiscard]] bool is_proven(const MapPoint& point) const {
+    return keyframes.size() < first_of_world_.back() + 3 || point.observations.size() >= 2;
   }
   // Returns its index. Its points do not know of it yet.
   int add_keyframe(const Frame& frame, int world) {
@@ -67,16 +72,15 @@ class Map {
   void drop_world() {
     const std::size_t first = first_of_world_.back();
     first_of_world_.pop_back();
-    for (std::size_t k = first; k < keyframes.size(); ++k) {
-      for (const int p : std::vector<int>(keyframes[k].frame.map_point)) {
-        if (is_alive(p)) erase_observation(p, static_cast<int>(k));
-      }
-    }
+    for (std::size_t k = first; k < keyframes.size(); ++k) erase_observations(static_cast<int>(k));
     keyframes.erase(keyframes.begin() + static_cast<std::ptrdiff_t>(first), keyframes.end());
     while (!alive_keyframes.empty() && alive_keyframes.back() >= static_cast<int>(first)) alive_keyframes.pop_back();
   }
-  // Moves a world onto another, of which it is a part from now on.
-  void join(int world, int other, const cfp::SE3<double>& T_other_world) {
+  // Moves a world onto another, of which it is a part from now on. Returns the keyframes that it has.
+  std::vector<int> join(int world, int other, const cfp::SE3<double>& T_other_world) {
+    std::vector<int> joined;
+    std::copy_if(alive_keyframes.begin(), alive_keyframes.end(), std::back_inserter(joined),
+                 [&](int k) { return keyframe(k).world == world; });
     for (MapPoint& p : points) {
       if (!p.alive || keyframe(p.created_by).world != world) continue;
       p.position = T_other_world * p.position;
@@ -87,6 +91,7 @@ class Map {
       k.frame.T_cam_world = k.frame.T_cam_world * T_other_world.inverse();
       k.world = other;
     }
+    return joined;
   }
   // Forgets until at most so many keyframes are left: the smallest of the worlds that are no larger than this one, then
   // the oldest of all.
@@ -107,6 +112,9 @@ class Map {
       }
     }
   }
+  // The point, if it is one and has not gone.
+  [[nodiscard]] const MapPoint* find(int index) const { return is_alive(index) ? &point(index) : nullptr; }
+  [[nodiscard]] MapPoint* find(int index) { return is_alive(index) ? &point(index) : nullptr; }
   [[nodiscard]] MapPoint& point(int index) { return points[static_cast<std::size_t>(index)]; }
   [[nodiscard]] const MapPoint& point(int index) const { return points[static_cast<std::size_t>(index)]; }
   [[nodiscard]] Keyframe& keyframe(int index) { return keyframes[static_cast<std::size_t>(index)]; }
@@ -174,18 +182,13 @@ class Map {
       gone.T_of_parent = gone.frame.T_cam_world * keyframe(other).frame.T_cam_world.inverse();
       break;
     }
-    for (const int p : std::vector<int>(gone.frame.map_point)) {
-      if (is_alive(p)) erase_observation(p, index);
-    }
-    Frame pose_only;
-    pose_only.T_cam_world = gone.frame.T_cam_world;
-    gone.frame = std::move(pose_only);
+    erase_observations(index);
+    const cfp::SE3<double> T_cam_world = gone.frame.T_cam_world;
+    gone.frame = {};
+    gone.frame.T_cam_world = T_cam_world;
     gone.neighbours = {};
-    const auto erase_from = [index](std::vector<int>& list) {
-      list.erase(std::remove(list.begin(), list.end(), index), list.end());
-    };
-    erase_from(alive_keyframes);
-    for (const int k : alive_keyframes) erase_from(keyframe(k).neighbours);
+    erase_from(alive_keyframes, index);
+    for (const int k : alive_keyframes) erase_from(keyframe(k).neighbours, index);
   }
 
   // Keyframes that share at least `min_shared` of the given points, most first (ties: the newer first).
@@ -205,6 +208,12 @@ class Map {
   }
 
  private:
+  void erase_observations(int keyframe_index) {
+    for (const int p : std::vector<int>(keyframe(keyframe_index).frame.map_point)) {
+      if (is_alive(p)) erase_observation(p, keyframe_index);
+    }
+  }
+
   std::vector<int> dead_, free_;  // points that have gone: since the last recycle(), and before
   std::vector<std::size_t> first_of_world_{0};
 };

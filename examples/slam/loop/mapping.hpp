@@ -19,25 +19,19 @@ inline void update_points(Map& map, Frame& frame, const cfp::StaticProbability<C
                           bool detector_ok) {
   for (std::size_t i = 0; i < frame.size(); ++i) {
     float& m = frame.map_point_probability[i];
-    const bool mapped = map.is_alive(frame.map_point[i]);
-    if (mapped) m = map.point(frame.map_point[i]).static_probability;
+    int& seen = frame.map_point[i];
+    MapPoint* const point = map.find(seen);
+    if (point == nullptr) seen = no_point;
+    if (point != nullptr) m = point->static_probability;
+    if (point != nullptr && !learn) continue;
     const float learnt = m >= 0 ? probability.updated_map_point(i, m) : frame.static_probability[i];
     m = !detector_ok && m >= 0 && m < 0.5F ? std::min(m, learnt) : learnt;
-    if (!mapped) {
-      frame.map_point[i] = no_point;
-      continue;
-    }
-    MapPoint& point = map.point(frame.map_point[i]);
-    if (!learn) {
-      m = point.static_probability;
-      continue;
-    }
-    ++point.found;
-    point.static_probability = m;
-    if (cfp::is_deletable(m, probability.options().map_point)) {
-      map.erase_point(frame.map_point[i]);
-      frame.map_point[i] = no_point;
-    }
+    if (point == nullptr) continue;
+    ++point->found;
+    point->static_probability = m;
+    if (!cfp::is_deletable(m, probability.options().map_point)) continue;
+    map.erase_point(seen);
+    seen = no_point;
   }
 }
 
@@ -67,29 +61,33 @@ inline void update_points(Map& map, Frame& frame, const cfp::StaticProbability<C
 
 class Mapping {
  public:
-  explicit Mapping(const Options& options) : options_(options.mapping), probability_(options.probability) {}
+  static constexpr int min_gap = 3;  // frames between keyframes; the bundle adjustment is handed over within it
+
+  explicit Mapping(const Options& options) : options_(options) {}
 
   // Whether keypoint i of a frame may become a map point.
   [[nodiscard]] bool may_create(const Frame& frame, std::size_t i) const {
-    return frame.depths_m[i] > 0 && cfp::may_create_map_point(frame.static_probability[i], probability_);
+    return frame.depths_m[i] > 0 && cfp::may_create_map_point(frame.static_probability[i], options_.probability);
   }
 
   // The frame's map points must be its inliers, of which `inliers` count. `reference` is the keyframe it shares most
   // points with.
   [[nodiscard]] bool wants_keyframe(const Map& map, const Frame& frame, int reference, std::size_t inliers,
                                     int frames_since) const {
-    if (frames_since < options_.min_gap) return false;
-    if (frames_since >= options_.max_gap) return true;
+    constexpr int max_gap = 30;
+    constexpr double reference_share = 0.75;  // of the reference's points: fewer inliers, and the view is another
+    constexpr float close_m = 3.2F;  // points whose depth says much about the position (ORB-SLAM2: 40 baselines)
+    constexpr std::size_t min_close = 100, new_close = 70;  // fewer tracked, and more to be had
+    if (frames_since < min_gap) return false;
+    if (frames_since >= max_gap) return true;
     std::size_t of_reference = 0, close = 0, close_new = 0;
     for (const int p : map.keyframe(reference).frame.map_point) {
-      if (map.is_alive(p) && map.is_proven(p)) ++of_reference;
+      if (map.is_alive(p) && map.is_proven(map.point(p))) ++of_reference;
     }
     for (std::size_t i = 0; i < frame.size(); ++i) {
-      if (may_create(frame, i) && frame.depths_m[i] < options_.close_m)
-        ++(map.is_alive(frame.map_point[i]) ? close : close_new);
+      if (may_create(frame, i) && frame.depths_m[i] < close_m) ++(map.is_alive(frame.map_point[i]) ? close : close_new);
     }
-    return double(inliers) < options_.reference_share * double(of_reference) ||
-           (close < options_.min_close && close_new > options_.new_close);
+    return double(inliers) < reference_share * double(of_reference) || (close < min_close && close_new > new_close);
   }
 
   // Adds the frame as a keyframe; keypoints with depth that see no point yet and may be static make new ones, M = K.
@@ -99,15 +97,15 @@ class Mapping {
     Frame& kept = map.keyframe(index).frame;
     const cfp::SE3<double> T_world_cam = kept.T_cam_world.inverse();
     for (std::size_t i = 0; i < kept.size(); ++i) {
-      if (map.is_alive(kept.map_point[i])) {
-        observe(map.point(kept.map_point[i]), kept, i, index, T_world_cam.translation);
+      if (MapPoint* const point = map.find(kept.map_point[i])) {
+        observe(*point, kept, i, index, T_world_cam.translation);
       } else {
         kept.map_point[i] = no_point;
         if (may_create(kept, i)) create(map, kept, i, index, view);
       }
     }
     std::vector<int> neighbours = map.covisible(kept.map_point, 15);
-    neighbours.erase(std::remove(neighbours.begin(), neighbours.end(), index), neighbours.end());
+    erase_from(neighbours, index);
     map.keyframe(index).neighbours = std::move(neighbours);
     return index;
   }
@@ -115,43 +113,48 @@ class Mapping {
   // Of the points made by the last few keyframes, those that did not prove themselves go; then of the keyframes around
   // the newest those that others make superfluous, and what is too much.
   void cull(Map& map) {
+    constexpr int settled = 3;                // keyframes after its own a point has proven itself, or gone
+    constexpr double min_found_share = 0.25;  // points seen in a smaller share of the frames that should see them go
+    constexpr std::size_t min_observations = 2;
     const int newest = static_cast<int>(map.keyframes.size()) - 1;
     const auto is_settled = [&](int p) {
-      if (!map.is_alive(p)) return true;
-      const MapPoint& point = map.point(p);
-      const int age = newest - point.created_by;
-      const bool unproven = age >= 3 && point.observations.size() < options_.min_observations;
-      if (!unproven && double(point.found) >= options_.min_found_share * double(point.in_view)) return age >= 3;
+      const MapPoint* const point = map.find(p);
+      if (point == nullptr) return true;
+      const bool old = newest - point->created_by >= settled;
+      if (double(point->found) >= min_found_share * double(point->in_view) &&
+          !(old && point->observations.size() < min_observations))
+        return old;
       map.erase_point(p);
       return true;
     };
     young_.erase(std::remove_if(young_.begin(), young_.end(), is_settled), young_.end());
     for (const int k : std::vector<int>(map.keyframe(newest).neighbours)) {
-      if (k > 0 && newest - k >= 3 && is_superfluous(map, k)) map.erase_keyframe(k);
+      if (k > 0 && newest - k >= settled && is_superfluous(map, k)) map.erase_keyframe(k);
     }
     map.forget(options_.max_keyframes, map.keyframe(newest).world);
   }
 
  private:
   // Whether at least three others saw nearly all of its points, not from farther away.
-  [[nodiscard]] bool is_superfluous(const Map& map, int keyframe) const {
+  [[nodiscard]] static bool is_superfluous(const Map& map, int keyframe) {
+    constexpr double superfluous_share = 0.9;
     const Frame& frame = map.keyframe(keyframe).frame;
     std::size_t points = 0, known = 0;
     for (std::size_t i = 0; i < frame.size(); ++i) {
-      if (!map.is_alive(frame.map_point[i])) continue;
-      const auto& seen = map.point(frame.map_point[i]).observations;
+      const MapPoint* const point = map.find(frame.map_point[i]);
+      if (point == nullptr) continue;
       ++points;
-      known += std::count_if(seen.begin(), seen.end(), [&](const Observation& o) {
+      known += std::count_if(point->observations.begin(), point->observations.end(), [&](const Observation& o) {
                  const Frame& other = map.keyframe(o.keyframe).frame;
                  return o.keyframe != keyframe &&
                         other.keypoints[static_cast<std::size_t>(o.keypoint)].octave <= frame.keypoints[i].octave + 1;
                }) >= 3;
     }
-    return double(known) >= options_.superfluous_share * double(points);
+    return double(known) >= superfluous_share * double(points);
   }
 
-  void observe(MapPoint& point, const Frame& frame, std::size_t i, int keyframe,
-               const cfp::Vector3<double>& camera_centre) const {
+  static void observe(MapPoint& point, const Frame& frame, std::size_t i, int keyframe,
+                      const cfp::Vector3<double>& camera_centre) {
     point.normal =
         (point.normal * double(point.observations.size()) + (point.position - camera_centre).normalized()).normalized();
     point.observations.push_back({keyframe, static_cast<int>(i)});
@@ -172,8 +175,7 @@ class Mapping {
     young_.push_back(frame.map_point[i] = map.add(std::move(point)));
   }
 
-  MappingOptions options_;
-  cfp::FrameOptions probability_;
+  Options options_;
   std::vector<int> young_;  // points of the last keyframes
 };
 

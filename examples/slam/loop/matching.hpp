@@ -43,12 +43,12 @@ struct Match {
 // the point with the smaller distance. `ratio` below 1 asks that the second nearest on the same level be farther by
 // that factor.
 template <typename Free>
-void match_expected(const Frame& frame, const KeypointGrid& grid, const std::vector<Expected>& expected,
-                    int max_distance, float ratio, const Free& free, std::vector<Match>& matches) {
+std::vector<Match> match_expected(const Frame& frame, const KeypointGrid& grid, const std::vector<Expected>& expected,
+                                  float ratio, const Free& free) {
+  std::vector<Match> matches;
   std::vector<int> taken(frame.size(), -1);  // index into matches
-  matches.clear();
   for (const Expected& e : expected) {
-    int best = max_distance + 1, second = max_distance + 1, best_level = -1, second_level = -1;
+    int best = far_descriptor + 1, second = best, best_level = -1, second_level = -1;
     std::size_t keypoint = 0;
     grid.near(e.x, e.y, e.radius, [&](std::size_t i) {
       const int level = frame.keypoints[i].octave;
@@ -65,8 +65,7 @@ void match_expected(const Frame& frame, const KeypointGrid& grid, const std::vec
         second_level = level;
       }
     });
-    if (best > max_distance) continue;
-    if (best_level == second_level && float(best) > ratio * float(second)) continue;
+    if (best > far_descriptor || (best_level == second_level && float(best) > ratio * float(second))) continue;
     const float turn = e.angle < 0 ? 0.0F : std::fmod(e.angle - frame.keypoints[keypoint].angle + 720.0F, 360.0F);
     const Match match{keypoint, e.index, best, turn};
     if (taken[keypoint] < 0) {
@@ -76,6 +75,7 @@ void match_expected(const Frame& frame, const KeypointGrid& grid, const std::vec
       other = match;
     }
   }
+  return matches;
 }
 
 // Keeps the matches whose orientation turned as most did: the three fullest of thirty bins, as ORB-SLAM2 does.
@@ -96,10 +96,9 @@ inline void keep_common_turn(std::vector<Match>& matches) {
 // Mutual nearest descriptors with a ratio test, without any idea where the points may be: for relocalisation. Corners
 // are in map and frame several times, from several octaves and keyframes: the second nearest must be another place, and
 // the point's own nearest keypoint the same one, or one beside it.
-inline void match_descriptors(const Frame& frame, const Map& map, const std::vector<int>& candidates, int max_distance,
-                              float ratio, std::vector<Match>& matches) {
+inline std::vector<Match> match_descriptors(const Frame& frame, const Map& map, const std::vector<int>& candidates) {
   constexpr double same_place_m = 0.05;
-  constexpr float same_place_px = 4;
+  constexpr float same_place_px = 4, ratio = 0.8F;
   struct Nearest {
     int distance = std::numeric_limits<int>::max();
     std::size_t index = 0;
@@ -109,15 +108,15 @@ inline void match_descriptors(const Frame& frame, const Map& map, const std::vec
     return (map.point(candidates[a]).position - map.point(candidates[b]).position).squaredNorm() >
            same_place_m * same_place_m;
   };
-  matches.clear();
+  std::vector<Match> matches;
   for (std::size_t i = 0; i < frame.size(); ++i) {
-    int best = max_distance + 1, second = max_distance + 1;
+    int best = near_descriptor + 1, second = best;
     std::size_t nearest = 0;
     for (std::size_t c = 0; c < candidates.size(); ++c) {
       const int distance = hamming(map.point(candidates[c]).descriptor, frame.descriptors[i]);
       if (distance < of_point[c].distance) of_point[c] = {distance, i};
       if (distance >= second) continue;
-      const bool other = best > max_distance || elsewhere(c, nearest);
+      const bool other = best > near_descriptor || elsewhere(c, nearest);
       if (distance < best) {
         if (other) second = best;
         best = distance;
@@ -126,7 +125,7 @@ inline void match_descriptors(const Frame& frame, const Map& map, const std::vec
         second = distance;
       }
     }
-    if (best <= max_distance && float(best) <= ratio * float(second))
+    if (best <= near_descriptor && float(best) <= ratio * float(second))
       matches.push_back({i, static_cast<int>(nearest), best, 0});
   }
   const auto one_sided = [&](const Match& m) {
@@ -135,6 +134,7 @@ inline void match_descriptors(const Frame& frame, const Map& map, const std::vec
   };
   matches.erase(std::remove_if(matches.begin(), matches.end(), one_sided), matches.end());
   for (Match& m : matches) m.index = candidates[static_cast<std::size_t>(m.index)];
+  return matches;
 }
 
 // Of matches without any idea where they are, those that agree with one of them, the one that most agree with: the

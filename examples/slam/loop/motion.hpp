@@ -1,26 +1,21 @@
-// Where the camera should be: the velocity of the last two frames goes on.
+// How the camera should have moved: the velocity of the last two frames goes on.
 #pragma once
 
 #include <algorithm>
 #include <optional>
 
-#include "cfp/geometry/homography.hpp"
 #include "frame.hpp"
 
 namespace cfp_slam {
 
 class MotionModel {
  public:
-  struct Prediction {
-    cfp::SE3<double> T_cam_world;
-    std::optional<cfp::Matrix3<float>> image_motion;  // homography from the last image; none without a velocity
-  };
-
-  [[nodiscard]] Prediction predict(const Frame& last, double time_s, const View& view) const {
-    if (!last.has_pose || !velocity_ || !(time_s > last.time_s)) return {last.T_cam_world, std::nullopt};
+  // Since the last frame; none without a velocity.
+  [[nodiscard]] std::optional<cfp::SE3<double>> predict(const Frame& last, double time_s) const {
+    constexpr double longest_s = 0.2;  // for which a velocity is believed
+    if (!last.has_pose || !velocity_ || !(time_s > last.time_s)) return std::nullopt;
     const cfp::Vector6<double> step = *velocity_ * std::min(time_s - last.time_s, longest_s);
-    const cfp::SE3<double> motion = cfp::se3_exp(step);
-    return {motion * last.T_cam_world, cfp::rotation_homography(view.camera, motion.rotation.cast<float>())};
+    return cfp::se3_exp(step);
   }
 
   void learn(const Frame& last, const Frame& frame) {
@@ -30,7 +25,6 @@ class MotionModel {
   }
 
  private:
-  static constexpr double longest_s = 0.2;  // for which a velocity is believed
   std::optional<cfp::Vector6<double>> velocity_;
 };
 

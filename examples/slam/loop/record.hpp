@@ -4,11 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
-#include <vector>
 
-#include "cfp/frame/health.hpp"
 #include "cfp/frame/pose_health.hpp"
-#include "cfp/geometry/box.hpp"
 
 namespace cfp_slam {
 
@@ -49,16 +46,6 @@ constexpr const char* to_string(Outcome outcome) {
   return names[static_cast<std::size_t>(outcome)];
 }
 
-struct BoxRecord {
-  std::int64_t id = 0;
-  cfp::Box<float> box;
-  bool compensated = false;
-  double object_probability = 0;
-  bool object_known = false;  // false: O is the value for "unknown"
-  std::size_t flow_pairs = 0;
-  float depth_m = 0;  // of the object; 0: unknown
-};
-
 struct FrameRecord {
   double time_s = 0;
   std::string image;  // file of the colour image, relative to the recording
@@ -67,8 +54,6 @@ struct FrameRecord {
   bool keyframe = false;
   std::size_t keypoints = 0, matches = 0, inliers = 0;
   cfp::PoseAssessment pose;
-  cfp::FrameHealth health;
-  std::vector<BoxRecord> boxes;
 
   void add_note(const std::string& what) { note += (note.empty() ? "" : "; ") + what; }
 };

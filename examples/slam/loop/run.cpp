@@ -6,18 +6,6 @@
 #include "front_end.hpp"
 #include "tracking.hpp"
 
-namespace cfp {
-
-template PoseResult refine_pose(const PoseObservations<double>&, const PinholeCamera<double>&, const SE3<double>&,
-                                const PoseOptions&, PoseWorkspace<double>&, span<char>);
-template PnpRansacResult<float> pnp_ransac(PointSpan<float, 3>, PointSpan<float, 2>, span<const float>,
-                                           const PinholeCamera<float>&, const PnpRansacOptions&, PnpRansacWorkspace&,
-                                           span<char>);
-template BundleResult adjust_bundle(const BundleProblem<PinholeCamera<double>, float>&, const BundleOptions&,
-                                    BundleWorkspace&, span<double>);
-
-}  // namespace cfp
-
 namespace cfp_slam {
 
 Options fitted(Options options, const FrameSource& source, const cfp_examples::Detector& detector) {
@@ -43,7 +31,8 @@ View view_of(const FrameSource& source, const Options& options) {
           source.calibration.height,
           cfp_examples::level_sigmas(options.features),
           static_cast<float>(options.keypoint_sigma_px),
-          options.baseline_fx};
+          options.baseline_fx,
+          options.features.scale_factor};
 }
 
 RunResult run_slam(const FrameSource& source, cfp_examples::Detector& detector, const Options& chosen,
@@ -67,7 +56,7 @@ RunResult run_slam(const FrameSource& source, cfp_examples::Detector& detector, 
     if (images.usable) {
       const Part part(observer, Module::tracking);
       tracking.track(front_end(images, detector), record);
-      front_end.set_boxes(record.boxes);
+      front_end.set_boxes(tracking.state());
     } else {
       record.outcome = Outcome::skipped;
     }

@@ -4,7 +4,8 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <iterator>
+#include <future>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -32,7 +33,6 @@ class Tracking {
         probability_(camera, options.probability),
         detector_(options),
         localization_(options, view, map_, probability_, observer),
-        local_map_(options.features),
         mapping_(options) {}
   Tracking(const Tracking&) = delete;
   Tracking& operator=(const Tracking&) = delete;
@@ -41,7 +41,6 @@ class Tracking {
   void track(FrontEndResult&& input, FrameRecord& record) {
     take_bundle(false);
     Frame& frame = input.frame;
-    relocalised_ = false;
     pose_ = {};
     const double step_s = frame.time_s - last_.time_s;
     if (step_s > 0 && cfp::is_finite(step_s)) {  // a clock that was set back says nothing
@@ -50,9 +49,7 @@ class Tracking {
     }
     if (interval_.is_gap(frame.time_s)) {  // the last frame says nothing of where its points are now
       record.add_note("gap before this frame: " + std::to_string(frame.time_s - last_.time_s) + " s");
-      input.flow_from.clear();
-      input.flow_to.clear();
-      input.flow_depths_m.clear();
+      input.flow = {};
       last_.has_pose = false;
     }
     estimate(input, record);
@@ -61,7 +58,8 @@ class Tracking {
     const auto& match = localization_.match();
     record.matches = match.size() - std::size_t(std::count(match.begin(), match.end(), cfp::no_match));
     if (map_.keyframes.empty()) {
-      initialize(frame, record);
+      if (!begin_map(frame, record)) 
+        record.add_note("waiting for " + std::to_string(options_.min_initial_points) + " static points with depth");
     } else {
       follow_trial(frame, record);
       follow_probation(frame, record);
@@ -69,8 +67,7 @@ class Tracking {
         world_ = map_.keyframe(local_map_.reference()).world;
         join_worlds(frame, record);
         extend_map(frame, record);
-      } else if (lost_s_ < options_.new_map_after_s || !begin_world(frame, record)) {
-        record.outcome = Outcome::lost;
+      } else if (lost_s_ < options_.new_map_after_s || !begin_map(frame, record)) {
         record.add_note(std::string("lost, ") + cfp::to_string(pose_.health.status));
       }
     }
@@ -84,6 +81,9 @@ class Tracking {
     localization_.learn(last_, frame);
     last_ = std::move(frame);
   }
+
+  // Boxes, objects, labels and all else of the last frame.
+  [[nodiscard]] const cfp::FrameState<float>& state() const { return probability_.state(); }
 
   // Puts the last bundle adjustment's result into the map.
   RunResult finish() {
@@ -103,30 +103,31 @@ class Tracking {
     localization_.begin(frame, last_);
     cfp::StageResult<float> stage = coarse(input, record);
     observer_.weighted(stage, probability_.state(), frame);
-    note_boxes(record);
-    if (const std::optional<cfp::PoseEstimate> pose = first_pose(frame, stage.weight)) {
+    if (!map_.keyframes.empty()) pose_ = localization_.first_pose(frame, last_, local_map_, stage.weight, believed_);
+    if (frame.has_pose && last_.has_pose) {
       {
         const Part part(observer_, Module::fine);
-        stage = probability_.fine(*pose, localization_.match(), frame.map_point_probability);
+        stage = probability_.fine({frame.T_cam_world * last_.T_cam_world.inverse(), pose_.inliers},
+                                  localization_.match(), frame.map_point_probability);
       }
       observer_.weighted(stage, probability_.state(), frame);
     }
-    record.health = stage.report.health;
     for (std::size_t i = 0; i < frame.size(); ++i)
       frame.static_probability[i] = probability_.static_probability(i, frame.map_point_probability[i]);
-    if (frame.has_pose) pose_ = localization_.second_pose(frame, local_map_, stage.weight, relocalised_, believed_);
+    if (frame.has_pose)
+      pose_ = localization_.second_pose(frame, local_map_, stage.weight, pose_.from_map, believed_);
     observer_.decided(probability_, frame, map_);
   }
 
-  cfp::StageResult<float> coarse(const FrontEndResult& input, FrameRecord& record) {
+  cfp::StageResult<float> coarse(FrontEndResult& input, FrameRecord& record) {
     cfp::Frame<float> frame;
     frame.timestamp_s = input.frame.time_s;
     frame.keypoints = cfp::view(input.frame.keypoints);
     if (input.detections) frame.detections = detector_.believed(*input.detections, probability_.state(), record);
-    frame.flow = {cfp::view(input.flow_from), cfp::view(input.flow_to)};
+    frame.flow = {cfp::view(input.flow.from), cfp::view(input.flow.to)};
     if (options_.give_depths) {
       frame.depths = input.frame.depths_m;
-      frame.flow.previous_depths = input.flow_depths_m;
+      frame.flow.previous_depths = input.flow.depths_m;
     }
     frame.map_point_probability = input.frame.map_point_probability;
     frame.image_motion = localization_.image_motion();
@@ -136,23 +137,11 @@ class Tracking {
     return stage;
   }
 
-  void note_boxes(FrameRecord& record) const {
-    const auto& state = probability_.state();
-    for (std::size_t b = 0; b < state.boxes.size(); ++b) {
-      const auto& box = state.boxes[b];
-      const auto& object = state.objects[b];
-      record.boxes.push_back({box.id, box.box, box.compensated(), object.static_probability,
-                              object.status == cfp::Status::ok, object.pairs,
-                              cfp::object_depth(state.current, box.id)});
-    }
-  }
-
-  // The motion since the last frame, if both frames have a pose.
-  std::optional<cfp::PoseEstimate> first_pose(Frame& frame, cfp::span<const float> weight) {
-    if (map_.keyframes.empty()) return std::nullopt;
-    relocalised_ = localization_.first_pose(frame, last_, local_map_, weight, believed_, pose_);
-    if (!frame.has_pose || !last_.has_pose) return std::nullopt;
-    return cfp::PoseEstimate{frame.T_cam_world * last_.T_cam_world.inverse(), pose_.inliers};
+  // Poses that turned out to be wrong, all but the first so many.
+  void take_back_poses(std::size_t first, const char* why, FrameRecord& record) {
+    poses_.take_back_after(first);
+    believed_.reset();
+    record.add_note(why);
   }
 
   // What took the view may take it for as long again as it has: so long a new map is on trial. Is it lost within that,
@@ -160,8 +149,7 @@ class Tracking {
   void follow_trial(const Frame& frame, FrameRecord& record) {
     if (!trial_) return;
     const int reference = local_map_.reference();
-    const bool in_it = frame.has_pose && map_.keyframe(reference).world == map_.newest_world();
-    if (!in_it) {
+    if (!frame.has_pose || map_.keyframe(reference).world != map_.newest_world()) {
       end_trial(record);
       local_map_.set_reference(frame.has_pose ? reference : 0);
       lost_s_ = 0;
@@ -171,65 +159,54 @@ class Tracking {
   }
   void end_trial(FrameRecord& record) {
     take_bundle(true);
-    poses_.take_back_after(trial_->first_pose);
+    take_back_poses(trial_->first_pose, "the new map is given up, its poses are taken back", record);
     map_.drop_world();
     trial_.reset();
-    believed_.reset();
     probation_ = 0;
-    record.add_note("the new map is given up, its poses are taken back");
   }
 
   // A pose from the map alone is on probation until some frames have been tracked from it. When it turns out to have
   // been wrong, the poses given since are taken back.
   void follow_probation(const Frame& frame, FrameRecord& record) {
-    const bool failed = probation_ > 0 && (!frame.has_pose || (relocalised_ && is_jump(frame)));
-    if (failed) {
-      poses_.take_back_after(first_on_probation_);
-      believed_.reset();
-      record.add_note("a relocalisation was wrong, its poses are taken back");
+    const bool jumps = pose_.from_map && believed_ && cfp::is_jump(believed_->step_to(frame), options_.health);
+    const bool failed = probation_ > 0 && (!frame.has_pose || jumps);
+    if (failed) take_back_poses(first_on_probation_, "a relocalisation was wrong, its poses are taken back", record);
+    if (!frame.has_pose) {
+      probation_ = 0;
+    } else if (!pose_.from_map) {
+      probation_ = std::max(probation_ - 1, 0);
+    } else {
+      begin_probation(failed || probation_ == 0);
     }
-    if (relocalised_ && frame.has_pose && (failed || probation_ == 0)) first_on_probation_ = poses_.size();
-    probation_ = !frame.has_pose ? 0 : relocalised_ ? options_.probation : std::max(probation_ - 1, 0);
   }
-  [[nodiscard]] bool is_jump(const Frame& frame) const {
-    return believed_ && cfp::is_jump(believed_->step_to(frame.T_cam_world, frame.time_s), options_.health);
+  void begin_probation(bool anew) {
+    constexpr int frames = 5;
+    if (anew) first_on_probation_ = poses_.size();
+    probation_ = frames;
   }
 
-  [[nodiscard]] std::size_t usable_points(const Frame& frame) const {
+  // The first frame is the world; it needs enough points that may be static. After some time of being lost the map is
+  // left alone, and a new one begins: its poses have nothing to do with those before until the camera sees the old one
+  // again.
+  bool begin_map(Frame& frame, FrameRecord& record) {
     std::size_t usable = 0;
     for (std::size_t i = 0; i < frame.size(); ++i) usable += mapping_.may_create(frame, i) ? 1U : 0U;
-    return usable;
-  }
-
-  // The first frame is the world. It needs enough points that may be static.
-  void initialize(Frame& frame, FrameRecord& record) {
-    const std::size_t usable = usable_points(frame);
-    if (usable < options_.min_initial_points) {
-      record.outcome = Outcome::lost;
-      record.add_note("waiting for " + std::to_string(options_.min_initial_points) +
-                      " static points with depth: this frame has " + std::to_string(usable));
-      return;
+    if (usable < options_.min_initial_points) return false;
+    record.outcome = Outcome::tracked;
+    if (!map_.keyframes.empty()) {
+      std::fill(frame.map_point.begin(), frame.map_point.end(), no_point);
+      world_ = map_.begin_world();
+      frames_since_join_ = 0;
+      T_other_world_.reset();
+      trial_ = Trial{lost_s_, poses_.size()};
+      record.outcome = Outcome::relocalised;
+      record.add_note("new map");
     }
     frame.T_cam_world = {};
     frame.has_pose = true;
     pose_ = {};
     pose_.inliers = usable;
-    record.outcome = Outcome::tracked;
     make_keyframe(frame, record);
-  }
-
-  // After some time of being lost the map is left alone, and a new one begins. Its poses have nothing to do with those
-  // before until the camera sees the old map again.
-  bool begin_world(Frame& frame, FrameRecord& record) {
-    if (usable_points(frame) < options_.min_initial_points) return false;
-    std::fill(frame.map_point.begin(), frame.map_point.end(), no_point);
-    world_ = map_.begin_world();
-    frames_since_join_ = 0;
-    T_other_world_.reset();
-    trial_ = Trial{lost_s_, poses_.size()};
-    initialize(frame, record);
-    record.outcome = Outcome::relocalised;
-    record.add_note("new map");
     return true;
   }
 
@@ -250,10 +227,10 @@ class Tracking {
   }
   void join_world(const Localization::Elsewhere& found, const cfp::SE3<double>& T_other_world, Frame& frame,
                   FrameRecord& record) {
-    const int other = map_.keyframe(found.reference).world;
+    const int newer = std::max(world_, map_.keyframe(found.reference).world);
+    const int older = std::min(world_, map_.keyframe(found.reference).world);
     take_bundle(true);
-    const bool is_older = other < world_;
-    if (is_older) {
+    if (newer == world_) {
       last_.T_cam_world = last_.T_cam_world * T_other_world.inverse();
       frame = found.frame;
       pose_ = found.pose;
@@ -261,28 +238,22 @@ class Tracking {
     }
     if (trial_) {
       end_trial(record);
-      relocalised_ = true;
-      probation_ = options_.probation;
-      first_on_probation_ = poses_.size();
+      pose_.from_map = true;
+      begin_probation(true);
     } else {
-      const int newer = std::max(world_, other);
-      std::vector<int> joined;
-      std::copy_if(map_.alive_keyframes.begin(), map_.alive_keyframes.end(), std::back_inserter(joined),
-                   [&](int k) { return map_.keyframe(k).world == newer; });
-      is_older ? map_.join(world_, other, T_other_world) : map_.join(other, world_, T_other_world.inverse());
+      const auto joined = map_.join(newer, older, newer == world_ ? T_other_world : T_other_world.inverse());
       record.add_note("joined to the old map");
       take_back_what_has_gone(joined, frame, record);
     }
-    world_ = std::min(world_, other);
+    world_ = older;
   }
   // What filled the view while a map was on its own may have moved since: the poses by it were none in the room.
-  void take_back_what_has_gone(const std::vector<int>& keyframes, const Frame& frame, FrameRecord& record) {
-    std::vector<int> gone;
-    std::copy_if(keyframes.begin(), keyframes.end(), std::back_inserter(gone),
-                 [&](int k) { return has_gone(map_, k, frame, localization_.grid(), view_); });
-    if (gone.empty()) return;
-    poses_.take_back_of(gone, map_);
-    for (const int k : gone) map_.erase_keyframe(k);
+  void take_back_what_has_gone(std::vector<int> keyframes, const Frame& frame, FrameRecord& record) {
+    const auto is_there = [&](int k) { return !has_gone(map_, k, frame, localization_.grid(), view_); };
+    keyframes.erase(std::remove_if(keyframes.begin(), keyframes.end(), is_there), keyframes.end());
+    if (keyframes.empty()) return;
+    poses_.take_back_of(keyframes, map_);
+    for (const int k : keyframes) map_.erase_keyframe(k);
     record.add_note("poses by what has gone since are taken back");
   }
   // Where the camera of a frame is by two transformations.
@@ -292,7 +263,7 @@ class Tracking {
   }
 
   void extend_map(Frame& frame, FrameRecord& record) {
-    const bool on_probation = relocalised_ || probation_ > 0;
+    const bool on_probation = pose_.from_map || probation_ > 0;
     const bool apart = world_ != map_.keyframe(map_.alive_keyframes.front()).world;
     record.outcome = on_probation || apart ? Outcome::relocalised : Outcome::tracked;
     update_points(map_, frame, probability_, !on_probation, detector_.ok());
@@ -312,15 +283,24 @@ class Tracking {
     map_.recycle();
     record.keyframe = true;
     frames_since_keyframe_ = 0;
-    if (map_.keyframes.size() > 1) bundle_.start(map_, keyframe, view_, options_.bundle, options_.threads, observer_);
+    if (map_.keyframes.size() < 2) return;
+    bundle_ = std::make_unique<LocalBundle>(map_, keyframe, view_);
+    frames_since_bundle_ = 0;
+    adjusted_ = std::async(options_.threads ? std::launch::async : std::launch::deferred, [this] {
+      const Part part(observer_, Module::bundle_adjustment);
+      bundle_->solve();
+    });
   }
 
-  // The result of the bundle adjustment under way, `min_gap` frames after its start or now. The last frame moves with
-  // its reference.
+  // The result of the bundle adjustment under way is taken a fixed number of frames after its start, or now, whether it
+  // was ready earlier or not: so the same images give the same poses however many threads there are. The last frame
+  // moves with its reference.
   void take_bundle(bool now) {
-    if (!bundle_.is_due(now, options_.mapping.min_gap)) return;
+    if (bundle_ == nullptr || (!now && ++frames_since_bundle_ < Mapping::min_gap)) return;
+    adjusted_.get();
     const cfp::SE3<double> T_cam_reference = last_.T_cam_world * reference_pose().inverse();
-    bundle_.finish(map_);
+    bundle_->apply(map_);
+    bundle_.reset();
     if (last_.has_pose) last_.T_cam_world = T_cam_reference * reference_pose();
   }
 
@@ -337,13 +317,11 @@ class Tracking {
   Localization localization_;
   LocalMap local_map_;
   Mapping mapping_;
-  BundleThread bundle_;
   PoseHistory poses_;
 
   Frame last_;
   cfp::FrameInterval interval_;           // the motion model is not asked over a gap
   RefinedPose pose_;                      // of this frame
-  bool relocalised_ = false;              // in this frame
   std::optional<BelievedPose> believed_;  // the last of all frames
   double lost_s_ = 0;                     // since then
   int frames_since_keyframe_ = 0;
@@ -354,6 +332,10 @@ class Tracking {
   std::optional<Trial> trial_;
   std::optional<cfp::SE3<double>> T_other_world_;  // of the last look for other maps
   int frames_since_join_ = 0;
+
+  std::unique_ptr<LocalBundle> bundle_;  // under way
+  int frames_since_bundle_ = 0;
+  std::future<void> adjusted_;  // destroyed first: it waits for the thread
 };
 
 }  // namespace cfp_slam
