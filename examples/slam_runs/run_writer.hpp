@@ -179,9 +179,8 @@ class RunWriter final : public Observer {
   void write_frame(const FrameRecord& f) {
     frames_ << cfp_examples::fixed(f.time_s, 6) << ' ' << f.image << ' ' << to_string(f.outcome) << ' ' << f.keyframe
             << ' ' << f.keypoints << ' ' << f.matches << ' ' << f.inliers << ' ' << health_.effective_points << ' '
-            << health_.box_share << ' ' << (health_.fallback != cfp::WeightFallback::none) << ' '
-            << f.pose.inlier_share << ' ' << f.pose.spread << ' '
-            << (cfp::is_finite(f.pose.position_sigma_m) ? f.pose.position_sigma_m : -1);
+            << health_.box_share << ' ' << (health_.fallback != cfp::WeightFallback::none) << ' ' << f.pose.inlier_share
+            << ' ' << f.pose.spread << ' ' << (cfp::is_finite(f.pose.position_sigma_m) ? f.pose.position_sigma_m : -1);
     for (std::size_t m = 0; m < module_count; ++m) frames_ << ' ' << clock_.take_ms(static_cast<Module>(m));
     frames_ << (f.note.empty() ? "" : " # ") << f.note << '\n';
   }

@@ -1,7 +1,6 @@
 // What of the detector is believed.
 #pragma once
 
-#include <algorithm>
 #include <optional>
 #include <string>
 
@@ -9,6 +8,7 @@
 #include "../../support/numbers.hpp"
 #include "cfp/frame/detector_health.hpp"
 #include "cfp/frame/detector_lag.hpp"
+#include "frame.hpp"
 #include "options.hpp"
 #include "record.hpp"
 
@@ -34,7 +34,7 @@ class DetectorWatch {
     ok_ = status == cfp::DetectorStatus::ok || status == cfp::DetectorStatus::absurd;
     if (!ok_) return std::nullopt;
     const auto is_absurd = [&](const auto& d) { return cfp::is_absurd(d, options_.detector_health); };
-    detections.erase(std::remove_if(detections.begin(), detections.end(), is_absurd), detections.end());
+    remove_where(detections, is_absurd);
     return detections;
   }
 

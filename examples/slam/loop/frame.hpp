@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -19,6 +18,11 @@ namespace cfp_slam {
 using Camera = cfp::RadialTangentialCamera<float>;  // of the images
 using Descriptor = cfp_examples::OrbDescriptor;
 inline constexpr int no_point = -1;
+
+template <typename Element, typename Is>
+void remove_where(std::vector<Element>& list, const Is& is) {
+  list.erase(std::remove_if(list.begin(), list.end(), is), list.end());
+}
 
 // The camera of the undistorted images: their size, and how sure a keypoint's position is per pyramid level.
 struct View {
@@ -56,9 +60,9 @@ struct Frame {
   [[nodiscard]] std::size_t size() const { return keypoints.size(); }
   // The point that keypoint i sees by its depth, in the camera's frame. Precondition: it has one.
   [[nodiscard]] cfp::Vector3<double> back_project(std::size_t i, const cfp::PinholeCamera<float>& camera) const {
-    const double z = static_cast<double>(depths_m[i]);
-    return {z * static_cast<double>((pixels[i][0] - camera.cx) / camera.fx),
-            z * static_cast<double>((pixels[i][1] - camera.cy) / camera.fy), z};
+    cfp::Vector3<float> ray = cfp::Vector3<float>::Zero();
+    (void)camera.unproject({pixels[i][0], pixels[i][1]}, ray);
+    return static_cast<double>(depths_m[i]) * ray.cast<double>();
   }
 };
 
@@ -68,31 +72,24 @@ class KeypointGrid {
   void build(const Frame& frame, const View& view) {
     columns_ = view.width / cell + 1;
     rows_ = view.height / cell + 1;
-    cells_.resize(static_cast<std::size_t>(columns_ * rows_));
-    for (auto& c : cells_) c.clear();
-    for (std::size_t i = 0; i < frame.size(); ++i) {
-      const std::array<float, 2>& p = frame.pixels[i];
-      cells_[index(column(p[0]), row(p[1]))].push_back({p[0], p[1], i});
-    }
+    cells_.assign(static_cast<std::size_t>(columns_ * rows_), {});
+    for (std::size_t i = 0; i < frame.size(); ++i)
+      cells_[index(column(frame.pixels[i][0]), row(frame.pixels[i][1]))].push_back(i);
   }
 
-  // visit(index) for every keypoint within `radius` pixels along both axes.
+  // visit(index) for every keypoint of the frame within `radius` pixels along both axes.
   template <typename Visit>
-  void near(float x, float y, float radius, const Visit& visit) const {
+  void near(const Frame& frame, float x, float y, float radius, const Visit& visit) const {
     for (int r = row(y - radius); r <= row(y + radius); ++r) {
       for (int c = column(x - radius); c <= column(x + radius); ++c) {
-        for (const Entry& e : cells_[index(c, r)]) {
-          if (std::abs(e.x - x) <= radius && std::abs(e.y - y) <= radius) visit(e.keypoint);
+        for (const std::size_t i : cells_[index(c, r)]) {
+          if (std::abs(frame.pixels[i][0] - x) <= radius && std::abs(frame.pixels[i][1] - y) <= radius) visit(i);
         }
       }
     }
   }
 
  private:
-  struct Entry {
-    float x, y;
-    std::size_t keypoint;
-  };
   static constexpr int cell = 20;
   // Undistorted pixels may lie outside the image; they belong to the border's cells, those without a ray to the first.
   static int within(float x, int cells) {
@@ -103,7 +100,7 @@ class KeypointGrid {
   [[nodiscard]] std::size_t index(int c, int r) const { return static_cast<std::size_t>(r * columns_ + c); }
 
   int columns_ = 0, rows_ = 0;
-  std::vector<std::vector<Entry>> cells_;
+  std::vector<std::vector<std::size_t>> cells_;
 };
 
 }  // namespace cfp_slam

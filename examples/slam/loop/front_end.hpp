@@ -2,8 +2,6 @@
 // of their own.
 #pragma once
 
-#include <array>
-#include <cstddef>
 #include <future>
 #include <optional>
 #include <vector>

@@ -1,8 +1,6 @@
 // Points of the last frame, in the map or known from its depth alone, found again in this one.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <vector>
 
 #include "cfp/frame/frame.hpp"

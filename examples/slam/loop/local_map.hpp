@@ -3,15 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <vector>
 
 #include "matching.hpp"
 
 namespace cfp_slam {
 
-class LocalMap {
- public:
+struct LocalMap {
+  int reference = 0;                // the keyframe that shares most points with the last frame searched, or a newer one
+  std::vector<int> points;          // around it
+  std::size_t expected_proven = 0;  // of them: proven ones that it should have seen
+
   // The frame needs a pose. `wide`: it is new, and may be less exact.
   void search(Frame& frame, const KeypointGrid& grid, Map& map, const View& view, bool wide) {
     collect(frame, map);
@@ -20,19 +22,12 @@ class LocalMap {
       frame.map_point[m.keypoint] = m.index;
   }
 
-  // The keyframe that shares most points with the last frame searched, or a newer one.
-  [[nodiscard]] int reference() const { return reference_; }
-  void set_reference(int keyframe) { reference_ = keyframe; }
-  [[nodiscard]] const std::vector<int>& points() const { return points_; }
-  // Proven ones that the last frame searched should have seen.
-  [[nodiscard]] std::size_t expected_proven() const { return expected_proven_; }
-
  private:
   // Points of the keyframes that share some with the frame, and of one neighbour of each.
   void collect(const Frame& frame, const Map& map) {
     constexpr std::size_t nearest = 20, most = 30;
     std::vector<int> keyframes = map.covisible(frame.map_point, 1);
-    if (!keyframes.empty()) reference_ = keyframes.front();
+    if (!keyframes.empty()) reference = keyframes.front();
     if (keyframes.size() > nearest) keyframes.resize(nearest);
     for (std::size_t k = 0, direct = keyframes.size(); k < direct && keyframes.size() < most; ++k) {
       const std::vector<int>& neighbours = map.keyframe(keyframes[k]).neighbours;
@@ -41,13 +36,13 @@ class LocalMap {
       });
       if (added != neighbours.end()) keyframes.push_back(*added);
     }
-    points_.clear();
+    points.clear();
     std::vector<bool> known(map.points.size());
     for (const int k : keyframes) {
       for (const int p : map.keyframe(k).frame.map_point) {
         if (!map.is_alive(p) || known[static_cast<std::size_t>(p)]) continue;
         known[static_cast<std::size_t>(p)] = true;
-        points_.push_back(p);
+        points.push_back(p);
       }
     }
   }
@@ -62,8 +57,8 @@ class LocalMap {
     const int levels = static_cast<int>(view.scales.size());
     const double log_scale = std::log(static_cast<double>(view.scale_factor));
     std::vector<Expected> expected;
-    expected_proven_ = 0;
-    for (const int p : points_) {
+    expected_proven = 0;
+    for (const int p : points) {
       MapPoint& point = map.point(p);
       if (!seen[static_cast<std::size_t>(p)]) {
         cfp::Vector2<double> pixel;
@@ -78,14 +73,10 @@ class LocalMap {
         expected.push_back({float(pixel.x()), float(pixel.y()), clamped, radius, &point.descriptor, -1, p});
       }
       ++point.in_view;
-      expected_proven_ += map.is_proven(point) ? 1U : 0U;
+      expected_proven += map.is_proven(point) ? 1U : 0U;
     }
     return expected;
   }
-
-  int reference_ = 0;
-  std::size_t expected_proven_ = 0;
-  std::vector<int> points_;
 };
 
 }  // namespace cfp_slam

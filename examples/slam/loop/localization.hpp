@@ -2,13 +2,11 @@
 // map alone.
 #pragma once
 
-#include <cstdint>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "cfp/frame/static_probability.hpp"
-#include "cfp/geometry/homography.hpp"
 #include "last_frame_matching.hpp"
 #include "local_map.hpp"
 #include "motion.hpp"
@@ -53,7 +51,7 @@ class Localization {
       frame.has_pose = pose.health.ok();
     };
     if (last.has_pose) from_last(believed);
-    if (frame.has_pose || !relocalize_(frame, local_map.points())) return pose;
+    if (frame.has_pose || !relocalize_(frame, local_map.points)) return pose;
     from_last_ = match_last_frame(frame, grid_, last, map_, view_);
     from_last(std::nullopt);
     pose.from_map = true;
@@ -85,15 +83,12 @@ class Localization {
     from_last_.match.swap(unmatched);
     found.pose = from_map(found.frame, around, frame.static_probability);
     from_last_.match.swap(unmatched);
-    found.reference = around.reference();
+    found.reference = around.reference;
     return found.pose.health.ok() ? std::optional(std::move(found)) : std::nullopt;
   }
 
-  // Homography from the last image; none without a velocity.
-  [[nodiscard]] std::optional<cfp::Matrix3<float>> image_motion() const {
-    if (!motion_since_last_) return std::nullopt;
-    return cfp::rotation_homography(view_.camera, motion_since_last_->rotation.cast<float>());
-  }
+  // As the velocity lets expect it; none without.
+  [[nodiscard]] const std::optional<cfp::SE3<double>>& motion_since_last() const { return motion_since_last_; }
   // Keypoint of the last frame, per keypoint.
   [[nodiscard]] const std::vector<std::int32_t>& match() const { return from_last_.match; }
   [[nodiscard]] const KeypointGrid& grid() const { return grid_; }
@@ -113,7 +108,7 @@ class Localization {
       local_map.search(frame, grid_, map_, view_, wide);
     }
     const Part part(observer_, Module::pose);
-    return refine(frame, weight, local_map.expected_proven(), true, health, believed);
+    return refine(frame, weight, local_map.expected_proven, true, health, believed);
   }
 
   // The stage's weights hold M of what the last frame saw; that of points which joined since comes on top.

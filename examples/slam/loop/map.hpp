@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
 #include <iterator>
 #include <map>
 #include <unordered_map>
@@ -38,10 +37,6 @@ struct Keyframe {
   int parent = -1;               // of one that has gone: where it was is told by another keyframe, if there was one,
   cfp::SE3<double> T_of_parent;  // from whose camera to its own this goes
 };
-
-inline void erase_from(std::vector<int>& list, int value) {
-  list.erase(std::remove(list.begin(), list.end(), value), list.end());
-}
 
 class Map {
  public:
@@ -97,18 +92,15 @@ class Map {
   // the oldest of all.
   void forget(std::size_t most, int world) {
     while (alive_keyframes.size() > most) {
-      std::map<int, int> others;
-      for (const int k : alive_keyframes) ++others[keyframe(k).world];
-      const int here = others[world];
-      others.erase(world);
-      const auto smallest = std::min_element(others.begin(), others.end(),
-                                             [](const auto& a, const auto& b) { return a.second < b.second; });
-      if (smallest == others.end() || smallest->second > here) {
-        erase_keyframe(alive_keyframes.front());
-        continue;
-      }
+      std::map<int, int> count;
+      for (const int k : alive_keyframes) ++count[keyframe(k).world];
+      const auto smaller = [&](const auto& a, const auto& b) {
+        return std::pair(a.second, a.first == world) < std::pair(b.second, b.first == world);
+      };
+      const int smallest = std::min_element(count.begin(), count.end(), smaller)->first;
+      const int oldest = alive_keyframes.front();
       for (const int k : std::vector<int>(alive_keyframes)) {
-        if (keyframe(k).world == smallest->first) erase_keyframe(k);
+        if (smallest == world ? k == oldest : keyframe(k).world == smallest) erase_keyframe(k);
       }
     }
   }
@@ -187,8 +179,9 @@ class Map {
     gone.frame = {};
     gone.frame.T_cam_world = T_cam_world;
     gone.neighbours = {};
-    erase_from(alive_keyframes, index);
-    for (const int k : alive_keyframes) erase_from(keyframe(k).neighbours, index);
+    const auto is_it = [index](int k) { return k == index; };
+    remove_where(alive_keyframes, is_it);
+    for (const int k : alive_keyframes) remove_where(keyframe(k).neighbours, is_it);
   }
 
   // Keyframes that share at least `min_shared` of the given points, most first (ties: the newer first).

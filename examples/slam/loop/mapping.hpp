@@ -2,8 +2,7 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
-#include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "cfp/frame/static_probability.hpp"
@@ -48,7 +47,7 @@ inline void update_points(Map& map, Frame& frame, const cfp::StaticProbability<C
     cfp::Vector2<double> pixel;
     const cfp::Vector3<double> in_camera = frame.T_cam_world * map.point(p).position;
     if (!view.sees(in_camera, pixel)) continue;
-    grid.near(float(pixel.x()), float(pixel.y()), near_px, [&](std::size_t i) {
+    grid.near(frame, float(pixel.x()), float(pixel.y()), near_px, [&](std::size_t i) {
       const double beyond = double(frame.depths_m[i]) / in_camera.z() - 1;
       if (beyond > depth_tolerance)
         ++behind;
@@ -98,14 +97,14 @@ class Mapping {
     const cfp::SE3<double> T_world_cam = kept.T_cam_world.inverse();
     for (std::size_t i = 0; i < kept.size(); ++i) {
       if (MapPoint* const point = map.find(kept.map_point[i])) {
-        observe(*point, kept, i, index, T_world_cam.translation);
+        observe(*point, kept, i, index, T_world_cam);
       } else {
         kept.map_point[i] = no_point;
-        if (may_create(kept, i)) create(map, kept, i, index, view);
+        if (may_create(kept, i)) create(map, kept, i, index, T_world_cam, view);
       }
     }
     std::vector<int> neighbours = map.covisible(kept.map_point, 15);
-    erase_from(neighbours, index);
+    remove_where(neighbours, [&](int k) { return k == index; });
     map.keyframe(index).neighbours = std::move(neighbours);
     return index;
   }
@@ -127,7 +126,7 @@ class Mapping {
       map.erase_point(p);
       return true;
     };
-    young_.erase(std::remove_if(young_.begin(), young_.end(), is_settled), young_.end());
+    remove_where(young_, is_settled);
     for (const int k : std::vector<int>(map.keyframe(newest).neighbours)) {
       if (k > 0 && newest - k >= settled && is_superfluous(map, k)) map.erase_keyframe(k);
     }
@@ -154,15 +153,15 @@ class Mapping {
   }
 
   static void observe(MapPoint& point, const Frame& frame, std::size_t i, int keyframe,
-                      const cfp::Vector3<double>& camera_centre) {
-    point.normal =
-        (point.normal * double(point.observations.size()) + (point.position - camera_centre).normalized()).normalized();
+                      const cfp::SE3<double>& T_world_cam) {
+    const cfp::Vector3<double> direction = (point.position - T_world_cam.translation).normalized();
+    point.normal = (point.normal * double(point.observations.size()) + direction).normalized();
     point.observations.push_back({keyframe, static_cast<int>(i)});
     point.descriptor = frame.descriptors[i];
   }
 
-  void create(Map& map, Frame& frame, std::size_t i, int keyframe, const View& view) {
-    const cfp::SE3<double> T_world_cam = frame.T_cam_world.inverse();
+  void create(Map& map, Frame& frame, std::size_t i, int keyframe, const cfp::SE3<double>& T_world_cam,
+              const View& view) {
     const cfp::Vector3<double> in_camera = frame.back_project(i, view.camera);
     MapPoint point;
     point.position = T_world_cam * in_camera;
@@ -170,7 +169,7 @@ class Mapping {
     point.max_distance = static_cast<float>(in_camera.norm()) * view.scale(frame.keypoints[i]);
     point.static_probability = frame.static_probability[i];
     point.created_by = keyframe;
-    observe(point, frame, i, keyframe, T_world_cam.translation);
+    observe(point, frame, i, keyframe, T_world_cam);
     frame.map_point_probability[i] = point.static_probability;
     young_.push_back(frame.map_point[i] = map.add(std::move(point)));
   }

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
 #include <functional>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "cfp/frame/descriptor_matching.hpp"
@@ -48,30 +48,28 @@ std::vector<Match> match_expected(const Frame& frame, const KeypointGrid& grid, 
   std::vector<Match> matches;
   std::vector<int> taken(frame.size(), -1);  // index into matches
   for (const Expected& e : expected) {
-    int best = far_descriptor + 1, second = best, best_level = -1, second_level = -1;
-    std::size_t keypoint = 0;
-    grid.near(e.x, e.y, e.radius, [&](std::size_t i) {
+    struct Candidate {
+      int distance = far_descriptor + 1, level = -1;
+      std::size_t keypoint = 0;
+    } best, second;
+    grid.near(frame, e.x, e.y, e.radius, [&](std::size_t i) {
       const int level = frame.keypoints[i].octave;
       if (level < e.level - 1 || level > e.level + 1 || !free(i)) return;
-      const int distance = hamming(*e.descriptor, frame.descriptors[i]);
-      if (distance < best) {
-        second = best;
-        second_level = best_level;
-        best = distance;
-        best_level = level;
-        keypoint = i;
-      } else if (distance < second) {
-        second = distance;
-        second_level = level;
-      }
+      const Candidate candidate{hamming(*e.descriptor, frame.descriptors[i]), level, i};
+      if (candidate.distance < best.distance)
+        second = std::exchange(best, candidate);
+      else if (candidate.distance < second.distance)
+        second = candidate;
     });
-    if (best > far_descriptor || (best_level == second_level && float(best) > ratio * float(second))) continue;
-    const float turn = e.angle < 0 ? 0.0F : std::fmod(e.angle - frame.keypoints[keypoint].angle + 720.0F, 360.0F);
-    const Match match{keypoint, e.index, best, turn};
-    if (taken[keypoint] < 0) {
-      taken[keypoint] = static_cast<int>(matches.size());
+    if (best.distance > far_descriptor) continue;
+    if (best.level == second.level && float(best.distance) > ratio * float(second.distance)) continue;
+    const float turn = std::fmod(e.angle - frame.keypoints[best.keypoint].angle + 720.0F, 360.0F);
+    const Match match{best.keypoint, e.index, best.distance, e.angle < 0 ? 0 : turn};
+    int& index = taken[best.keypoint];
+    if (index < 0) {
+      index = static_cast<int>(matches.size());
       matches.push_back(match);
-    } else if (Match& other = matches[static_cast<std::size_t>(taken[keypoint])]; best < other.distance) {
+    } else if (Match& other = matches[static_cast<std::size_t>(index)]; match.distance < other.distance) {
       other = match;
     }
   }
@@ -89,8 +87,7 @@ inline void keep_common_turn(std::vector<Match>& matches) {
   std::array<int, bins> sorted = count;
   std::sort(sorted.begin(), sorted.end(), std::greater<>());
   const int least = std::max({sorted[2], sorted[0] / 10, 1});
-  matches.erase(std::remove_if(matches.begin(), matches.end(), [&](const Match& m) { return count[bin(m)] < least; }),
-                matches.end());
+  remove_where(matches, [&](const Match& m) { return count[bin(m)] < least; });
 }
 
 // Mutual nearest descriptors with a ratio test, without any idea where the points may be: for relocalisation. Corners
@@ -99,11 +96,7 @@ inline void keep_common_turn(std::vector<Match>& matches) {
 inline std::vector<Match> match_descriptors(const Frame& frame, const Map& map, const std::vector<int>& candidates) {
   constexpr double same_place_m = 0.05;
   constexpr float same_place_px = 4, ratio = 0.8F;
-  struct Nearest {
-    int distance = std::numeric_limits<int>::max();
-    std::size_t index = 0;
-  };
-  std::vector<Nearest> of_point(candidates.size());
+  std::vector<std::pair<int, std::size_t>> of_point(candidates.size(), {std::numeric_limits<int>::max(), 0});
   const auto elsewhere = [&](std::size_t a, std::size_t b) {
     return (map.point(candidates[a]).position - map.point(candidates[b]).position).squaredNorm() >
            same_place_m * same_place_m;
@@ -114,7 +107,7 @@ inline std::vector<Match> match_descriptors(const Frame& frame, const Map& map, 
     std::size_t nearest = 0;
     for (std::size_t c = 0; c < candidates.size(); ++c) {
       const int distance = hamming(map.point(candidates[c]).descriptor, frame.descriptors[i]);
-      if (distance < of_point[c].distance) of_point[c] = {distance, i};
+      if (distance < of_point[c].first) of_point[c] = {distance, i};
       if (distance >= second) continue;
       const bool other = best > near_descriptor || elsewhere(c, nearest);
       if (distance < best) {
@@ -129,10 +122,10 @@ inline std::vector<Match> match_descriptors(const Frame& frame, const Map& map, 
       matches.push_back({i, static_cast<int>(nearest), best, 0});
   }
   const auto one_sided = [&](const Match& m) {
-    const auto &a = frame.pixels[m.keypoint], &b = frame.pixels[of_point[static_cast<std::size_t>(m.index)].index];
+    const auto &a = frame.pixels[m.keypoint], &b = frame.pixels[of_point[static_cast<std::size_t>(m.index)].second];
     return !(std::hypot(a[0] - b[0], a[1] - b[1]) <= same_place_px);
   };
-  matches.erase(std::remove_if(matches.begin(), matches.end(), one_sided), matches.end());
+  remove_where(matches, one_sided);
   for (Match& m : matches) m.index = candidates[static_cast<std::size_t>(m.index)];
   return matches;
 }
@@ -161,8 +154,7 @@ inline void keep_rigid(const Frame& frame, const Map& map, const cfp::PinholeCam
   }
   if (most == 0) return;  // no depths
   const Match kept = matches[centre];
-  matches.erase(std::remove_if(matches.begin(), matches.end(), [&](const Match& m) { return !agree(kept, m); }),
-                matches.end());
+  remove_where(matches, [&](const Match& m) { return !agree(kept, m); });
 }
 
 }  // namespace cfp_slam

@@ -1,9 +1,6 @@
 // Everything that can be chosen about a run.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
-
 #include "../../support/orb_features.hpp"
 #include "cfp/frame/detector_health.hpp"
 #include "cfp/frame/detector_lag.hpp"
@@ -33,10 +30,10 @@ struct Options {
   cfp::PoseHealthOptions first_health{10, 0.3, 0, 0.1, 0.05}, health, relocalised_health{30, 0.4, 0.1, 0.02, 0.02};
   cfp::DetectorHealthOptions detector_health;
   cfp::DetectorLagOptions detector_lag;
-  int max_idle = 30;                // frames over which boxes are carried on while the detector is not believed
-  double new_map_after_s = 1;       // of being lost
-  double unproven_share = 0.01;     // in the pose: weight of what fewer than two keyframes saw, relative to all else
-  double min_known_share = 0.05;    // of the proven points that should be in view: fewer found, and it is not there
+  int max_idle = 30;              // frames over which boxes are carried on while the detector is not believed
+  double new_map_after_s = 1;     // of being lost
+  double unproven_share = 0.01;   // in the pose: weight of what fewer than two keyframes saw, relative to all else
+  double min_known_share = 0.05;  // of the proven points that should be in view: fewer found, and it is not there
   std::size_t min_initial_points = 100;
   std::size_t max_keyframes = 500;  // over all maps, see Map::forget
 };

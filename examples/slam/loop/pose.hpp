@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -52,11 +51,12 @@ class PoseSolver {
     observations.depths = seen.depths;
     observations.baseline_fx = view.baseline_fx;
     std::vector<char> inlier(seen.keypoints.size());
-    const auto solve = [&](const cfp::SE3<double>& start, const cfp::PoseOptions& options) {
-      return cfp::refine_pose(observations, view.exact, start, options, workspace_, inlier);
+    const auto solve = [&](const cfp::PoseOptions& options) {
+      const auto result = cfp::refine_pose(observations, view.exact, frame.T_cam_world, options, workspace_, inlier);
+      if (cfp::is_solved(result.status)) frame.T_cam_world = result.T_cam_world;
+      return result;
     };
-    cfp::PoseResult result = solve(frame.T_cam_world, options_.pose);
-    if (cfp::is_solved(result.status)) frame.T_cam_world = result.T_cam_world;
+    const cfp::PoseResult result = solve(options_.pose);
     std::optional<cfp::PoseStep<double>> step;
     if (believed) step = believed->step_to(frame);
     RefinedPose out{0, 0, cfp::assess_pose(result, observations.pixels, seen.weights, inlier, step, health), false};
@@ -67,8 +67,7 @@ class PoseSolver {
       cfp::PoseOptions narrow = options_.pose;
       narrow.rounds[0] = narrow.rounds[narrow.round_count - 1];
       narrow.round_count = 1;
-      result = solve(frame.T_cam_world, narrow);
-      if (cfp::is_solved(result.status)) frame.T_cam_world = result.T_cam_world;
+      solve(narrow);
     }
     std::size_t proven = 0;
     for (std::size_t o = 0; o < inlier.size(); ++o) {
@@ -126,7 +125,8 @@ class PoseSolver {
     for (std::size_t o = 0; o < seen.weights.size(); ++o) (seen.proven[o] ? proven : others) += seen.weights[o];
     const double share = std::min(1.0, options_.unproven_share * proven / std::max(others, 1e-9));
     const double known = std::clamp((static_cast<double>(expected) - few) / (enough_expected - few), 0.0, 1.0);
-    for (std::size_t o = 0; o < seen.weights.size(); ++o) seen.weights[o] *= seen.proven[o] ? 1 : 1 + (share - 1) * known;
+    for (std::size_t o = 0; o < seen.weights.size(); ++o)
+      seen.weights[o] *= seen.proven[o] ? 1 : 1 + (share - 1) * known;
     return share < 1 && known > 0;
   }
 

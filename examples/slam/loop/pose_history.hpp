@@ -3,7 +3,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
 #include <vector>
 
 #include "map.hpp"
@@ -26,7 +25,7 @@ class PoseHistory {
     const auto is_of_one = [&](const Pose& p) {
       return std::find(keyframes.begin(), keyframes.end(), map.ancestor(p.reference)) != keyframes.end();
     };
-    poses_.erase(std::remove_if(poses_.begin(), poses_.end(), is_of_one), poses_.end());
+    remove_where(poses_, is_of_one);
   }
 
   [[nodiscard]] RunResult result(const Map& map) const {

@@ -1,8 +1,6 @@
 // What the loop knows of a frame when it is done, and the names of its parts.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <string>
 
 #include "cfp/frame/pose_health.hpp"

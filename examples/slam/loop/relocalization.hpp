@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstddef>
-#include <cstdint>
 #include <iterator>
 #include <vector>
 
@@ -22,7 +20,7 @@ class Relocalization {
                  const cfp::PinholeCamera<float>& camera)
       : map_(map), probability_(probability), camera_(camera) {
     options_.seed = seed;
-    options_.min_inliers = min_inliers;
+    options_.min_inliers = 15;
     options_.max_iterations = 1000;  // most candidates are hopeless: give up soon
   }
 
@@ -50,8 +48,6 @@ class Relocalization {
   }
 
  private:
-  static constexpr std::size_t min_inliers = 15;
-
   bool try_points(Frame& frame, const std::vector<int>& points) {
     std::vector<int> candidates;
     // What one keyframe alone saw may have moved since.
@@ -59,7 +55,7 @@ class Relocalization {
                  [&](int p) { return map_.is_alive(p) && map_.is_proven(map_.point(p)); });
     std::vector<Match> matches = match_descriptors(frame, map_, candidates);
     keep_rigid(frame, map_, camera_, matches);
-    if (matches.size() < min_inliers) return false;
+    if (matches.size() < options_.min_inliers) return false;
     std::vector<cfp::Vector3<float>> world;
     std::vector<std::array<float, 2>> pixels;
     std::vector<float> weights;

@@ -1,7 +1,6 @@
 // One run of the SLAM loop over one recording.
 #pragma once
 
-#include <cstddef>
 #include <functional>
 #include <vector>
 

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
 #include <future>
 #include <memory>
 #include <optional>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "cfp/frame/static_probability.hpp"
+#include "cfp/geometry/homography.hpp"
 #include "cfp/interop/opencv.hpp"
 #include "detector_watch.hpp"
 #include "front_end.hpp"
@@ -45,7 +45,7 @@ class Tracking {
     const double step_s = frame.time_s - last_.time_s;
     if (step_s > 0 && cfp::is_finite(step_s)) {  // a clock that was set back says nothing
       lost_s_ += step_s;
-      if (trial_) trial_->left_s -= step_s;
+      if (trial_) trial_->left -= step_s;
     }
     if (interval_.is_gap(frame.time_s)) {  // the last frame says nothing of where its points are now
       record.add_note("gap before this frame: " + std::to_string(frame.time_s - last_.time_s) + " s");
@@ -58,13 +58,12 @@ class Tracking {
     const auto& match = localization_.match();
     record.matches = match.size() - std::size_t(std::count(match.begin(), match.end(), cfp::no_match));
     if (map_.keyframes.empty()) {
-      if (!begin_map(frame, record)) 
+      if (!begin_map(frame, record))
         record.add_note("waiting for " + std::to_string(options_.min_initial_points) + " static points with depth");
     } else {
       follow_trial(frame, record);
       follow_probation(frame, record);
       if (frame.has_pose) {
-        world_ = map_.keyframe(local_map_.reference()).world;
         join_worlds(frame, record);
         extend_map(frame, record);
       } else if (lost_s_ < options_.new_map_after_s || !begin_map(frame, record)) {
@@ -74,7 +73,7 @@ class Tracking {
     record.inliers = pose_.inliers;
     record.pose = pose_.health;
     if (frame.has_pose) {
-      poses_.add(frame, local_map_.reference(), map_);
+      poses_.add(frame, local_map_.reference, map_);
       believed_ = BelievedPose{frame.time_s, frame.T_cam_world};
       lost_s_ = 0;
     }
@@ -92,9 +91,9 @@ class Tracking {
   }
 
  private:
-  struct Trial {  // of the newest map
-    double left_s = 0;
+  struct Trial {  // of what may turn out to be wrong: then the poses from the first one on are taken back
     std::size_t first_pose = 0;  // of poses_
+    double left = 0;             // seconds of a new map, frames of a relocalisation
   };
 
   // Matches, probabilities, weights and the pose, each twice.
@@ -114,8 +113,7 @@ class Tracking {
     }
     for (std::size_t i = 0; i < frame.size(); ++i)
       frame.static_probability[i] = probability_.static_probability(i, frame.map_point_probability[i]);
-    if (frame.has_pose)
-      pose_ = localization_.second_pose(frame, local_map_, stage.weight, pose_.from_map, believed_);
+    if (frame.has_pose) pose_ = localization_.second_pose(frame, local_map_, stage.weight, pose_.from_map, believed_);
     observer_.decided(probability_, frame, map_);
   }
 
@@ -130,16 +128,17 @@ class Tracking {
       frame.flow.previous_depths = input.flow.depths_m;
     }
     frame.map_point_probability = input.frame.map_point_probability;
-    frame.image_motion = localization_.image_motion();
+    if (const auto& motion = localization_.motion_since_last())
+      frame.image_motion = cfp::rotation_homography(view_.camera, motion->rotation.cast<float>());
     const Part part(observer_, Module::coarse);
     const auto stage = probability_.coarse(frame);
     detector_.look_for_lag(frame, probability_.state(), record);
     return stage;
   }
 
-  // Poses that turned out to be wrong, all but the first so many.
-  void take_back_poses(std::size_t first, const char* why, FrameRecord& record) {
-    poses_.take_back_after(first);
+  void fail(std::optional<Trial>& trial, const char* why, FrameRecord& record) {
+    poses_.take_back_after(trial->first_pose);
+    trial.reset();
     believed_.reset();
     record.add_note(why);
   }
@@ -148,41 +147,35 @@ class Tracking {
   // or an older one found, it goes, with its poses.
   void follow_trial(const Frame& frame, FrameRecord& record) {
     if (!trial_) return;
-    const int reference = local_map_.reference();
-    if (!frame.has_pose || map_.keyframe(reference).world != map_.newest_world()) {
+    if (!frame.has_pose || reference().world != map_.newest_world()) {
       end_trial(record);
-      local_map_.set_reference(frame.has_pose ? reference : 0);
+      if (!frame.has_pose) local_map_.reference = 0;
       lost_s_ = 0;
-    } else if (trial_->left_s <= 0) {
+    } else if (trial_->left <= 0) {
       trial_.reset();
     }
   }
   void end_trial(FrameRecord& record) {
     take_bundle(true);
-    take_back_poses(trial_->first_pose, "the new map is given up, its poses are taken back", record);
+    fail(trial_, "the new map is given up, its poses are taken back", record);
     map_.drop_world();
-    trial_.reset();
-    probation_ = 0;
+    probation_.reset();
   }
 
   // A pose from the map alone is on probation until some frames have been tracked from it. When it turns out to have
   // been wrong, the poses given since are taken back.
   void follow_probation(const Frame& frame, FrameRecord& record) {
     const bool jumps = pose_.from_map && believed_ && cfp::is_jump(believed_->step_to(frame), options_.health);
-    const bool failed = probation_ > 0 && (!frame.has_pose || jumps);
-    if (failed) take_back_poses(first_on_probation_, "a relocalisation was wrong, its poses are taken back", record);
-    if (!frame.has_pose) {
-      probation_ = 0;
-    } else if (!pose_.from_map) {
-      probation_ = std::max(probation_ - 1, 0);
-    } else {
-      begin_probation(failed || probation_ == 0);
-    }
+    if (probation_ && (!frame.has_pose || jumps))
+      fail(probation_, "a relocalisation was wrong, its poses are taken back", record);
+    if (frame.has_pose && pose_.from_map)
+      begin_probation();
+    else if (probation_ && --probation_->left <= 0)
+      probation_.reset();
   }
-  void begin_probation(bool anew) {
-    constexpr int frames = 5;
-    if (anew) first_on_probation_ = poses_.size();
-    probation_ = frames;
+  void begin_probation() {
+    constexpr double frames = 5;
+    probation_ = Trial{probation_ ? probation_->first_pose : poses_.size(), frames};
   }
 
   // The first frame is the world; it needs enough points that may be static. After some time of being lost the map is
@@ -195,10 +188,10 @@ class Tracking {
     record.outcome = Outcome::tracked;
     if (!map_.keyframes.empty()) {
       std::fill(frame.map_point.begin(), frame.map_point.end(), no_point);
-      world_ = map_.begin_world();
+      map_.begin_world();
       frames_since_join_ = 0;
       T_other_world_.reset();
-      trial_ = Trial{lost_s_, poses_.size()};
+      trial_ = Trial{poses_.size(), lost_s_};
       record.outcome = Outcome::relocalised;
       record.add_note("new map");
     }
@@ -206,7 +199,7 @@ class Tracking {
     frame.has_pose = true;
     pose_ = {};
     pose_.inliers = usable;
-    make_keyframe(frame, record);
+    make_keyframe(frame, map_.newest_world(), record);
     return true;
   }
 
@@ -214,11 +207,11 @@ class Tracking {
   // one, or do without it, if it is on trial.
   void join_worlds(Frame& frame, FrameRecord& record) {
     constexpr int interval = 5;  // frames
-    const auto is_other = [&](int k) { return map_.keyframe(k).world != world_; };
-    if (probation_ > 0 || ++frames_since_join_ % interval != 0 ||
+    const auto is_other = [&](int k) { return map_.keyframe(k).world != reference().world; };
+    if (probation_ || ++frames_since_join_ % interval != 0 ||
         std::none_of(map_.alive_keyframes.begin(), map_.alive_keyframes.end(), is_other))
       return;
-    const auto found = localization_.find_elsewhere(frame, world_);
+    const auto found = localization_.find_elsewhere(frame, reference().world);
     std::optional<cfp::SE3<double>> T_other_world;
     if (found) T_other_world = found->frame.T_cam_world.inverse() * frame.T_cam_world;
     if (T_other_world && T_other_world_ && agree(*T_other_world, *T_other_world_, frame))
@@ -227,30 +220,27 @@ class Tracking {
   }
   void join_world(const Localization::Elsewhere& found, const cfp::SE3<double>& T_other_world, Frame& frame,
                   FrameRecord& record) {
-    const int newer = std::max(world_, map_.keyframe(found.reference).world);
-    const int older = std::min(world_, map_.keyframe(found.reference).world);
+    const auto [older, newer] = std::minmax({reference().world, map_.keyframe(found.reference).world});
+    const bool to_older = newer == reference().world;
     take_bundle(true);
-    if (newer == world_) {
+    if (to_older) {
       last_.T_cam_world = last_.T_cam_world * T_other_world.inverse();
       frame = found.frame;
       pose_ = found.pose;
-      local_map_.set_reference(found.reference);
+      local_map_.reference = found.reference;
     }
     if (trial_) {
       end_trial(record);
-      pose_.from_map = true;
-      begin_probation(true);
+      begin_probation();
     } else {
-      const auto joined = map_.join(newer, older, newer == world_ ? T_other_world : T_other_world.inverse());
+      const auto joined = map_.join(newer, older, to_older ? T_other_world : T_other_world.inverse());
       record.add_note("joined to the old map");
       take_back_what_has_gone(joined, frame, record);
     }
-    world_ = older;
   }
   // What filled the view while a map was on its own may have moved since: the poses by it were none in the room.
   void take_back_what_has_gone(std::vector<int> keyframes, const Frame& frame, FrameRecord& record) {
-    const auto is_there = [&](int k) { return !has_gone(map_, k, frame, localization_.grid(), view_); };
-    keyframes.erase(std::remove_if(keyframes.begin(), keyframes.end(), is_there), keyframes.end());
+    remove_where(keyframes, [&](int k) { return !has_gone(map_, k, frame, localization_.grid(), view_); });
     if (keyframes.empty()) return;
     poses_.take_back_of(keyframes, map_);
     for (const int k : keyframes) map_.erase_keyframe(k);
@@ -263,20 +253,18 @@ class Tracking {
   }
 
   void extend_map(Frame& frame, FrameRecord& record) {
-    const bool on_probation = pose_.from_map || probation_ > 0;
-    const bool apart = world_ != map_.keyframe(map_.alive_keyframes.front()).world;
-    record.outcome = on_probation || apart ? Outcome::relocalised : Outcome::tracked;
-    update_points(map_, frame, probability_, !on_probation, detector_.ok());
+    const bool apart = reference().world != map_.keyframe(map_.alive_keyframes.front()).world;
+    record.outcome = probation_ || apart ? Outcome::relocalised : Outcome::tracked;
+    update_points(map_, frame, probability_, !probation_, detector_.ok());
     ++frames_since_keyframe_;
-    if (!on_probation &&
-        mapping_.wants_keyframe(map_, frame, local_map_.reference(), pose_.in_map, frames_since_keyframe_))
-      make_keyframe(frame, record);
+    if (!probation_ && mapping_.wants_keyframe(map_, frame, local_map_.reference, pose_.in_map, frames_since_keyframe_))
+      make_keyframe(frame, reference().world, record);
   }
 
-  void make_keyframe(Frame& frame, FrameRecord& record) {
+  void make_keyframe(Frame& frame, int world, FrameRecord& record) {
     take_bundle(true);
-    const int keyframe = mapping_.insert(map_, frame, world_, view_);
-    local_map_.set_reference(keyframe);
+    const int keyframe = mapping_.insert(map_, frame, world, view_);
+    local_map_.reference = keyframe;
     mapping_.cull(map_);
     frame.map_point = map_.keyframe(keyframe).frame.map_point;
     frame.map_point_probability = map_.keyframe(keyframe).frame.map_point_probability;
@@ -298,15 +286,14 @@ class Tracking {
   void take_bundle(bool now) {
     if (bundle_ == nullptr || (!now && ++frames_since_bundle_ < Mapping::min_gap)) return;
     adjusted_.get();
-    const cfp::SE3<double> T_cam_reference = last_.T_cam_world * reference_pose().inverse();
+    const cfp::SE3<double> T_cam_reference = last_.T_cam_world * reference().frame.T_cam_world.inverse();
     bundle_->apply(map_);
     bundle_.reset();
-    if (last_.has_pose) last_.T_cam_world = T_cam_reference * reference_pose();
+    if (last_.has_pose) last_.T_cam_world = T_cam_reference * reference().frame.T_cam_world;
   }
 
-  [[nodiscard]] const cfp::SE3<double>& reference_pose() const {
-    return map_.keyframe(local_map_.reference()).frame.T_cam_world;
-  }
+  // Its world is the camera's, if that has a pose.
+  [[nodiscard]] const Keyframe& reference() const { return map_.keyframe(local_map_.reference); }
 
   Options options_;
   View view_;
@@ -326,10 +313,7 @@ class Tracking {
   double lost_s_ = 0;                     // since then
   int frames_since_keyframe_ = 0;
 
-  int probation_ = 0;                   // frames left
-  std::size_t first_on_probation_ = 0;  // of poses_
-  int world_ = 0;                       // of the keyframes to come
-  std::optional<Trial> trial_;
+  std::optional<Trial> trial_, probation_;         // of the newest map, of a pose from the map alone
   std::optional<cfp::SE3<double>> T_other_world_;  // of the last look for other maps
   int frames_since_join_ = 0;
 
