@@ -117,6 +117,8 @@ template <typename Scalar>
   if (taken < options.min_pairs) return motion;
 
   workspace.distances.resize(outside.size());
+  if (workspace.search.observations.index.size() < outside.size())  // a later call may search and must not allocate
+    workspace.search.observations.begin(outside.size());
   const auto believe = [&](const SE3<double>& T_cur_prev) {
     motion.T_cur_prev = T_cur_prev.template cast<Scalar>();
     motion_distances(flow.previous, flow.previous_depths, flow.current, UncertainMotion<Scalar>(motion.T_cur_prev),
