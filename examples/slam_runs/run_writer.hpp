@@ -16,7 +16,6 @@
 #include <map>
 #include <stdexcept>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -88,7 +87,8 @@ class RunWriter final : public Observer {
     health_ = result.report.health;
     if (result.report.stage == cfp::Stage::coarse) {
       for (std::size_t b = 0; b < state.boxes.size(); ++b) {
-        const auto& [box, object] = std::tie(state.boxes[b], state.objects[b]);
+        const auto& box = state.boxes[b];
+        const auto& object = state.objects[b];
         boxes_ << frame_ << ' ' << box.id << ' ' << box.box.x1 << ' ' << box.box.y1 << ' ' << box.box.x2 << ' '
                << box.box.y2 << ' ' << box.compensated() << ' ' << (object.status == cfp::Status::ok) << ' '
                << object.static_probability << ' ' << object.pairs << '\n';

@@ -34,6 +34,14 @@ void write_run(const TemporaryFolder& folder, const std::string& image) {
   frame.map_point_probability = {-1, 0.7F, 0.1F};
   cfp::FrameState<float> state;
   state.label = {cfp::KeypointLabel::outside, cfp::KeypointLabel::background, cfp::KeypointLabel::foreground};
+  state.boxes.resize(1);
+  state.boxes[0].id = -7;
+  state.boxes[0].box = {1, 2, 3.5F, 4};
+  state.boxes[0].detection = -1;  // compensated
+  state.objects.resize(1);
+  state.objects[0].static_probability = 0.1 + 0.2;
+  state.objects[0].status = cfp::Status::ok;
+  state.objects[0].pairs = 12;
   const std::vector<float> k{1, 0.3F, 0.4F}, fine{1, 0.6F, 1.0F / 3}, weight{1, 0.5F, 0.25F};
   cfp::StageResult<float> result;
   state.static_probability = k;
@@ -49,11 +57,9 @@ void write_run(const TemporaryFolder& folder, const std::string& image) {
   record.keypoints = 3;
   record.pose.inlier_share = 0.75;
   record.pose.position_sigma_m = 0.002;
-  record.boxes.push_back({-7, {1, 2, 3.5F, 4}, true, 0.1 + 0.2, true, 12});
   writer.begin(Module::pose);
   writer.end(Module::pose);
   writer.finished(record);
-  record.boxes.clear();
   record.outcome = Outcome::lost;
   record.note = "too few: 3 # of 4";
   writer.finished(record);
