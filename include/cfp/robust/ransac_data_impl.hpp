@@ -36,7 +36,7 @@ struct RansacColumns {
     exact.assign(Rows * capacity, 0.0);
     fast.resize(Rows * capacity);
   }
-  void push(std::size_t i, const double (&datum)[Rows]) noexcept {
+  CFP_INLINE void push(std::size_t i, const double (&datum)[Rows]) noexcept {
     for (std::size_t r = 0; r < Rows; ++r) row(r)[size] = datum[r];
     index[size++] = static_cast<std::uint32_t>(i);
   }
