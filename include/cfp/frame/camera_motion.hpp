@@ -81,7 +81,7 @@ template <typename Scalar>
                                         const CameraMotionOptions& options, CameraMotionWorkspace<Scalar>& workspace,
                                         SE3<double>& T) {
   PnpRansacOptions search;
-  search.threshold_px = options.max_sigma_px;
+  search.threshold_px = (std::min)(options.max_sigma_px, 1e3);
   search.max_iterations = 100;
   const PnpRansacResult<Scalar> found =
       pnp_ransac(PointSpan<Scalar, 3>(workspace.points), current, {}, camera, search, workspace.search);
