@@ -96,7 +96,8 @@ inline namespace CFP_ISA {
 
 /// The motion of the camera from the pairs of the undistorted image that `outside` marks as on no object and whose
 /// depth is known: weighted robust pose refinement (refine_pose) from `start`, once with the largest noise and once
-/// with the noise that the pairs then show. Unknown where too few pairs have a depth or agree. O(pairs).
+/// with the noise that the pairs then show; where that is above search_above_px, from the motion that pnp_ransac finds,
+/// and narrowly. Unknown where too few pairs have a depth or agree. O(pairs).
 template <typename Scalar>
 [[nodiscard]] CameraMotion<Scalar> estimate_camera_motion(const FlowPairs<Scalar>& flow, span<const char> outside,
                                                           const SE3<double>& start, const PinholeCamera<Scalar>& camera,

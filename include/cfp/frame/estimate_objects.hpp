@@ -34,12 +34,6 @@ template <typename Scalar>
   return options.coarse.use_depth_foreground && is_non_rigid(box.class_id, options);
 }
 
-/// Whether keypoints in no box are judged by the flow, too.
-[[nodiscard]] inline bool looks_for_unreported(const FrameOptions& options) noexcept {
-  return options.use_boxes && options.map_point.weight == WeightRule::posterior &&
-         options.coarse.unreported.radius_px > 0;
-}
-
 /// The options on the scale of the noise of this frame's flow.
 [[nodiscard]] inline ObjectProbabilityOptions scaled_to_flow(const ObjectProbabilityOptions& options,
                                                              const FrameReport& report) noexcept {
@@ -169,7 +163,7 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   FrameReport& report = state.report;
   report.unknown_objects = state.boxes.size();
   if (!options.coarse.use_object_probability || n == 0) return;
-  if (state.boxes.empty() && !detail::looks_for_unreported(options)) return;
+  if (state.boxes.empty() && !looks_for_unreported(options)) return;
 
   FrameScratch<Scalar>& scratch = state.scratch;
   const FlowPairs<Scalar> flow{undistorted(camera, frame.flow.previous, scratch.undistorted_previous),

@@ -128,6 +128,12 @@ inline namespace CFP_ISA {
                      [class_id](const ObjectClass& c) { return c.class_id == class_id && c.non_rigid; });
 }
 
+/// Whether keypoints in no box are judged by the flow, too.
+[[nodiscard]] inline bool looks_for_unreported(const FrameOptions& options) noexcept {
+  return options.use_boxes && options.map_point.weight == WeightRule::posterior &&
+         options.coarse.unreported.radius_px > 0;
+}
+
 /// The enumerator's name as the example programs spell it.
 [[nodiscard]] constexpr const char* to_string(Variant variant) noexcept {
   constexpr const char* names[] = {"cfp",    "cfp-minus",    "no-mdc",     "no-dbscan",

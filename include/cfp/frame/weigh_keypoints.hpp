@@ -44,8 +44,8 @@ template <typename Scalar>
                                                   options.object_threshold));
 }
 
-/// M of a map point of which nothing is known when keypoint i observes it: 1 outside all boxes and by the printed
-/// rules, else the prior of its label, which what is shown static raises.
+/// M of a map point of which nothing is known when keypoint i observes it: 1 outside all boxes where nothing moves and
+/// by the printed rules, else the prior of its label, which what is shown static raises.
 template <typename Scalar>
 [[nodiscard]] Scalar unknown_map_point(std::size_t i, const FrameOptions& options,
                                        const FrameState<Scalar>& state) noexcept {
@@ -56,9 +56,9 @@ template <typename Scalar>
   return posterior_probability(Scalar(0.5), e, Scalar(on_object ? o.foreground_prior : o.background_prior), o);
 }
 
-/// The weight by Bayes' rule, before any fallback. Outside all boxes it is M. In one, E can only lower it,
-/// because what rests may move in the next frame; K counts once the constraints were asked, as keypoint_evidence has
-/// it, and what came from nowhere is then left out.
+/// The weight by Bayes' rule, before any fallback. Outside all boxes it is M. In one, and for what is_unreported, E can
+/// only lower it, because what rests may move in the next frame; K counts once the constraints were asked, as
+/// keypoint_evidence has it, and what came from nowhere is then left out.
 template <typename Scalar>
 [[nodiscard]] Scalar posterior_weight(std::size_t i, non_deduced<Scalar> map_point_probability,
                                       const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
