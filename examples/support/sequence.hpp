@@ -220,6 +220,22 @@ class Sequence {
   std::vector<std::string> notes_;
 };
 
+// Frames in the order of time: a recording's, or what somebody made of them.
+struct FrameSource {
+  FrameSource() = default;
+  // The recording must stay.
+  FrameSource(const Sequence& sequence)  // NOLINT: a recording is a source
+      : calibration(sequence.calibration()),
+        camera(sequence.camera()),
+        size(sequence.size()),
+        load([&sequence](std::size_t k) { return sequence.load(k); }) {}
+
+  TumCamera calibration;
+  cfp::RadialTangentialCamera<double> camera;
+  std::size_t size = 0;
+  std::function<SequenceFrame(std::size_t)> load;
+};
+
 // Loads frame i + 1 in the background while frame i is worked on. The frames are those of `load`.
 class PrefetchingReader {
  public:

@@ -134,7 +134,7 @@ TEST_CASE("What a frame sees through has gone; what is hidden, or where people a
   }
   const int keyframe = add_keyframe(map, board);
   KeypointGrid grid;
-  grid.build(frame, view);
+  grid.build(frame.pixels, view.width, view.height);
   const auto gone = [&](std::size_t behind, float static_probability, float depth_m = 1) {
     for (std::size_t i = 0; i < frame.size(); ++i) frame.depths_m[i] = i < behind ? 3 : depth_m;
     frame.static_probability.assign(frame.size(), static_probability);

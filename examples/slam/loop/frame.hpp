@@ -1,13 +1,13 @@
-// One RGB-D frame as the loop sees it, and the search for its keypoints near a pixel.
+// One RGB-D frame as the loop sees it.
 #pragma once
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <vector>
 
 #include <opencv2/core.hpp>
 
+#include "../../support/keypoint_grid.hpp"
 #include "../../support/orb_features.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/radial_tangential_camera.hpp"
@@ -17,6 +17,7 @@ namespace cfp_slam {
 
 using Camera = cfp::RadialTangentialCamera<float>;  // of the images
 using Descriptor = cfp_examples::OrbDescriptor;
+using cfp_examples::KeypointGrid;
 inline constexpr int no_point = -1;
 
 template <typename Element, typename Is>
@@ -64,43 +65,6 @@ struct Frame {
     (void)camera.unproject({pixels[i][0], pixels[i][1]}, ray);
     return static_cast<double>(depths_m[i]) * ray.cast<double>();
   }
-};
-
-// The keypoints of a frame by image cell.
-class KeypointGrid {
- public:
-  void build(const Frame& frame, const View& view) {
-    columns_ = view.width / cell + 1;
-    rows_ = view.height / cell + 1;
-    cells_.assign(static_cast<std::size_t>(columns_ * rows_), {});
-    for (std::size_t i = 0; i < frame.size(); ++i)
-      cells_[index(column(frame.pixels[i][0]), row(frame.pixels[i][1]))].push_back(i);
-  }
-
-  // visit(index) for every keypoint of the frame within `radius` pixels along both axes.
-  template <typename Visit>
-  void near(const Frame& frame, float x, float y, float radius, const Visit& visit) const {
-    for (int r = row(y - radius); r <= row(y + radius); ++r) {
-      for (int c = column(x - radius); c <= column(x + radius); ++c) {
-        for (const std::size_t i : cells_[index(c, r)]) {
-          if (std::abs(frame.pixels[i][0] - x) <= radius && std::abs(frame.pixels[i][1] - y) <= radius) visit(i);
-        }
-      }
-    }
-  }
-
- private:
-  static constexpr int cell = 20;
-  // Undistorted pixels may lie outside the image; they belong to the border's cells, those without a ray to the first.
-  static int within(float x, int cells) {
-    return x > 0 ? static_cast<int>(std::min(x / float(cell), float(cells - 1))) : 0;
-  }
-  [[nodiscard]] int column(float x) const { return within(x, columns_); }
-  [[nodiscard]] int row(float y) const { return within(y, rows_); }
-  [[nodiscard]] std::size_t index(int c, int r) const { return static_cast<std::size_t>(r * columns_ + c); }
-
-  int columns_ = 0, rows_ = 0;
-  std::vector<std::vector<std::size_t>> cells_;
 };
 
 }  // namespace cfp_slam

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "cfp/frame/static_probability.hpp"
-#include "last_frame_matching.hpp"
 #include "local_map.hpp"
 #include "motion.hpp"
 #include "observer.hpp"
@@ -34,7 +33,7 @@ class Localization {
     motion_since_last_ = motion_.predict(last, frame.time_s);
     frame.T_cam_world = motion_since_last_ ? *motion_since_last_ * last.T_cam_world : last.T_cam_world;
     const Part part(observer_, Module::matching);
-    grid_.build(frame, view_);
+    grid_.build(frame.pixels, view_.width, view_.height);
     from_last_ = match_last_frame(frame, grid_, last, map_, view_);
   }
   // Last of all.

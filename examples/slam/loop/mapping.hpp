@@ -47,7 +47,7 @@ inline void update_points(Map& map, Frame& frame, const cfp::StaticProbability<C
     cfp::Vector2<double> pixel;
     const cfp::Vector3<double> in_camera = frame.T_cam_world * map.point(p).position;
     if (!view.sees(in_camera, pixel)) continue;
-    grid.near(frame, float(pixel.x()), float(pixel.y()), near_px, [&](std::size_t i) {
+    grid.near(frame.pixels, float(pixel.x()), float(pixel.y()), near_px, [&](std::size_t i) {
       const double beyond = double(frame.depths_m[i]) / in_camera.z() - 1;
       if (beyond > depth_tolerance)
         ++behind;

@@ -10,7 +10,7 @@
 #include "cfp/frame/pose_health.hpp"
 #include "cfp/frame/weigh_keypoints.hpp"
 #include "cfp/optimization/pose/pose_refinement.hpp"
-#include "last_frame_matching.hpp"
+#include "matching.hpp"
 #include "options.hpp"
 
 namespace cfp_slam {

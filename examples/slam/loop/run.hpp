@@ -1,7 +1,6 @@
 // One run of the SLAM loop over one recording.
 #pragma once
 
-#include <functional>
 #include <vector>
 
 #include "../../detection/detector_types.hpp"
@@ -11,21 +10,7 @@
 
 namespace cfp_slam {
 
-// The frames that a run sees, in the order of time: a recording's, or what somebody made of them.
-struct FrameSource {
-  FrameSource() = default;
-  // The recording must stay.
-  FrameSource(const cfp_examples::Sequence& sequence)  // NOLINT: a recording is a source
-      : calibration(sequence.calibration()),
-        camera(sequence.camera()),
-        size(sequence.size()),
-        load([&sequence](std::size_t k) { return sequence.load(k); }) {}
-
-  cfp_examples::TumCamera calibration;
-  cfp::RadialTangentialCamera<double> camera;
-  std::size_t size = 0;
-  std::function<cfp_examples::SequenceFrame(std::size_t)> load;
-};
+using cfp_examples::FrameSource;
 
 // The options of the variant, for these images and this detector's people.
 Options fitted(Options options, const FrameSource& source, const cfp_examples::Detector& detector);
