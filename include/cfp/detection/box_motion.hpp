@@ -45,9 +45,8 @@ struct BoxMotionOptions {
   return {};
 }
 
-/// Kalman filter of one value that changes at a nearly constant rate: x <- x + dt x', white noise on the acceleration
-/// of spectral density q^2, so Q = q^2 [dt^3/3, dt^2/2; dt^2/2, dt], and one step of 2 dt equals two steps of dt.
-/// A value, its rate per second, and their covariance.
+/// Kalman filter of a value that changes at a nearly constant rate (per second): x <- x + dt x', white noise on the
+/// acceleration of spectral density q^2, so Q = q^2 [dt^3/3, dt^2/2; dt^2/2, dt]; one step of 2 dt equals two of dt.
 template <typename Scalar>
 struct RateFilter {
   Scalar value{}, rate{};
@@ -89,9 +88,8 @@ struct BoxFilter {
 namespace detail {
 inline namespace CFP_ISA {
 
-// Centres and velocities are kept below: far outside any image, and a box of 1 px there has a width in float.
-inline constexpr double box_farthest_px = 1e6;
-inline constexpr double box_largest_px = 1e5;                  // sizes lie between 1 px and this
+inline constexpr double box_farthest_px = 1e6;  // of centres and velocities; a box of 1 px there has a width in float
+inline constexpr double box_largest_px = 1e5;   // sizes lie between 1 px and this
 inline constexpr double box_largest_log = 11.512925464970229;  // log of the line above
 
 // Keeps a value in its range, where it stops at the border, and its rate and covariance finite.

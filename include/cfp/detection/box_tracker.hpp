@@ -40,7 +40,8 @@ class BoxTracker {
     select(detections, result);
     partner_.resize(tracks_.size());
     const std::size_t pairs = associate_boxes(tracks_, candidates_, options_.min_iou, workspace_, partner_).pairs;
-    extend_tracks();
+    take_partners(
+        [&](Track& track, const Candidate& candidate) { correct_box(track.filter, candidate.box, options_.motion); });
     if (pairs < (std::min)(tracks_.size(), candidates_.size())) restart_tracks();
     start_tracks(result);
     output(result, true);
@@ -136,12 +137,6 @@ class BoxTracker {
     }
   }
 
-  void extend_tracks() {
-    take_partners([this](Track& track, const Candidate& candidate) {
-      correct_box(track.filter, candidate.box, options_.motion);
-    });
-  }
-
   // Who turned is not where he is predicted: to go on with the prediction would put a box beside him. The object is the
   // same; its motion is not, and has to be seen again before it is compensated.
   void restart_tracks() {
@@ -163,11 +158,8 @@ class BoxTracker {
 
   void start_tracks(BoxTrackerResult<Scalar>& result) {
     for (const Candidate& candidate : candidates_) {
-      if (!candidate.free) continue;
-      if (!starts(candidate)) {
-        ++result.ignored;
-        continue;
-      }
+      if (candidate.free && !starts(candidate)) ++result.ignored;
+      if (!candidate.free || !starts(candidate)) continue;
       Track track;
       track.filter = make_box_filter(candidate.box, options_.motion);
       track.class_id = candidate.class_id;
