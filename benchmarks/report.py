@@ -200,7 +200,7 @@ def page(rows, versions, machine, environment, include, seconds, commit):
     parts = [
         "# Results\n",
         f"Written by `benchmarks/run` on {datetime.date.today()}{commit and f' at commit {commit}'}, {seconds / 60:.0f} minutes; do not edit. All rows with their spread, quality and percentiles: `build/bench-results` after a run.\n",
-        table(["", ""], [("processor", f"{processor()}, {machine.get('num_cpus', '')} cores; {caches}"), ("compiler", environment["base"]["compiler"]),
+        table(["", ""], [("processor", f"{processor()}, {machine.get('num_cpus', '')} cores" + (f"; {caches}" if caches else "")), ("compiler", environment["base"]["compiler"]),
                          *[(b, f"`{environment[b]['flags'].strip()}`: {environment[b]['instruction set']}") for b in BUILDS], ("versions", ", ".join(f"{k} {v}" for k, v in versions.items()))]),
         "Times are processor time of one thread, medians over all runs. Both builds take turns, module by module, several times; within a process the benchmarks are interleaved, "
         "and inputs rotate. **Bold: misses its goal.**\n",

@@ -158,8 +158,11 @@ class BoxTracker {
 
   void start_tracks(BoxTrackerResult<Scalar>& result) {
     for (const Candidate& candidate : candidates_) {
-      if (candidate.free && !starts(candidate)) ++result.ignored;
-      if (!candidate.free || !starts(candidate)) continue;
+      if (!candidate.free) continue;
+      if (!starts(candidate)) {
+        ++result.ignored;
+        continue;
+      }
       Track track;
       track.filter = make_box_filter(candidate.box, options_.motion);
       track.class_id = candidate.class_id;
