@@ -13,6 +13,7 @@
 #include "cfp/math/se3.hpp"
 #include "cfp/robust/ransac.hpp"
 #include "cfp/robust/ransac_data_impl.hpp"
+#include "cfp/simd/packet.hpp"
 
 namespace cfp::detail {
 
@@ -54,24 +55,33 @@ void load_observations(const PointSpan<Scalar, 3>& world, const PointSpan<Scalar
   finish(out);
 }
 
-// The reprojection of one observation under a pose: residual (u, v) in px, linearised at the measurement.
-template <typename T>
+// The reprojections of P::lanes observations from the i-th on: residual (u, v) in px, linearised at the measurement;
+// zero behind the camera.
+template <typename P>
 struct LinearReprojection {
-  T x, y, inverse_z, u, v;
-  bool in_front;
+  using T = simd::scalar_of<P>;
+  decltype(P() < P()) in_front;
+  P inverse_z, x, y, u, v;
 
   LinearReprojection(const ObservationArrays& in, const SE3<T>& pose, std::size_t i) noexcept {
-    const Vector3<T> p = pose * Vector3<T>(in.row(X)[i], in.row(Y)[i], in.row(Z)[i]);
-    in_front = p.z() > Tolerance<T>::min_depth;
-    inverse_z = 1 / p.z();
-    x = p.x() * inverse_z;
-    y = p.y() * inverse_z;
-    const T dx = x - in.row(ray_x)[i], dy = y - in.row(ray_y)[i];
-    u = in.row(s11)[i] * dx + in.row(s12)[i] * dy;
-    v = in.row(s22)[i] * dy;
+    const auto load = [&](std::size_t row) { return simd::load<P>(in.row(row) + i); };
+    const P X_ = load(X), Y_ = load(Y), Z_ = load(Z);
+    const auto moved = [&](int r) -> P {
+      return P(pose.rotation(r, 0)) * X_ + P(pose.rotation(r, 1)) * Y_ + P(pose.rotation(r, 2)) * Z_ +
+             P(pose.translation[r]);
+    };
+    const P z = moved(2);
+    in_front = P(Tolerance<T>::min_depth) < z;
+    inverse_z = simd::select(in_front, P(T(1)) / z, P(T(0)));
+    x = moved(0) * inverse_z;
+    y = moved(1) * inverse_z;
+    const P dx = x - load(ray_x), dy = y - load(ray_y);
+    u = load(s11) * dx + load(s12) * dy;
+    v = load(s22) * dy;
   }
-  // In px^2; infinite behind the camera.
-  [[nodiscard]] T distance_sq() const noexcept { return in_front ? u * u + v * v : std::numeric_limits<T>::infinity(); }
+  [[nodiscard]] P distance_sq() const noexcept {  // px^2; infinite behind the camera
+    return simd::select(in_front, u * u + v * v, P(std::numeric_limits<T>::infinity()));
+  }
 };
 
 // Sum of w rho(d^2 / scale), rho(x) = x / (1 + x), as a model of least_squares.hpp. A step is (rho, omega) of
@@ -82,23 +92,36 @@ struct ReprojectionModel {
   T scale;
 
   T linearize(const SE3<T>& pose, NormalEquations<6>& out) const noexcept {
-    out = {};
-    T cost = 0;
-    for (std::size_t i = 0; i < in.size; ++i) {
-      const LinearReprojection<T> r(in, pose, i);
-      const T w = in.weights()[i], e = r.distance_sq() / scale, s = 1 / (1 + e);
-      cost += e < T(25) ? w * e * s : w * T(25.0 / 26);
-      if (!(e < 25)) continue;  // its weight is below 0.0015
-      const Vector6<T> dx{r.inverse_z, 0, -r.x * r.inverse_z, -r.x * r.y, 1 + r.x * r.x, -r.y};
-      const Vector6<T> dy{0, r.inverse_z, -r.y * r.inverse_z, -1 - r.y * r.y, r.x * r.y, r.x};
-      Eigen::Matrix<T, 2, 6> J;
-      J.row(0) = (in.row(s11)[i] * dx + in.row(s12)[i] * dy).transpose();
-      J.row(1) = in.row(s22)[i] * dy.transpose();
-      const T weight = w * s * s / scale;
-      out.H += weight * J.transpose().lazyProduct(J);
-      out.g += weight * J.transpose().lazyProduct(Vector2<T>(r.u, r.v));
+    using P = simd::Packet<T>;
+    const P one(T(1)), zero(T(0)), per_scale(1 / scale), far(T(25));  // beyond it the weight is below 0.0015
+    P cost = zero, g[6], H[6][6];
+    for (int r = 0; r < 6; ++r) {
+      g[r] = zero;
+      for (int c = r; c < 6; ++c) H[r][c] = zero;
     }
-    return cost;
+    for (std::size_t i = 0; i < in.size; i += P::lanes) {
+      const LinearReprojection<P> at(in, pose, i);
+      const auto load = [&](std::size_t row) { return P::load(in.row(row) + i); };
+      const P w = load(observation_weight_row), e = at.distance_sq() * per_scale, s = one / (one + e);
+      const auto near = e < far;
+      cost += w * simd::select(near, e * s, P(T(25.0 / 26)));
+      const P weight = simd::select(near, w * s * s * per_scale, zero);
+      const P q = at.inverse_z, xy = at.x * at.y;
+      const P dx[6] = {q, zero, zero - at.x * q, zero - xy, one + at.x * at.x, zero - at.y};
+      const P dy[6] = {zero, q, zero - at.y * q, zero - one - at.y * at.y, xy, at.x};
+      P u[6], v[6];
+      for (int c = 0; c < 6; ++c) u[c] = load(s11) * dx[c] + load(s12) * dy[c], v[c] = load(s22) * dy[c];
+      for (int r = 0; r < 6; ++r) {
+        const P wu = weight * u[r], wv = weight * v[r];
+        g[r] += wu * at.u + wv * at.v;
+        for (int c = r; c < 6; ++c) H[r][c] += wu * u[c] + wv * v[c];
+      }
+    }
+    for (int r = 0; r < 6; ++r) {
+      out.g[r] = reduce_add(g[r]);
+      for (int c = r; c < 6; ++c) out.H(r, c) = reduce_add(H[r][c]);
+    }
+    return reduce_add(cost);
   }
   [[nodiscard]] SE3<T> moved(const SE3<T>& pose, const Vector6<T>& step) const noexcept {
     SE3<T> out = se3_exp<T>(step) * pose;

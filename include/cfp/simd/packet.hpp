@@ -10,6 +10,7 @@
 #pragma once
 
 #include <cmath>
+#include <type_traits>
 
 #include <Eigen/Core>
 
@@ -87,6 +88,15 @@ struct ScalarOf<Packet<T>> {
 };
 template <typename P>
 using scalar_of = typename ScalarOf<P>::type;
+
+/// The numbers at `from`, as many as P has lanes.
+template <typename P>
+[[nodiscard]] P load(const scalar_of<P>* from) noexcept {
+  if constexpr (std::is_arithmetic_v<P>)
+    return *from;
+  else
+    return P::load(from);
+}
 
 /// Per lane: a where the condition holds, else b. Both are evaluated; the one not taken may hold NaN or infinity.
 template <typename T>
