@@ -41,10 +41,11 @@ WORKLOADS = [
 
 # What runs once per frame: (module, row, what, most microseconds for base and native).
 FRAME = [
-    ("frame", "frame<float, Stages::both, true>", "both stages, F given, float", 170, 140),
-    ("frame", "frame<double, Stages::both, true>", "both stages, F given, double", None, None),
-    ("frame", "frame<float, Stages::both, false>", "both stages, F by RANSAC, float", 1500, 1500),
-    ("frame", "frame<double, Stages::both, false>", "both stages, F by RANSAC, double", None, None),
+    ("frame", "frame<float, Stages::both, Given::fundamental>", "both stages, F given, float", 170, 140),
+    ("frame", "frame<double, Stages::both, Given::fundamental>", "both stages, F given, double", None, None),
+    ("frame", "frame<float, Stages::both, Given::depths>", "both stages, motion from the flow's depths, float", 500, 500),
+    ("frame", "frame<float, Stages::both, Given::nothing>", "both stages, F by RANSAC, float", 1500, 1500),
+    ("frame", "frame<double, Stages::both, Given::nothing>", "both stages, F by RANSAC, double", None, None),
     ("box_tracker", "cfp_frame<double>/5", "box tracker, 5 boxes", 2, 2),
     ("box_tracker", "cfp_frame<double>/20", "box tracker, 20 boxes", 10, 10),
     ("clustering", "foreground/window/200", "foreground of a box of 200 keypoints", None, None),
@@ -53,10 +54,10 @@ FRAME = [
 # The average times of the paper's Table V (CFP-SLAM, an i7 with an RTX 3060) in milliseconds; what of ours does that work, how often.
 PAPER = [
     ("EKF: missed-detection compensation and association of boxes", 0.07, 1, "box_tracker", "cfp_frame<double>/5", "5 boxes"),
-    ("OSP: static probability of objects", 17.93, 1, "frame", "frame<float, Stages::coarse, false>",
+    ("OSP: static probability of objects", 17.93, 1, "frame", "frame<float, Stages::coarse, Given::nothing>",
      "500 pairs, 3 boxes, F's RANSAC, foreground included; corners and optical flow, most of the paper's time, excluded"),
     ("DBSCAN: clustering of the keypoints in boxes", 1.76, 3, "clustering", "foreground/dbscan/200", "3 boxes of 200 keypoints, adaptive eps included"),
-    ("KSP: static probability of keypoints", 3.66, 1, "frame", "frame<float, Stages::fine, true>", "1000 keypoints, map points and weights included"),
+    ("KSP: static probability of keypoints", 3.66, 1, "frame", "frame<float, Stages::fine, Given::fundamental>", "1000 keypoints, map points and weights included"),
     ("two pose optimisations", "part of Tracking, 42.7", 2, "pose_refinement", "pixel only, N = 1000, 10 % outliers: cfp double, default", "1000 points, 10 % outliers"),
 ]
 
