@@ -234,3 +234,46 @@ TEST_CASE("A third of the pairs that move together neither turn the camera's mot
   }
   CHECK(misled >= 10);
 }
+
+TEST_CASE("A region that moves on its own seldom takes the camera with it, as a body or as one vector of flow",
+          "[frame][camera_motion]") {
+  cfp::CameraMotionWorkspace<double> workspace;
+  for (const bool rigid : {false, true}) {
+    cfp::Random random(9, "region");
+    int misled = 0, misled_without = 0;
+    constexpr int runs = 100;
+    for (int i = 0; i < runs; ++i) {
+      const cfp::SE3<double> T = motion(0.015, 0.008, random);
+      const double moves_px = i % 2 == 0 ? 2.5 : 8;
+      Flow f = flow(300, T, 0.1, 0, random);
+      // A third of the image, 1.2 to 3 m away.
+      const double left = random.uniform(0, 270), top = random.uniform(0, 200), near_m = random.uniform(1.2, 3);
+      const double angle = random.uniform(0, 2 * cfp::pi<double>);
+      const cfp::SE3<double> walk = motion(moves_px / camera.fx * near_m, 0.3 * moves_px / camera.fx, random);
+      for (std::size_t k = 0; k < f.depths.size(); ++k) {
+        const cfp::Vector2<double> p(f.previous[k][0] - left, f.previous[k][1] - top);
+        if (!(p.x() > 0 && p.x() < 370 && p.y() > 0 && p.y() < 277)) continue;
+        cfp::Vector3<double> ray;
+        cfp::Vector2<double> q;
+        REQUIRE(camera.unproject(cfp::Vector2<double>(f.previous[k][0], f.previous[k][1]), ray));
+        const cfp::Vector3<double> point = near_m * ray;
+        if (!camera.project(T * (rigid ? walk * point : point), q)) continue;
+        if (!rigid) q += moves_px * cfp::Vector2<double>(std::cos(angle), std::sin(angle));
+        f.depths[k] = near_m;
+        f.current[k] = {q.x() + 0.1 * random.normal(), q.y() + 0.1 * random.normal()};
+      }
+      const auto is_misled = [&](double search_above_px) {
+        cfp::CameraMotionOptions options;
+        options.search_above_px = search_above_px;
+        const cfp::CameraMotion<double> found =
+            cfp::estimate_camera_motion<double>(f.pairs(), f.outside, {}, camera, options, workspace);
+        const cfp::SE3<double> error = T.inverse() * found.T_cur_prev;
+        return found.known && error.translation.norm() / 2 + cfp::so3_log(error.rotation).norm() > 1 / camera.fx;
+      };
+      misled += is_misled(cfp::CameraMotionOptions().search_above_px) ? 1 : 0;
+      misled_without += is_misled(1e9) ? 1 : 0;
+    }
+    CHECK(misled <= 3 * runs / 20);
+    CHECK(misled_without >= runs / 2);
+  }
+}

@@ -25,7 +25,7 @@ struct CameraMotionOptions {
   double min_sigma_px = 0.05;  ///< the noise of the flow is measured and kept in these bounds, > 0
   double max_sigma_px = 1;     ///< >= min_sigma_px
   /// More noise than this may be something that moves and no box holds: the motion is then searched by pnp_ransac,
-  /// which a third of such pairs do not mislead; px, > 0.
+  /// which a third of such pairs seldom mislead (cfp_camera_motion_study); px, > 0.
   double search_above_px = 0.25;
   MotionDistanceOptions distance;
   PoseOptions pose;
@@ -75,16 +75,24 @@ template <typename Scalar>
 namespace detail {
 inline namespace CFP_ISA {
 
-/// The motion that most of workspace.points agree to; false, and T untouched, without one.
+/// The motion that most of the `taken` workspace.points agree to; false, and T untouched, without one. Its threshold is
+/// below sigma_px, their noise under a motion which what moves may have led astray: a wider one would hold both.
 template <typename Scalar>
-[[nodiscard]] bool search_camera_motion(const PointSpan<Scalar, 2>& current, const PinholeCamera<Scalar>& camera,
-                                        const CameraMotionOptions& options, CameraMotionWorkspace<Scalar>& workspace,
-                                        SE3<double>& T) {
+[[nodiscard]] bool search_camera_motion(const PointSpan<Scalar, 2>& current, std::size_t taken,
+                                        const PinholeCamera<Scalar>& camera, Scalar sigma_px,
+                                        CameraMotionWorkspace<Scalar>& workspace, SE3<double>& T) {
+  constexpr std::size_t most = 150;  // pairs; more take their time and find little more
   PnpRansacOptions search;
-  search.threshold_px = (std::min)(options.max_sigma_px, 1e3);
-  search.max_iterations = 100;
+  search.threshold_px = 0.7 * (std::min)(static_cast<double>(sigma_px), 1e3);
+  search.max_iterations = 50;
+  workspace.sigmas.assign(current.size(), Scalar(0));
+  for (std::size_t i = 0, k = 0; i < current.size(); ++i) {
+    if (!is_finite(workspace.points[i][0])) continue;
+    if (k * most / taken != (k + 1) * most / taken) workspace.sigmas[i] = Scalar(1);
+    ++k;
+  }
   const PnpRansacResult<Scalar> found =
-      pnp_ransac(PointSpan<Scalar, 3>(workspace.points), current, {}, camera, search, workspace.search);
+      pnp_ransac(PointSpan<Scalar, 3>(workspace.points), current, workspace.sigmas, camera, search, workspace.search);
   if (found.found()) T = found.T_cam_world.template cast<double>();
   return found.found();
 }
@@ -136,7 +144,7 @@ template <typename Scalar>
   motion.sigma_px = Scalar(options.max_sigma_px);
   for (int pass = 0; pass < 2; ++pass) {
     if (pass > 0 && motion.sigma_px > Scalar(options.search_above_px) &&
-        detail::search_camera_motion(flow.current, camera, options, workspace, T)) {
+        detail::search_camera_motion(flow.current, taken, camera, motion.sigma_px, workspace, T)) {
       believe(T);
       rounds.rounds[0] = rounds.rounds[rounds.round_count - 1];  // a wide loss would lose it again
       rounds.round_count = 1;
