@@ -65,9 +65,9 @@ struct LinearReprojection {
 
   LinearReprojection(const ObservationArrays& in, const SE3<T>& pose, std::size_t i) noexcept {
     const auto load = [&](std::size_t row) { return simd::load<P>(in.row(row) + i); };
-    const P X_ = load(X), Y_ = load(Y), Z_ = load(Z);
+    const P wx = load(X), wy = load(Y), wz = load(Z);
     const auto moved = [&](int r) -> P {
-      return P(pose.rotation(r, 0)) * X_ + P(pose.rotation(r, 1)) * Y_ + P(pose.rotation(r, 2)) * Z_ +
+      return P(pose.rotation(r, 0)) * wx + P(pose.rotation(r, 1)) * wy + P(pose.rotation(r, 2)) * wz +
              P(pose.translation[r]);
     };
     const P z = moved(2);
