@@ -12,6 +12,7 @@
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/depth_noise.hpp"
 #include "cfp/geometry/distance.hpp"
+#include "cfp/math/matrix3.hpp"
 #include "cfp/math/se3.hpp"
 #include "cfp/math/uncertain_motion.hpp"
 
@@ -57,15 +58,27 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
   Matrix23<Scalar> jacobian;
   if (!camera.project(point, projected, &jacobian)) return none;
   const Vector2<Scalar> r = pixel_cur - projected, along = jacobian * turned;
-  Eigen::Matrix<Scalar, 2, 6> by_motion;
-  by_motion.template leftCols<3>() = jacobian;
-  by_motion.template rightCols<3>() = -jacobian * hat(point);
-  const Scalar per_variance = Scalar(1) / (sigma_px * sigma_px);
-  const Eigen::Matrix<Scalar, 2, 6> spread_by_motion = by_motion.lazyProduct(motion.covariance) * per_variance;
+  // M = d project / d xi: the rows of the Jacobian, and what turning the point about the camera makes of them.
+  Scalar M[2][6], MC[2][6];
+  for (int row = 0; row < 2; ++row) {
+    const Vector3<Scalar> by_point(jacobian(row, 0), jacobian(row, 1), jacobian(row, 2)),
+        turning = cross(point, by_point);
+    for (int i = 0; i < 3; ++i) M[row][i] = by_point[i], M[row][i + 3] = turning[i];
+    for (int k = 0; k < 6; ++k) {
+      MC[row][k] = Scalar(0);
+      for (int i = 0; i < 6; ++i) MC[row][k] += M[row][i] * motion.covariance(i, k);
+    }
+  }
   // W = I + M C M^T / sigma^2, and its inverse.
-  const Scalar a = Scalar(1) + spread_by_motion.row(0).dot(by_motion.row(0)),
-               b = spread_by_motion.row(0).dot(by_motion.row(1)),
-               c = Scalar(1) + spread_by_motion.row(1).dot(by_motion.row(1)), det = a * c - b * b;
+  const Scalar per_variance = Scalar(1) / (sigma_px * sigma_px);
+  Scalar a = Scalar(0), b = Scalar(0), c = Scalar(0);
+  for (int k = 0; k < 6; ++k) {
+    a += MC[0][k] * M[0][k];
+    b += MC[0][k] * M[1][k];
+    c += MC[1][k] * M[1][k];
+  }
+  a = Scalar(1) + per_variance * a, b = per_variance * b, c = Scalar(1) + per_variance * c;
+  const Scalar det = a * c - b * b;
   const auto times_inverse = [&](const Vector2<Scalar>& v) {
     return Vector2<Scalar>((c * v[0] - b * v[1]) / det, (a * v[1] - b * v[0]) / det);
   };

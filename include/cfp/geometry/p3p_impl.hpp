@@ -24,6 +24,26 @@ struct Conic {
 
 inline namespace CFP_ISA {
 
+// One number for each of two points or lines. Each operation is evaluated by itself: Eigen's expressions of several
+// would each be compiled in every host's unit.
+template <typename Real>
+struct Pair {
+  Eigen::Array<Real, 2, 1> both;
+
+  Pair() noexcept = default;
+  Pair(const Eigen::Array<Real, 2, 1>& values) noexcept : both(values) {}
+  Pair(Real first, Real second) noexcept : both(first, second) {}
+  Real operator[](int i) const noexcept { return both[i]; }
+  friend Pair operator+(const Pair& x, const Pair& y) noexcept { return {x.both + y.both}; }
+  friend Pair operator-(const Pair& x, const Pair& y) noexcept { return {x.both - y.both}; }
+  friend Pair operator*(const Pair& x, const Pair& y) noexcept { return {x.both * y.both}; }
+  friend Pair operator/(const Pair& x, const Pair& y) noexcept { return {x.both / y.both}; }
+  friend Pair operator*(Real f, const Pair& x) noexcept { return Pair(f, f) * x; }
+  friend Pair operator/(Real f, const Pair& x) noexcept { return Pair(f, f) / x; }
+  friend Pair operator-(const Pair& x, Real f) noexcept { return x - Pair(f, f); }
+  friend Pair sqrt(const Pair& x) noexcept { return {x.both.sqrt()}; }
+};
+
 template <typename T>
 [[nodiscard]] CFP_INLINE T squared_norm(const Triple<T>& x) noexcept {
   return x.u * x.u + x.v * x.v + x.w * x.w;
@@ -94,7 +114,7 @@ struct P3PEquations {
 // The lines l, m of the degenerate conic C = l m^T + m l^T, up to scale: its adjugate is -(l x m)(l x m)^T, and
 // C + hat(l x m) has rank one. False when they are not real.
 template <typename Real>
-[[nodiscard]] CFP_INLINE bool line_pair(const Conic<Real>& C, Triple<Eigen::Array<Real, 2, 1>>& lines) noexcept {
+[[nodiscard]] CFP_INLINE bool line_pair(const Conic<Real>& C, Triple<Pair<Real>>& lines) noexcept {
   const Real a01 = C.uw * C.vw - C.uv * C.ww, a02 = C.uv * C.vw - C.vv * C.uw, a12 = C.uv * C.uw - C.uu * C.vw;
   const Real a00 = C.vv * C.ww - C.vw * C.vw, a11 = C.uu * C.ww - C.uw * C.uw, a22 = C.uu * C.vv - C.uv * C.uv;
   Triple<Real> v{a02, a12, a22};
@@ -117,35 +137,34 @@ template <typename Real>
 // All solutions with positive depths; returns their number.
 template <typename Real>
 [[nodiscard]] CFP_INLINE int p3p_depths(const P3PEquations<Real>& q, Triple<Real> (&solutions)[4]) noexcept {
-  using Pair = Eigen::Array<Real, 2, 1>;
   const Real s = q.degenerate_conic(), scale = Real(1) / (Real(1) + std::abs(s));
-  Triple<Pair> l;
+  Triple<Pair<Real>> l;
   if (!line_pair(q.pencil(scale, s * scale), l)) return 0;
 
   // Where both lines meet C1 or C2: points (-lw lu, -lw lv, n), the nearest to the origin of the plane w = 1, plus
   // t (-lv, lu, 0); qa t^2 + 2 qb t + qc = 0.
   const bool second = std::abs(s) < Real(1);
   const Conic<Real> C = q.pencil(second ? Real(0) : Real(1), second ? Real(1) : Real(0));
-  const Pair n = l.u * l.u + l.v * l.v;
-  const Pair gu = C.uu * l.u + C.uv * l.v, gv = C.uv * l.u + C.vv * l.v, g = l.u * gu + l.v * gv;
-  const Pair qa = (C.uu + C.vv) * n - g;
-  const Pair qb = n * (C.vw * l.u - C.uw * l.v) - l.w * (l.u * gv - l.v * gu);
-  const Pair qc = l.w * (l.w * g - Real(2) * n * (C.uw * l.u + C.vw * l.v)) + C.ww * n * n;
-  const Pair square = qb * qb, product = qa * qc, discriminant = square - product;
-  const Pair margin = Real(-1e-8) * (square + product.abs()), root = (discriminant.max)(Real(0)).sqrt();
+  const Pair<Real> n = l.u * l.u + l.v * l.v;
+  const Pair<Real> gu = C.uu * l.u + C.uv * l.v, gv = C.uv * l.u + C.vv * l.v, g = l.u * gu + l.v * gv;
+  const Pair<Real> qa = (C.uu + C.vv) * n - g;
+  const Pair<Real> qb = n * (C.vw * l.u - C.uw * l.v) - l.w * (l.u * gv - l.v * gu);
+  const Pair<Real> qc = l.w * (l.w * g - Real(2) * n * (C.uw * l.u + C.vw * l.v)) + C.ww * n * n;
+  const Pair<Real> square = qb * qb, product = qa * qc, discriminant = square - product;
 
   int count = 0;
   for (int i = 0; i < 2; ++i) {
     // A slightly negative discriminant is a double root after rounding; the polish tells.
-    if (!(discriminant[i] > margin[i])) continue;
-    const Real sum = -(qb[i] + std::copysign(root[i], qb[i]));
-    const Pair t = Pair(sum, qc[i]) / Pair(qa[i], sum);
-    Triple<Pair> p{-l.w[i] * l.u[i] - t * l.v[i], -l.w[i] * l.v[i] + t * l.u[i], Pair::Constant(n[i])};
-    const Pair w1 = p.w + p.u, w2 = p.w + p.v;
-    const Pair unit = ((p.u - p.v) * (p.u - p.v) + q.e12 * w1 * w2).sqrt().inverse();
+    if (!(discriminant[i] > Real(-1e-8) * (square[i] + std::abs(product[i])))) continue;
+    const Real root = std::sqrt((std::max)(discriminant[i], Real(0))), sum = -(qb[i] + std::copysign(root, qb[i]));
+    const Pair<Real> t = Pair<Real>(sum, qc[i]) / Pair<Real>(qa[i], sum);
+    const Real lu = l.u[i], lv = l.v[i], lw = l.w[i];
+    Triple<Pair<Real>> p{-lv * t - lw * lu, lu * t - lw * lv, Pair<Real>(n[i], n[i])};
+    const Pair<Real> w1 = p.w + p.u, w2 = p.w + p.v;
+    const Pair<Real> unit = Real(1) / sqrt((p.u - p.v) * (p.u - p.v) + q.e12 * w1 * w2);
     p = {p.u * unit, p.v * unit, p.w * unit};
-    const Triple<Pair> change = q.step(p, q.residual(p));
-    const Pair change_sq = squared_norm(change);
+    const Triple<Pair<Real>> change = q.step(p, q.residual(p));
+    const Pair<Real> change_sq = squared_norm(change);
     for (int k = 0; k < 2; ++k) {
       Triple<Real>& x = solutions[count];
       x = {p.u[k], p.v[k], p.w[k]};
