@@ -58,7 +58,7 @@ template <int N>
 // where solve_normal_equations is.
 template <int N>
 [[nodiscard]] bool invert_scaled(const Eigen::Matrix<double, N, N>& H, double damping, double tolerance,
-                                 double (&scale)[N], Eigen::Matrix<double, N, N>& T) noexcept {
+                                 Eigen::Matrix<double, N, 1>& scale, Eigen::Matrix<double, N, N>& T) noexcept {
   for (int r = 0; r < N; ++r) {
     if (!(H(r, r) > 0) || !is_finite(H(r, r))) return false;
     scale[r] = 1 / std::sqrt(H(r, r));
@@ -90,7 +90,7 @@ template <int N>
 [[nodiscard]] bool solve_normal_equations(const Eigen::Matrix<double, N, N>& H, const Eigen::Matrix<double, N, 1>& g,
                                           double damping, double tolerance,
                                           Eigen::Matrix<double, N, 1>& step) noexcept {
-  double scale[N], reduced[N];
+  Eigen::Matrix<double, N, 1> scale, reduced;
   Eigen::Matrix<double, N, N> T;
   if (!detail::invert_scaled(H, damping, tolerance, scale, T)) return false;
   for (int r = 0; r < N; ++r) {
@@ -112,7 +112,7 @@ template <int N>
 template <int N>
 [[nodiscard]] bool invert_normal_equations(const Eigen::Matrix<double, N, N>& H, double tolerance,
                                            Eigen::Matrix<double, N, N>& inverse) noexcept {
-  double scale[N];
+  Eigen::Matrix<double, N, 1> scale;
   Eigen::Matrix<double, N, N> T;
   if (!detail::invert_scaled(H, 0, tolerance, scale, T)) return false;
   bool finite = true;
