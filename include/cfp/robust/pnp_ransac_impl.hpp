@@ -40,11 +40,14 @@ void load_observations(const PointSpan<Scalar, 3>& world, const PointSpan<Scalar
     Vector3<Scalar> ray(Scalar(0), Scalar(0), Scalar(1));
     Vector2<Scalar> pixel = pixels[i];
     Matrix23<Scalar> J = Matrix23<Scalar>::Zero();
-    if (!(w > 0) || !is_finite(w) || !p.allFinite() || !(p.cwiseAbs().maxCoeff() < max_coordinate)) continue;
-    if (!pixel.allFinite() || !camera.unproject(pixel, ray) || !camera.project(ray, pixel, &J)) continue;
-    const Matrix2<double> A = J.template leftCols<2>().template cast<double>();
-    const double a = A.col(0).norm(), b = a > 0 ? A.col(0).dot(A.col(1)) / a : 0.0;
-    const double c = std::sqrt((std::max)(A.col(1).squaredNorm() - b * b, 0.0));
+    const auto is_near = [&](double x) { return std::abs(x) < max_coordinate; };
+    if (!(w > 0) || !is_finite(w) || !is_near(p.x()) || !is_near(p.y()) || !is_near(p.z())) continue;
+    if (!is_finite(pixel.x()) || !is_finite(pixel.y())) continue;
+    if (!camera.unproject(pixel, ray) || !camera.project(ray, pixel, &J)) continue;
+    const auto by = [&](int r, int c) { return static_cast<double>(J(r, c)); };
+    const double a = std::sqrt(by(0, 0) * by(0, 0) + by(1, 0) * by(1, 0));
+    const double b = a > 0 ? (by(0, 0) * by(0, 1) + by(1, 0) * by(1, 1)) / a : 0.0;
+    const double c = std::sqrt((std::max)(by(0, 1) * by(0, 1) + by(1, 1) * by(1, 1) - b * b, 0.0));
     if (!(a > 0 && c > 0) || !is_finite(a * c)) continue;
     out.push(i, {p.x(), p.y(), p.z(), static_cast<double>(ray.x()), static_cast<double>(ray.y()), a, b, c, w});
   }
