@@ -58,13 +58,12 @@ void load_observations(const PointSpan<Scalar, 3>& world, const PointSpan<Scalar
   finish(out);
 }
 
-// The reprojections of P::lanes observations from the i-th on: residual (u, v) in px, linearised at the measurement;
-// zero behind the camera.
+// The reprojections of as many observations as P has lanes, from the i-th on: residual (u, v) in px, linearised at the
+// measurement, and its square, infinite behind the camera.
 template <typename P>
 struct LinearReprojection {
   using T = simd::scalar_of<P>;
-  decltype(P() < P()) in_front;
-  P inverse_z, x, y, u, v;
+  P inverse_z, x, y, u, v, distance_sq;
 
   LinearReprojection(const ObservationArrays& in, const SE3<T>& pose, std::size_t i) noexcept {
     const auto load = [&](std::size_t row) { return simd::load<P>(in.row(row) + i); };
@@ -74,16 +73,14 @@ struct LinearReprojection {
              P(pose.translation[r]);
     };
     const P z = moved(2);
-    in_front = P(Tolerance<T>::min_depth) < z;
+    const auto in_front = P(Tolerance<T>::min_depth) < z;
     inverse_z = simd::select(in_front, P(T(1)) / z, P(T(0)));
     x = moved(0) * inverse_z;
     y = moved(1) * inverse_z;
     const P dx = x - load(ray_x), dy = y - load(ray_y);
     u = load(s11) * dx + load(s12) * dy;
     v = load(s22) * dy;
-  }
-  [[nodiscard]] P distance_sq() const noexcept {  // px^2; infinite behind the camera
-    return simd::select(in_front, u * u + v * v, P(std::numeric_limits<T>::infinity()));
+    distance_sq = simd::select(in_front, u * u + v * v, P(std::numeric_limits<T>::infinity()));
   }
 };
 
@@ -105,7 +102,7 @@ struct ReprojectionModel {
     for (std::size_t i = 0; i < in.size; i += P::lanes) {
       const LinearReprojection<P> at(in, pose, i);
       const auto load = [&](std::size_t row) { return P::load(in.row(row) + i); };
-      const P w = load(observation_weight_row), e = at.distance_sq() * per_scale, s = one / (one + e);
+      const P w = load(observation_weight_row), e = at.distance_sq * per_scale, s = one / (one + e);
       const auto near = e < far;
       cost += w * simd::select(near, e * s, P(T(25.0 / 26)));
       const P weight = simd::select(near, w * s * s * per_scale, zero);
@@ -196,7 +193,7 @@ struct PnpProblem {
   }
 
   [[nodiscard]] auto inlier_test(const Model& pose) const noexcept {
-    return [this, pose](std::size_t i) { return LinearReprojection<T>(in, pose, i).distance_sq() <= limit; };
+    return [this, pose](std::size_t i) { return LinearReprojection<T>(in, pose, i).distance_sq <= limit; };
   }
 };
 
