@@ -11,10 +11,11 @@
 #include "cfp/core/random.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
+#include "support/moving_flow.hpp"
 
 namespace {
 
-const cfp::PinholeCamera<double> camera{535.4, 539.2, 320.1, 247.6};
+constexpr cfp::PinholeCamera<double> camera = cfp_test::flow_camera;
 
 struct Flow {
   std::vector<std::array<double, 2>> previous, current;
@@ -23,12 +24,6 @@ struct Flow {
 
   [[nodiscard]] cfp::FlowPairs<double> pairs() const { return {previous, current, depths}; }
 };
-
-cfp::SE3<double> motion(double translation_m, double rotation_rad, cfp::Random& random) {
-  cfp::Vector6<double> xi;
-  for (int i = 0; i < 6; ++i) xi[i] = (i < 3 ? translation_m : rotation_rad) * random.normal();
-  return cfp::se3_exp(xi);
-}
 
 /// n pairs of a static room under T; every `mover`-th one (0: none) moves on its own.
 Flow flow(int n, const cfp::SE3<double>& T, double noise_px, int mover, cfp::Random& random, double moves_px = 8) {
@@ -60,7 +55,7 @@ TEST_CASE("The camera's motion and the flow's noise are found at rest, in rotati
   for (const double noise : {0.1, 0.2, 0.4}) {
     for (const auto& [t, r] : {std::array<double, 2>{0, 0}, {0, 0.02}, {0.03, 0}, {0.03, 0.02}}) {
       for (int i = 0; i < 10; ++i) {
-        const cfp::SE3<double> T = motion(t, r, random);
+        const cfp::SE3<double> T = cfp_test::random_motion(t, r, random);
         const Flow f = flow(300, T, noise, i % 2 == 0 ? 0 : 4, random);
         const cfp::CameraMotion<double> found =
             cfp::estimate_camera_motion<double>(f.pairs(), f.outside, cfp::SE3<double>(), camera, {}, workspace);
@@ -80,7 +75,7 @@ TEST_CASE("The covariance of the camera's motion is that of its error", "[frame]
   double sum = 0;
   constexpr int runs = 400;
   for (int i = 0; i < runs; ++i) {
-    const cfp::SE3<double> T = motion(0.03, 0.02, random);
+    const cfp::SE3<double> T = cfp_test::random_motion(0.03, 0.02, random);
     const Flow f = flow(i % 2 == 0 ? 60 : 300, T, 0.2, 0, random);
     const cfp::CameraMotion<double> found =
         cfp::estimate_camera_motion<double>(f.pairs(), f.outside, cfp::SE3<double>(), camera, {}, workspace);
@@ -99,7 +94,7 @@ TEST_CASE("What moves by less than the largest noise does not take the camera wi
   cfp::Random random(5, "slow movers");
   cfp::CameraMotionWorkspace<double> workspace;
   for (int i = 0; i < 10; ++i) {
-    const cfp::SE3<double> T = motion(0.03, 0.02, random);
+    const cfp::SE3<double> T = cfp_test::random_motion(0.03, 0.02, random);
     const Flow f = flow(300, T, 0.05, 4, random, 2.0);  // inliers of a noise of 1 px, far off at one of 0.05 px
     const cfp::CameraMotion<double> found =
         cfp::estimate_camera_motion<double>(f.pairs(), f.outside, cfp::SE3<double>(), camera, {}, workspace);
@@ -136,7 +131,7 @@ TEST_CASE("Too few pairs with depth, or pairs that do not agree, give no motion"
 TEST_CASE("After warm-up the camera's motion allocates nothing, and equal input gives equal bits",
           "[frame][camera_motion]") {
   cfp::Random random(3, "allocation");
-  const Flow f = flow(300, motion(0.02, 0.01, random), 0.2, 5, random);
+  const Flow f = flow(300, cfp_test::random_motion(0.02, 0.01, random), 0.2, 5, random);
   cfp::CameraMotionWorkspace<double> workspace;
   const cfp::CameraMotionOptions options;
   const cfp::FlowPairs<double> pairs = f.pairs();
@@ -215,7 +210,7 @@ TEST_CASE("A third of the pairs that move together neither turn the camera's mot
   int misled = 0;
   for (const double moves_px : {2.5, 4.0, 8.0}) {
     for (int i = 0; i < 20; ++i) {
-      const cfp::SE3<double> T = motion(0.01, 0.005, random);
+      const cfp::SE3<double> T = cfp_test::random_motion(0.01, 0.005, random);
       const Flow f = flow(300, T, 0.1, 3, random, moves_px);
       cfp::CameraMotion<double> found;
       const auto find = [&] {
@@ -238,37 +233,17 @@ TEST_CASE("A third of the pairs that move together neither turn the camera's mot
 TEST_CASE("A region that moves on its own seldom takes the camera with it, as a body or as one vector of flow",
           "[frame][camera_motion]") {
   cfp::CameraMotionWorkspace<double> workspace;
-  for (const bool rigid : {false, true}) {
+  for (const cfp_test::Mover mover : {cfp_test::Mover::region, cfp_test::Mover::rigid_region}) {
     cfp::Random random(9, "region");
     int misled = 0, misled_without = 0;
     constexpr int runs = 100;
     for (int i = 0; i < runs; ++i) {
-      const cfp::SE3<double> T = motion(0.015, 0.008, random);
-      const double moves_px = i % 2 == 0 ? 2.5 : 8;
-      Flow f = flow(300, T, 0.1, 0, random);
-      // A third of the image, 1.2 to 3 m away.
-      const double left = random.uniform(0, 270), top = random.uniform(0, 200), near_m = random.uniform(1.2, 3);
-      const double angle = random.uniform(0, 2 * cfp::pi<double>);
-      const cfp::SE3<double> walk = motion(moves_px / camera.fx * near_m, 0.3 * moves_px / camera.fx, random);
-      for (std::size_t k = 0; k < f.depths.size(); ++k) {
-        const cfp::Vector2<double> p(f.previous[k][0] - left, f.previous[k][1] - top);
-        if (!(p.x() > 0 && p.x() < 370 && p.y() > 0 && p.y() < 277)) continue;
-        cfp::Vector3<double> ray;
-        cfp::Vector2<double> q;
-        REQUIRE(camera.unproject(cfp::Vector2<double>(f.previous[k][0], f.previous[k][1]), ray));
-        const cfp::Vector3<double> point = near_m * ray;
-        if (!camera.project(T * (rigid ? walk * point : point), q)) continue;
-        if (!rigid) q += moves_px * cfp::Vector2<double>(std::cos(angle), std::sin(angle));
-        f.depths[k] = near_m;
-        f.current[k] = {q.x() + 0.1 * random.normal(), q.y() + 0.1 * random.normal()};
-      }
+      const auto flow = cfp_test::make_moving_flow({mover, 0.33, i % 2 == 0 ? 2.5 : 8, 0.1, 0}, 300, random);
       const auto is_misled = [&](double search_above_px) {
         cfp::CameraMotionOptions options;
         options.search_above_px = search_above_px;
-        const cfp::CameraMotion<double> found =
-            cfp::estimate_camera_motion<double>(f.pairs(), f.outside, {}, camera, options, workspace);
-        const cfp::SE3<double> error = T.inverse() * found.T_cur_prev;
-        return found.known && error.translation.norm() / 2 + cfp::so3_log(error.rotation).norm() > 1 / camera.fx;
+        const cfp::CameraMotion<double> found = flow.estimate(options, workspace);
+        return found.known && flow.error_px(found) > 1;
       };
       misled += is_misled(cfp::CameraMotionOptions().search_above_px) ? 1 : 0;
       misled_without += is_misled(1e9) ? 1 : 0;
