@@ -48,6 +48,7 @@ struct MovingFlow {
 };
 
 /// A room 1 to 5 m away with the depth noise of structured light; the camera moves by some 15 mm and 8 mrad.
+// Braces where numbers are drawn: arguments in parentheses are evaluated in another order by every compiler.
 inline MovingFlow make_moving_flow(const MovingFlowOptions& options, std::size_t pairs, cfp::Random& random) {
   MovingFlow flow;
   flow.T_cur_prev = random_motion(0.015, 0.008, random);
@@ -59,7 +60,7 @@ inline MovingFlow make_moving_flow(const MovingFlowOptions& options, std::size_t
   const cfp::SE3<double> walk = random_motion(options.moves_px / flow_camera.fx * near_m, turns_rad, random);
   const cfp::DepthNoise depth_noise;
   while (flow.depths.size() < pairs) {
-    const cfp::Vector2<double> p(random.uniform(10, 630), random.uniform(10, 470));
+    const cfp::Vector2<double> p{random.uniform(10, 630), random.uniform(10, 470)};
     const bool inside = p.x() > left && p.x() < left + width && p.y() > top && p.y() < top + height;
     const bool moves = spread ? random.uniform() < options.share : inside;
     const double z = moves && !spread ? near_m + 0.1 * random.normal() : random.uniform(1, 5);
@@ -70,7 +71,7 @@ inline MovingFlow make_moving_flow(const MovingFlowOptions& options, std::size_t
     if (moves && rigid) point = walk * point;
     if (!flow_camera.project(flow.T_cur_prev * point, q)) continue;
     if (moves && !rigid) q += options.moves_px * cfp::Vector2<double>(std::cos(angle), std::sin(angle));
-    q += options.noise_px * cfp::Vector2<double>(random.normal(), random.normal());
+    q += options.noise_px * cfp::Vector2<double>{random.normal(), random.normal()};
     const bool wrong = random.uniform() < options.wrong_depths;
     flow.previous.push_back({p.x(), p.y()});
     flow.current.push_back({q.x(), q.y()});
