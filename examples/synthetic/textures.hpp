@@ -70,14 +70,14 @@ inline cv::Scalar random_color(cfp::Random& random, double low = 20, double high
 inline void add_grain(cfp::Random& random, cv::Mat& image, double strength) {
   for (int cell = 1; cell <= 16; cell *= 4) {
     cv::Mat noise(image.rows / cell, image.cols / cell, CV_32F);
-    for (auto it = noise.begin<float>(); it != noise.end<float>(); ++it)
-      *it = static_cast<float>(3.46 * strength * (random.uniform() - 0.5));
+    std::generate_n(noise.ptr<float>(), noise.total(),
+                    [&] { return static_cast<float>(3.46 * strength * (random.uniform() - 0.5)); });
     cv::resize(noise, noise, image.size(), 0, 0, cv::INTER_LINEAR);
-    cv::Mat channels[3] = {noise, noise, noise}, grain, sum;
-    cv::merge(channels, 3, grain);
-    image.convertTo(sum, CV_32FC3);
-    sum += grain;
-    sum.convertTo(image, CV_8UC3);
+    const float* const grain = noise.ptr<float>();
+    cv::Vec3b* const pixels = image.ptr<cv::Vec3b>();  // of a whole image: its rows adjoin
+    for (std::size_t i = 0; i < image.total(); ++i) {
+      for (int c = 0; c < 3; ++c) pixels[i][c] = cv::saturate_cast<uchar>(static_cast<float>(pixels[i][c]) + grain[i]);
+    }
   }
 }
 
