@@ -41,6 +41,9 @@ template <typename Scalar>
   return x < Scalar(1) ? x : Scalar(1);
 }
 
+/// The number of frames after `count`, for ages and runs: stays at 10^9, three years of frames at 10 Hz.
+[[nodiscard]] constexpr int next_count(int count) noexcept { return count < 1000000000 ? count + 1 : count; }
+
 /// A depth measurement that can be used: finite and positive (ORB-SLAM2 marks missing depth with -1, sensors with 0 or
 /// NaN).
 template <typename Scalar>

@@ -87,8 +87,8 @@ class BoxTracker {
       predict_box(track.filter, dt_s, options_.motion);
       if (image_motion != nullptr && !warp_box(track.filter, *image_motion)) ++result.unwarped;
       track.box = track.filter.box();
-      track.age = next(track.age);
-      track.missed = next(track.missed);
+      track.age = next_count(track.age);
+      track.missed = next_count(track.missed);
       track.detection = -1;
     }
     return result;
@@ -123,7 +123,7 @@ class BoxTracker {
     track.score = candidate.score;
     track.detection = candidate.index;
     track.missed = 0;
-    track.hits = next(track.hits);
+    track.hits = next_count(track.hits);
   }
 
   template <typename Take>
@@ -206,8 +206,6 @@ class BoxTracker {
     box = visible;
     return true;
   }
-
-  [[nodiscard]] static int next(int count) noexcept { return count < 1000000000 ? count + 1 : count; }
 
   BoxTrackerOptions options_;
   std::int64_t next_id_ = 1;

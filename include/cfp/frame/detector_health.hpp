@@ -78,7 +78,7 @@ class DetectorHealth {
   DetectorStatus update(const std::optional<span<const Detection<Scalar>>>& detections) {
     if (!detections) return DetectorStatus::idle;
     const bool repeated = repeats(*detections);
-    repetitions_ = repeated ? next(repetitions_) : 0;
+    repetitions_ = repeated ? next_count(repetitions_) : 0;
     last_.assign(detections->begin(), detections->end());
     bool absurd = false, seen = false, staying = false;
     for (const Detection<Scalar>& d : *detections) {
@@ -91,11 +91,11 @@ class DetectorHealth {
     }
     if (seen) {
       // Single misses do not interrupt.
-      with_box_ = missing_ < options_.silent_after ? next(with_box_) : 1;
+      with_box_ = missing_ < options_.silent_after ? next_count(with_box_) : 1;
       expected_ = staying && with_box_ >= options_.confirmed_after;
       missing_ = 0;
     } else {
-      missing_ = next(missing_);
+      missing_ = next_count(missing_);
     }
     if (absurd) return DetectorStatus::absurd;
     if (repetitions_ >= options_.stuck_after) return DetectorStatus::stuck;
@@ -121,7 +121,6 @@ class DetectorHealth {
     return width > 0 && static_cast<double>(box.width()) < options_.leaving_share * width &&
            (static_cast<double>(box.x1) <= margin || static_cast<double>(box.x2) >= width - margin);
   }
-  [[nodiscard]] static int next(int count) noexcept { return count < 1000000000 ? count + 1 : count; }
 
   DetectorHealthOptions options_;
   std::vector<Detection<Scalar>> last_;
