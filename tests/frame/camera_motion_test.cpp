@@ -248,8 +248,8 @@ TEST_CASE("A region that moves on its own seldom takes the camera with it, as a 
       misled += is_misled(cfp::CameraMotionOptions().search_above_px) ? 1 : 0;
       misled_without += is_misled(1e9) ? 1 : 0;
     }
-    // 24 seeds: 0 to 4 with the search, 35 to 71 without.
-    CHECK(misled <= runs / 12);
-    CHECK(misled_without >= runs / 4);
+    // 24 seeds: 0 to 4 with the search, 58 to 71 and 35 to 62 without.
+    CHECK(misled <= runs / 20);
+    CHECK(misled_without >= (mover == cfp_test::Mover::region ? runs / 2 : 2 * runs / 5));
   }
 }

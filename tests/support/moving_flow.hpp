@@ -48,7 +48,6 @@ struct MovingFlow {
 };
 
 /// A room 1 to 5 m away with the depth noise of structured light; the camera moves by some 15 mm and 8 mrad.
-// Braces where numbers are drawn: arguments in parentheses are evaluated in another order by every compiler.
 inline MovingFlow make_moving_flow(const MovingFlowOptions& options, std::size_t pairs, cfp::Random& random) {
   MovingFlow flow;
   flow.T_cur_prev = random_motion(0.015, 0.008, random);
@@ -60,6 +59,7 @@ inline MovingFlow make_moving_flow(const MovingFlowOptions& options, std::size_t
   const cfp::SE3<double> walk = random_motion(options.moves_px / flow_camera.fx * near_m, turns_rad, random);
   const cfp::DepthNoise depth_noise;
   while (flow.depths.size() < pairs) {
+    // Braces: what is drawn in parentheses comes in another order from every compiler.
     const cfp::Vector2<double> p{random.uniform(10, 630), random.uniform(10, 470)};
     const bool inside = p.x() > left && p.x() < left + width && p.y() > top && p.y() < top + height;
     const bool moves = spread ? random.uniform() < options.share : inside;
