@@ -98,7 +98,7 @@ inline std::string summary_picture(const std::vector<RunRecord>& runs, std::size
            "\" href=\"data:image/jpeg;base64," + base64(picture->jpeg) + "\"/>\n";
     const double below = margin + content + line - y;
     text(right, below, "quiet words", "Boxes (track, O): yellow detected, orange compensated.");
-    text(right, below + line, "quiet words", "Keypoints in boxes: red moving, green static; rings: behind.");
+    text(right, below + line, "quiet words", "Keypoints: from red, moving, to green, static; rings: behind.");
   } else {
     out += placed(views[1].plot, right);
   }
