@@ -253,3 +253,48 @@ TEST_CASE("A region that moves on its own seldom takes the camera with it, as a 
     CHECK(misled_without >= (mover == cfp_test::Mover::region ? runs / 2 : 2 * runs / 5));
   }
 }
+
+TEST_CASE("A wrong depth among neighbours that agree bends no motion", "[frame][camera_motion]") {
+  cfp::Random random(31, "lone depths");
+  cfp::CameraMotionWorkspace<double> workspace;
+  std::vector<double> errors_m, normalized;
+  for (int run = 0; run < 60; ++run) {
+    const cfp::SE3<double> T{cfp::Matrix3<double>::Identity(), {0.013, 0, 0}};
+    Flow f;
+    while (f.depths.size() < 200) {
+      const cfp::Vector2<double> p(random.uniform(0, 640), random.uniform(0, 480));
+      const double z = 2.5 + 3 * p.x() / 640;  // a slanted wall
+      cfp::Vector3<double> ray;
+      cfp::Vector2<double> q;
+      REQUIRE(camera.unproject(p, ray));
+      REQUIRE(camera.project(T * cfp::Vector3<double>(z * ray), q));
+      q += 0.4 * cfp::Vector2<double>(random.normal(), random.normal());
+      f.previous.push_back({p.x(), p.y()});
+      f.current.push_back({q.x(), q.y()});
+      f.depths.push_back(random.uniform() < 0.15 ? random.uniform(0.5, 8) : z);
+      f.outside.push_back(1);
+    }
+    const cfp::CameraMotion<double> found =
+        cfp::estimate_camera_motion<double>(f.pairs(), f.outside, {}, camera, {}, workspace);
+    REQUIRE(found.known);
+    cfp::Vector6<double> error;
+    const cfp::SE3<double> difference = found.T_cur_prev * T.inverse();
+    error << difference.translation, cfp::so3_log(difference.rotation);
+    errors_m.push_back(error.head<3>().norm());
+    normalized.push_back(error.dot(found.covariance.llt().solve(error)));
+  }
+  std::nth_element(errors_m.begin(), errors_m.begin() + 30, errors_m.end());
+  std::nth_element(normalized.begin(), normalized.begin() + 30, normalized.end());
+  CHECK(errors_m[30] < 0.005);  // 12 mm with them
+  CHECK(normalized[30] < 15);   // 5.3 is the median of chi-squared; hundreds with them
+}
+
+TEST_CASE("A room whose neighbours share no depth keeps its pairs", "[frame][camera_motion]") {
+  cfp::Random random(32, "no depth is shared");
+  cfp::CameraMotionWorkspace<double> workspace;
+  const Flow f = flow(300, cfp_test::random_motion(0.03, 0.01, random), 0.2, 0, random);
+  const auto found = cfp::estimate_camera_motion<double>(f.pairs(), f.outside, {}, camera, {}, workspace);
+  REQUIRE(found.known);
+  const auto stays = [](const std::array<double, 3>& point) { return cfp::is_finite(point[0]); };
+  CHECK(std::count_if(workspace.points.begin(), workspace.points.end(), stays) == std::ptrdiff_t(f.depths.size()));
+}

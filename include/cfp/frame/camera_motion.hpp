@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 #include <vector>
 
 #include "cfp/core/options.hpp"
@@ -42,7 +44,13 @@ struct CameraMotion : UncertainMotion<Scalar> {
 /// Scratch memory, reused: after a call, calls of at most the same sizes allocate nothing.
 template <typename Scalar>
 struct CameraMotionWorkspace {
+  struct Sample {  // of the depth image
+    Scalar x, y, depth;
+    int neighbours, alike;  // numbers of neighbours, and of those of about the same depth
+    std::size_t pair;
+  };
   std::vector<std::array<Scalar, 3>> points;  // of the pairs, in the previous camera; NaN: takes no part
+  std::vector<Sample> samples;
   std::vector<Scalar> sigmas, distances;
   PoseWorkspace<Scalar> pose;
   PnpRansacWorkspace search;
@@ -75,6 +83,43 @@ template <typename Scalar>
 namespace detail {
 inline namespace CFP_ISA {
 
+/// Takes out of workspace.points those whose depth fewer than two of some seven neighbours in the image share to 12 %,
+/// unless these are over a third; returns how many stay. A wrong depth may move a pair by less than its noise, so that
+/// no distance tells it, and yet bend the motion: what seems far and moves makes a turn of a translation.
+template <typename Scalar>
+[[nodiscard]] std::size_t leave_out_lone_depths(const PointSpan<Scalar, 2>& pixels,
+                                                CameraMotionWorkspace<Scalar>& workspace) {
+  using Sample = typename CameraMotionWorkspace<Scalar>::Sample;
+  std::vector<Sample>& samples = workspace.samples;
+  samples.clear();
+  samples.reserve(pixels.size());
+  Scalar top = std::numeric_limits<Scalar>::max(), bottom = std::numeric_limits<Scalar>::lowest();
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    if (!is_finite(workspace.points[i][0])) continue;
+    samples.push_back({pixels(i, 0), pixels(i, 1), workspace.points[i][2], 0, 0, i});
+    top = (std::min)(top, pixels(i, 1)), bottom = (std::max)(bottom, pixels(i, 1));
+  }
+  if (samples.empty()) return 0;
+  std::sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) { return a.x < b.x; });
+  const Scalar extent = (samples.back().x - samples.front().x) * (bottom - top);
+  const Scalar reach = std::sqrt(Scalar(7) / 4 * extent / static_cast<Scalar>(samples.size()));
+  for (auto a = samples.begin(); a != samples.end(); ++a) {
+    for (auto b = a + 1; b != samples.end() && b->x - a->x <= reach; ++b) {
+      if (std::abs(a->y - b->y) > reach) continue;
+      const bool alike = std::abs(a->depth - b->depth) <= Scalar(0.12) * (std::min)(a->depth, b->depth);
+      ++a->neighbours, ++b->neighbours;
+      a->alike += alike ? 1 : 0, b->alike += alike ? 1 : 0;
+    }
+  }
+  const auto is_alone = [](const Sample& s) { return s.neighbours >= 2 && s.alike < 2; };
+  const auto alone = static_cast<std::size_t>(std::count_if(samples.begin(), samples.end(), is_alone));
+  if (3 * alone > samples.size()) return samples.size();
+  for (const Sample& s : samples) {
+    if (is_alone(s)) workspace.points[s.pair][0] = std::numeric_limits<Scalar>::quiet_NaN();
+  }
+  return samples.size() - alone;
+}
+
 /// The motion that most of the `taken` workspace.points agree to; false, and T untouched, without one. Its threshold is
 /// below sigma_px, their noise under a motion which what moves may have led astray: a wider one would hold both.
 template <typename Scalar>
@@ -103,9 +148,9 @@ template <typename Scalar>
 inline namespace CFP_ISA {
 
 /// The motion of the camera from the pairs of the undistorted image that `outside` marks as on no object and whose
-/// depth is known: weighted robust pose refinement (refine_pose) from `start`, once with the largest noise and once
-/// with the noise that the pairs then show; where that is above search_above_px, from the motion that pnp_ransac finds,
-/// and narrowly. Unknown where too few pairs have a depth or agree. O(pairs).
+/// depth is known and shared by neighbours: weighted robust pose refinement (refine_pose) from `start`, once with the
+/// largest noise and once with the noise that the pairs then show; where that is above search_above_px, from the motion
+/// that pnp_ransac finds, and narrowly. Unknown where too few pairs have a depth or agree. O(pairs).
 template <typename Scalar>
 [[nodiscard]] CameraMotion<Scalar> estimate_camera_motion(const FlowPairs<Scalar>& flow, span<const char> outside,
                                                           const SE3<double>& start, const PinholeCamera<Scalar>& camera,
@@ -115,14 +160,13 @@ template <typename Scalar>
   CameraMotion<Scalar> motion;
   const Scalar nowhere = std::numeric_limits<Scalar>::quiet_NaN();
   workspace.points.assign(outside.size(), {nowhere, nowhere, nowhere});
-  std::size_t taken = 0;
   for (std::size_t i = 0; i < flow.previous_depths.size(); ++i) {
     const Scalar z = flow.previous_depths[i];
     Vector3<Scalar> ray;
     if (outside[i] == 0 || !is_valid_depth(z) || !camera.unproject(flow.previous[i], ray)) continue;
     workspace.points[i] = {ray.x() * z, ray.y() * z, z};
-    ++taken;
   }
+  const std::size_t taken = detail::leave_out_lone_depths(flow.previous, workspace);
   if (taken < options.min_pairs) return motion;
 
   workspace.distances.resize(outside.size());
