@@ -80,10 +80,12 @@ struct FundamentalEvidence {
     return 3 * near > all && nats(near, T(1) / 3) + nats(all - near, T(2) / 3) > 7 * std::log((n - 3) / T(3.38));
   }
 
-  // Of the F whose distances were measured last against H.
+  // Of the F whose distances were measured last against H. Some F = [e']x H goes through any two pairs, the loudest if
+  // these are mismatches, and through one of them beside a person: so many say nothing for it.
   [[nodiscard]] Verdict judge(const Matrix3<T>& H) noexcept {
     const T distinct = compare(H);
     T best[ranges];
+    leave_out_loudest();
     const T all = nats(best);
     LogProduct products[strips];
     for (std::size_t k = 0; k < count; ++k) products[strip_of(x[k])].multiply(1 + best[range_of(k)] * gain[k]);
@@ -93,6 +95,8 @@ struct FundamentalEvidence {
       for (std::size_t k = first; k < first + person; ++k) rest -= products[k].value();
       if (rest < out.outside) out.outside = rest, out.window = first;
     }
+    leave_out_loudest();
+    out.all = nats(best);
     return out;
   }
 
@@ -123,6 +127,11 @@ struct FundamentalEvidence {
     }
     std::fill(gain + count, gain + (count + pairs.block - 1) / pairs.block * pairs.block, T(0));
     return distinct * static_cast<T>(stride);
+  }
+
+  void leave_out_loudest() noexcept {
+    T* const most = std::max_element(gain, gain + count);
+    *most = (std::min)(*most, T(0));
   }
 
   // The evidence, and the share in each range that it speaks for.
