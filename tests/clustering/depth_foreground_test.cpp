@@ -226,6 +226,26 @@ TEST_CASE("A wall beside a person's shoulders is not taken for the person", "[cl
   CHECK(kept(mask, 60, 40) == 0);
 }
 
+TEST_CASE("A gap that flying pixels bridge parts a person from a wall, the thin end of the wall does not",
+          "[clustering]") {
+  std::vector<double> depths;
+  add_layer(depths, 1000, 3.0, 0.00015);
+  add_layer(depths, 50, 3.15, 0.002);  // 3 cm for as many as a gap holds
+  add_layer(depths, 930, 3.25, 0.00015);
+  add_layer(depths, 20, 3.39, 0.01);
+  const Outcome out = run(depths);
+  CHECK(kept(out.mask, 0, 1000) == 1000);
+  CHECK(kept(out.mask, 1050, 950) == 0);
+}
+
+TEST_CASE("Evenly spread depths have no gap, however few or many", "[clustering]") {
+  for (const std::size_t n : {12U, 100U, 1000U}) {
+    std::vector<double> depths;
+    add_layer(depths, n, 2.0, 2.0 / static_cast<double>(n));
+    CHECK_THAT(run(depths).result.far_m, WithinAbs(2.7, 2.5 / static_cast<double>(n)));
+  }
+}
+
 TEST_CASE("A body is parted from a slanted plane that begins at its back", "[clustering]") {
   std::vector<double> depths;
   add_layer(depths, 100, 2.0, 0.003);

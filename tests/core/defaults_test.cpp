@@ -18,7 +18,7 @@ TEST_CASE("The defaults of the depth foreground", "[core]") {
   const cfp::ForegroundOptions o;
   CHECK((o.rule == cfp::ForegroundRule::depth_window && o.near_share == 0.15 && o.upper_share == 0.1));
   CHECK((o.obstacle_m == 0.3 && o.before_m == 0.5 && o.behind_m == 0.4 && o.first_gap_m == 0.15));
-  CHECK((o.last_gap_m == 0.6 && o.min_gap_m == 0.04 && o.half_body_m == 0.05 && o.min_points == 6));
+  CHECK((o.last_gap_m == 0.6 && o.min_gap_m == 0.02 && o.half_body_m == 0.05 && o.min_points == 6));
   CHECK(o.short_m == 0.3);
   CHECK(o.invalid_is_foreground);
   const cfp::AdaptiveOptions& a = o.adaptive;

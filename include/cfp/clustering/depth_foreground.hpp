@@ -5,6 +5,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "cfp/clustering/adaptive.hpp"
@@ -43,7 +44,7 @@ struct ForegroundOptions {
   double behind_m = 0.4;       ///< how far the window reaches behind the front where no gap ends it; >= 0
   double first_gap_m = 0.15;   ///< nearest end of the window at a gap, behind the front; >= 0
   double last_gap_m = 0.6;     ///< farthest end of the window at a gap; >= first_gap_m
-  double min_gap_m = 0.04;     ///< narrower gaps end nothing; >= 0
+  double min_gap_m = 0.02;     ///< narrower gaps between two points end nothing; >= 0
   double short_m = 0.3;        ///< another end of the window, so far behind the front; >= 0
   double half_body_m = 0.05;   ///< the front stands so much before `previous_depth_m`; >= 0
   std::size_t min_points = 6;  ///< fewer valid depths: too_few_points; >= 1
@@ -103,25 +104,35 @@ struct DepthRange {
   std::size_t first, last;
 };
 
-// The window of a front. A gap of many points is what few of them lie in: flying pixels bridge the empty ones.
+// The window of a front. A gap of many points is what few of them lie in, as flying pixels bridge the empty ones: it
+// may be the narrower the more they are, but is twice what they take where the window is filled evenly. More than a few
+// points lie behind it: every tail is thin.
 template <typename Scalar>
 [[nodiscard]] DepthRange depth_window(span<const Scalar> depths, double front, double before_m,
                                       const ForegroundOptions& o) noexcept {
   const auto depth = [&](std::size_t i) { return static_cast<double>(depths[i]); };
-  const std::size_t n = depths.size(), stride = 1 + n / 150;
-  std::size_t first = 0, last = 0, end_at_gap = 0;
-  while (first < n && depth(first) < front - before_m) ++first;
-  double widest = o.min_gap_m;
-  for (last = first; last < n && depth(last) <= front + o.last_gap_m; ++last) {
-    if (last + stride >= n || depth(last + 1) < front + o.first_gap_m) continue;
-    const double gap = depth(last + stride) - depth(last);
+  const auto nearer_than = [&](double z) {
+    return static_cast<std::size_t>(std::lower_bound(depths.begin(), depths.end(), z) - depths.begin());
+  };
+  const auto up_to = [&](double z) {
+    return static_cast<std::size_t>(std::upper_bound(depths.begin(), depths.end(), z) - depths.begin());
+  };
+  const std::size_t n = depths.size(), stride = 1 + n / 150, few = n / 50;
+  const std::size_t first = nearer_than(front - before_m), begin = nearer_than(front),
+                    end = up_to(front + o.last_gap_m);
+  const double even_m = end > begin ? (depth(end - 1) - depth(begin)) / static_cast<double>(end - begin) : 0;
+  const auto points = static_cast<double>(stride);
+  double widest = (std::max)(o.min_gap_m / std::sqrt(points), 2 * even_m * points);
+  std::size_t end_at_gap = 0;
+  for (std::size_t i = (std::max)(first + 1, nearer_than(front + o.first_gap_m)) - 1; i < end && i + stride + few < n;
+       ++i) {
+    const double gap = depth(i + stride) - depth(i);
     if (!(gap > widest)) continue;
     widest = gap;
-    end_at_gap = last + (stride + 1) / 2;
+    end_at_gap = i + (stride + 1) / 2;
   }
   if (end_at_gap > 0) return {first, end_at_gap};
-  while (last > first && depth(last - 1) > front + o.behind_m) --last;
-  return {first, last};
+  return {first, (std::max)(first, (std::min)(end, up_to(front + o.behind_m)))};
 }
 
 template <typename Scalar>
@@ -169,12 +180,13 @@ inline namespace CFP_ISA {
 /// The person's front may stand at `previous_depth_m`, if the window there holds more than `near_share` of the points;
 /// where the upper half of the box begins, if that is `obstacle_m` farther (a desk hides the legs); or at the depth
 /// that the nearest `near_share` reach, and then all that is nearer is the person's (an arm), else what is up to
-/// `before_m` nearer. The window ends at the widest gap between `first_gap_m` and `last_gap_m` behind the front;
-/// without a gap wider than `min_gap_m`, `behind_m` behind it; or `short_m` behind it. Of these windows the one is
-/// taken whose points lie most where people do (place_odds.hpp); without pixels the previous, else the nearest.
-/// Points without a valid depth take no part and get the label `invalid_is_foreground` says. O(n log n), in practice
-/// O(n); deterministic; permuting the points permutes the mask; allocates only when the workspace grows. Departure from
-/// the paper, which clusters: a window is better on every kind of scene of foreground_study.
+/// `before_m` nearer. The window ends at the widest gap between `first_gap_m` and `last_gap_m` behind the front that
+/// has more than a fiftieth of the points behind it; without a gap that is clear of noise and of evenly spread points,
+/// `behind_m` behind it; or `short_m` behind it. Of these windows the one is taken whose points lie most where people
+/// do (place_odds.hpp); without pixels the previous, else the nearest. Points without a valid depth take no part and
+/// get the label `invalid_is_foreground` says. O(n log n), in practice O(n); deterministic; permuting the points
+/// permutes the mask; allocates only when the workspace grows. Departure from the paper, which clusters: a window is
+/// better on every kind of scene of foreground_study.
 template <typename Scalar>
 ForegroundResult depth_foreground(const ForegroundInput<non_deduced<Scalar>>& in, const ForegroundOptions& options,
                                   ForegroundWorkspace<Scalar>& workspace, span<char> mask) {
