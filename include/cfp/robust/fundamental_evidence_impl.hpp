@@ -76,8 +76,7 @@ struct FundamentalEvidence {
       near += search.distances_sq[i] <= limit ? pairs.row(5)[i] : T(0);
       all += search.distances_sq[i] <= 9 * limit ? pairs.row(5)[i] : T(0);
     }
-    const auto nats = [&](T part, T chance) { return part > 0 ? part * std::log(part / (chance * all)) : T(0); };
-    return 3 * near > all && nats(near, T(1) / 3) + nats(all - near, T(2) / 3) > 7 * std::log((n - 3) / T(3.38));
+    return 3 * near > all && binomial_nats(near, all, T(1) / 3) > 7 * std::log((n - 3) / T(3.38));
   }
 
   // Of the F whose distances were measured last against H. Some F = [e']x H goes through any two pairs, the loudest if

@@ -10,6 +10,7 @@
 #include "cfp/core/span.hpp"
 #include "cfp/core/types.hpp"
 #include "cfp/geometry/p3p.hpp"
+#include "cfp/math/matrix3.hpp"
 #include "cfp/math/se3.hpp"
 #include "cfp/robust/ransac.hpp"
 #include "cfp/robust/ransac_data_impl.hpp"
@@ -56,6 +57,17 @@ void load_observations(const PointSpan<Scalar, 3>& world, const PointSpan<Scalar
     for (std::size_t i = 0; i < out.size; ++i) out.row(r)[i] -= out.origin[r];
   }
   finish(out);
+}
+
+// Whether the points lie on a line or in one place, to the rounding of float coordinates.
+[[nodiscard]] inline bool on_a_line(const ObservationArrays& in) noexcept {
+  const auto point = [&](std::size_t i) { return Vector3<double>(in.row(X)[i], in.row(Y)[i], in.row(Z)[i]); };
+  Vector3<double> far = Vector3<double>::Zero();
+  for (std::size_t i = 0; i < in.size; ++i) far = point(i).squaredNorm() > far.squaredNorm() ? point(i) : far;
+  for (std::size_t i = 0; i < in.size; ++i) {
+    if (cross(far, point(i)).norm() > 1e-6 * far.squaredNorm()) return false;
+  }
+  return true;
 }
 
 // The reprojections of as many observations as P has lanes, from the i-th on: residual (u, v) in px, linearised at the
@@ -192,8 +204,51 @@ struct PnpProblem {
     if (refined.cost < candidate.cost) candidate = refined;
   }
 
+  // Whether the pose is more than the best that chance makes of mismatches, be it by number or by weight: the weights
+  // may know nothing, and then leave fewer data, or tell all mismatches.
+  [[nodiscard]] bool stands_out(const Model& pose, std::size_t samples) const noexcept {
+    return outdoes_chance(pose, samples, false) || outdoes_chance(pose, samples, true);
+  }
+
   [[nodiscard]] auto inlier_test(const Model& pose) const noexcept {
     return [this, pose](std::size_t i) { return LinearReprojection<T>(in, pose, i).distance_sq <= limit; };
+  }
+
+ private:
+  // Source of the criterion: Moisan and Stival, "A probabilistic criterion to detect rigid point matches between two
+  // images and estimate the fundamental matrix", IJCV 2004. Three of the observations fit by construction, and each
+  // sample has up to four poses, three times as many for what the refinement adds: mismatches alone on a small object
+  // then have a pose in one call of a hundred.
+  [[nodiscard]] bool outdoes_chance(const Model& pose, std::size_t samples, bool weighed) const noexcept {
+    using P = simd::Packet<T>;
+    const P zero(T(0)), edge(limit), ring_from(9 * limit), ring_to(36 * limit);
+    enum { all, squares, near, ring, area, x, y, xx, xy, yy, count };
+    P sums[count];
+    std::fill(sums, sums + count, zero);
+    for (std::size_t i = 0; i < in.size; i += P::lanes) {
+      const auto load = [&](std::size_t row) { return P::load(in.row(row) + i); };
+      const P weight = load(observation_weight_row), w = weighed ? weight : select(zero < weight, P(T(1)), zero);
+      const P distance_sq = LinearReprojection<P>(in, pose, i).distance_sq, wx = w * load(ray_x), wy = w * load(ray_y);
+      sums[all] += w, sums[squares] += w * w;
+      sums[near] += select(distance_sq <= edge, w, zero);
+      sums[ring] += select(both(ring_from < distance_sq, distance_sq <= ring_to), w, zero);
+      sums[area] += w * load(s11) * load(s22);
+      sums[x] += wx, sums[y] += wy;
+      sums[xx] += wx * load(ray_x), sums[xy] += wx * load(ray_y), sums[yy] += wy * load(ray_y);
+    }
+    T sum[count];
+    std::transform(sums, sums + count, sum, [](const P& lanes) { return reduce_add(lanes); });
+    // In units of which a sample's three have one each on average.
+    const T unit = sum[squares] / sum[all], n = sum[all] / unit, inliers = sum[near] / unit;
+    const auto mean = [&](int k) { return sum[k] / sum[all]; };
+    // Where chance puts a mismatch. Pixels exchanged at random: the residual has twice their covariance C and within
+    // the threshold the share limit / 4 sqrt(|C|); a quarter of the limit added to C bounds it by one. Mismatches that
+    // keep to a part of the image: those three to six times as far, on 27 times the area, less a standard deviation.
+    const T l = limit / mean(area), others = sum[ring] / unit;
+    const T cxx = mean(xx) - mean(x) * mean(x) + l / 4, cyy = mean(yy) - mean(y) * mean(y) + l / 4;
+    const T cxy = mean(xy) - mean(x) * mean(y);
+    const T chance = (std::max)((others - std::sqrt(others)) / (27 * n), l / (4 * std::sqrt(cxx * cyy - cxy * cxy)));
+    return binomial_nats(inliers - 3, n - 3, chance) > std::log(T(12) * static_cast<T>(samples));
   }
 };
 

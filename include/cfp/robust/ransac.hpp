@@ -33,7 +33,7 @@ enum class RansacStatus : std::uint8_t {
   ok,               ///< model found with the asked confidence
   iteration_limit,  ///< model found, but max_iterations ended the search before the confidence was reached
   not_enough_data,  ///< fewer than min_inliers data are present
-  no_consensus,     ///< no model has min_inliers inliers
+  no_consensus,     ///< no model has min_inliers inliers, or more than chance gives
   degenerate,       ///< the data determine no model: points on a line, or in one place
   no_motion,        ///< F only: the pairs do not move; no F, the homography is the identity
   pure_rotation,    ///< F only: a rotation of the camera explains the pairs; no F, see the homography

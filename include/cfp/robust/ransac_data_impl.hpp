@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "cfp/core/span.hpp"
@@ -72,6 +73,22 @@ double refine(Model& model, int max_steps, double tolerance, State& state) {
   return result.status == SolverStatus::not_finite ? std::numeric_limits<double>::infinity() : result.final_cost;
 }
 
+// Nats by which it is unlikely that `near` of `all` data lie where chance puts the share `chance` of them: the exponent
+// of the binomial tail, 0 unless they are more than chance expects.
+template <typename T>
+[[nodiscard]] T binomial_nats(T near, T all, T chance) noexcept {
+  if (!(near > chance * all)) return 0;
+  const auto nats = [&](T part, T share) { return part > 0 ? part * std::log(part / (share * all)) : T(0); };
+  return nats(near, chance) + nats(all - near, 1 - chance);
+}
+
+inline void refuse(span<char> inlier_mask, RansacReport& report) noexcept {
+  std::fill(inlier_mask.begin(), inlier_mask.end(), char(0));
+  report.inliers = 0;
+  report.inlier_share = 0;
+  report.status = RansacStatus::no_consensus;
+}
+
 // Fills the counts, the share and the mask (empty, or one per datum of the caller, all 0). Too few inliers are no
 // consensus.
 template <std::size_t Rows, typename IsInlier>
@@ -85,11 +102,7 @@ void report_inliers(const RansacColumns<Rows>& data, IsInlier&& is_inlier, std::
     if (!inlier_mask.empty()) inlier_mask[data.index[i]] = 1;
   }
   report.inlier_share = (std::min)(weight / data.total_weight, 1.0);
-  if (report.inliers >= min_inliers) return;
-  std::fill(inlier_mask.begin(), inlier_mask.end(), char(0));
-  report.inliers = 0;
-  report.inlier_share = 0;
-  report.status = RansacStatus::no_consensus;
+  if (report.inliers < min_inliers) refuse(inlier_mask, report);
 }
 
 }  // namespace CFP_ISA
