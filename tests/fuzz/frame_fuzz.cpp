@@ -58,6 +58,7 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
                        &options.coarse.unreported.radius_px,
                        &options.coarse.unreported.max_share,
                        &flow.motion.search_above_px,
+                       &flow.motion.shared_depth_ratio,
                        &options.coarse.memory.time_constant_s,
                        &options.coarse.memory.evidence_limit,
                        &flow.nearer_than_room.inverse_mean,

@@ -29,6 +29,9 @@ struct CameraMotionOptions {
   /// More noise than this may be something that moves and no box holds: the motion is then searched by pnp_ransac,
   /// which a third of such pairs seldom mislead (cfp_camera_motion_study); px, > 0.
   double search_above_px = 0.25;
+  /// A depth that fewer than two of some seven neighbours in the image share to this ratio takes no part, unless that
+  /// is over a third of them; a ratio without unit, >= 0. 0: all take part (cfp_object_motion_study).
+  double shared_depth_ratio = 0.12;
   MotionDistanceOptions distance;
   PoseOptions pose;
 };
@@ -64,6 +67,7 @@ inline namespace CFP_ISA {
   if (!detail::positive(o.min_sigma_px)) return "min_sigma_px";
   if (!(o.max_sigma_px >= o.min_sigma_px) || !is_finite(o.max_sigma_px)) return "max_sigma_px";
   if (!detail::positive(o.search_above_px)) return "search_above_px";
+  if (!detail::non_negative(o.shared_depth_ratio)) return "shared_depth_ratio";
   if (const OptionPath field = nested("distance", invalid_field(o.distance))) return field;
   return nested("pose", invalid_field(o.pose));
 }
@@ -83,11 +87,11 @@ template <typename Scalar>
 namespace detail {
 inline namespace CFP_ISA {
 
-/// Takes out of workspace.points those whose depth fewer than two of some seven neighbours in the image share to 12 %,
-/// unless these are over a third; returns how many stay. A wrong depth may move a pair by less than its noise, so that
-/// no distance tells it, and yet bend the motion: what seems far and moves makes a turn of a translation.
+/// Takes out of workspace.points those whose depth no neighbours share: see shared_depth_ratio; 0 takes out none.
+/// Returns how many stay. A wrong depth may move a pair by less than its noise, so that no distance tells it, and yet
+/// bend the motion: what seems far and moves makes a turn of a translation.
 template <typename Scalar>
-[[nodiscard]] std::size_t leave_out_lone_depths(const PointSpan<Scalar, 2>& pixels,
+[[nodiscard]] std::size_t leave_out_lone_depths(const PointSpan<Scalar, 2>& pixels, Scalar ratio,
                                                 CameraMotionWorkspace<Scalar>& workspace) {
   using Sample = typename CameraMotionWorkspace<Scalar>::Sample;
   std::vector<Sample>& samples = workspace.samples;
@@ -99,14 +103,14 @@ template <typename Scalar>
     samples.push_back({pixels(i, 0), pixels(i, 1), workspace.points[i][2], 0, 0, i});
     top = (std::min)(top, pixels(i, 1)), bottom = (std::max)(bottom, pixels(i, 1));
   }
-  if (samples.empty()) return 0;
+  if (samples.empty() || ratio <= 0) return samples.size();
   std::sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) { return a.x < b.x; });
   const Scalar extent = (samples.back().x - samples.front().x) * (bottom - top);
   const Scalar reach = std::sqrt(Scalar(7) / 4 * extent / static_cast<Scalar>(samples.size()));
   for (auto a = samples.begin(); a != samples.end(); ++a) {
     for (auto b = a + 1; b != samples.end() && b->x - a->x <= reach; ++b) {
       if (std::abs(a->y - b->y) > reach) continue;
-      const bool alike = std::abs(a->depth - b->depth) <= Scalar(0.12) * (std::min)(a->depth, b->depth);
+      const bool alike = std::abs(a->depth - b->depth) <= ratio * (std::min)(a->depth, b->depth);
       ++a->neighbours, ++b->neighbours;
       a->alike += alike ? 1 : 0, b->alike += alike ? 1 : 0;
     }
@@ -166,7 +170,7 @@ template <typename Scalar>
     if (outside[i] == 0 || !is_valid_depth(z) || !camera.unproject(flow.previous[i], ray)) continue;
     workspace.points[i] = {ray.x() * z, ray.y() * z, z};
   }
-  const std::size_t taken = detail::leave_out_lone_depths(flow.previous, workspace);
+  const std::size_t taken = detail::leave_out_lone_depths(flow.previous, Scalar(options.shared_depth_ratio), workspace);
   if (taken < options.min_pairs) return motion;
 
   workspace.distances.resize(outside.size());
