@@ -97,7 +97,7 @@ template <typename Scalar>
   std::vector<Sample>& samples = workspace.samples;
   samples.clear();
   samples.reserve(pixels.size());
-  Scalar top = std::numeric_limits<Scalar>::max(), bottom = std::numeric_limits<Scalar>::lowest();
+  Scalar top = std::numeric_limits<Scalar>::infinity(), bottom = -top;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     if (!is_finite(workspace.points[i][0])) continue;
     samples.push_back({pixels(i, 0), pixels(i, 1), workspace.points[i][2], 0, 0, i});
