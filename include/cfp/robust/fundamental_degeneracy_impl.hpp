@@ -110,7 +110,7 @@ struct DegeneracyCheck {
     const bool person_possible = find_homography_beside(with_H.window);
     if (person_possible) with_H = evidence.judge(H);
     const auto stands = [&](const typename FundamentalEvidence<T>::Verdict& v, T factor) {
-      return v.distinct >= least && v.all > 11 * factor && (!person_possible || v.outside > 4 * factor);
+      return v.distinct >= least && v.all > 11 * factor && (!person_possible || v.outside > 3 * factor);
     };
     const auto suffices = [&](T factor) {
       return stands(with_H, factor) && !evidence.rests_on_lines(factor) &&
