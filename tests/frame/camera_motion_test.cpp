@@ -264,13 +264,13 @@ TEST_CASE("A wrong depth among neighbours that agree bends no motion", "[frame][
     const cfp::SE3<double> T{cfp::Matrix3<double>::Identity(), {0.013, 0, 0}};
     Flow f;
     while (f.depths.size() < 200) {
-      const cfp::Vector2<double> p(random.uniform(0, 640), random.uniform(0, 480));
+      const cfp::Vector2<double> p{random.uniform(0, 640), random.uniform(0, 480)};
       const double z = 2.5 + 3 * p.x() / 640;  // a slanted wall
       cfp::Vector3<double> ray;
       cfp::Vector2<double> q;
       REQUIRE(camera.unproject(p, ray));
       REQUIRE(camera.project(T * cfp::Vector3<double>(z * ray), q));
-      q += 0.4 * cfp::Vector2<double>(random.normal(), random.normal());
+      q += 0.4 * cfp::Vector2<double>{random.normal(), random.normal()};
       f.previous.push_back({p.x(), p.y()});
       f.current.push_back({q.x(), q.y()});
       f.depths.push_back(random.uniform() < 0.15 ? random.uniform(0.5, 8) : z);

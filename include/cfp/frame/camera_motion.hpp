@@ -97,13 +97,15 @@ template <typename Scalar>
   std::vector<Sample>& samples = workspace.samples;
   samples.clear();
   samples.reserve(pixels.size());
-  Scalar top = std::numeric_limits<Scalar>::infinity(), bottom = -top;
+  Scalar top = std::numeric_limits<Scalar>::infinity(), bottom = -top, nearest = top, farthest = 0;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     if (!is_finite(workspace.points[i][0])) continue;
     samples.push_back({pixels(i, 0), pixels(i, 1), workspace.points[i][2], 0, 0, i});
     top = (std::min)(top, pixels(i, 1)), bottom = (std::max)(bottom, pixels(i, 1));
+    nearest = (std::min)(nearest, samples.back().depth), farthest = (std::max)(farthest, samples.back().depth);
   }
-  if (samples.empty() || ratio <= 0) return samples.size();
+  const bool all_alike = farthest - nearest <= ratio * nearest;  // as all are where the motion is up to scale
+  if (samples.empty() || ratio <= 0 || all_alike) return samples.size();
   std::sort(samples.begin(), samples.end(), [](const Sample& a, const Sample& b) { return a.x < b.x; });
   const Scalar extent = (samples.back().x - samples.front().x) * (bottom - top);
   const Scalar reach = std::sqrt(Scalar(7) / 4 * extent / static_cast<Scalar>(samples.size()));
