@@ -1,0 +1,99 @@
+/// @file pnp_observations_impl.hpp
+/// The observations of pnp_ransac.hpp as arrays, and their reprojections. Not an interface.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "cfp/core/numeric.hpp"
+#include "cfp/core/span.hpp"
+#include "cfp/core/types.hpp"
+#include "cfp/math/matrix3.hpp"
+#include "cfp/math/se3.hpp"
+#include "cfp/robust/ransac_data_impl.hpp"
+#include "cfp/simd/packet.hpp"
+
+namespace cfp::detail {
+
+// The observations present. Points are relative to `origin`; a measurement is its ray (x, y, 1) and the upper
+// triangular S with S^T S = A^T A, A = d pixel / d (x, y) at the ray: |S d| is the pixel distance of a step d in the
+// plane z = 1.
+enum ObservationRow : std::size_t { X, Y, Z, ray_x, ray_y, s11, s12, s22, observation_weight_row, observation_rows };
+
+struct ObservationArrays : RansacColumns<observation_rows> {
+  std::array<double, 3> origin = {0, 0, 0};
+};
+
+inline namespace CFP_ISA {
+
+template <typename Camera, typename Scalar>
+void load_observations(const PointSpan<Scalar, 3>& world, const PointSpan<Scalar, 2>& pixels,
+                       const span<const Scalar>& weights, const Camera& camera, ObservationArrays& out) {
+  out.begin(world.size());
+  out.origin = {0, 0, 0};
+  constexpr double max_coordinate = 1e8;  // beyond it a point is taken for a broken one
+  for (std::size_t i = 0; i < world.size(); ++i) {
+    const double w = weights.empty() ? 1.0 : static_cast<double>(weights[i]);
+    const Vector3<double> p = world[i].template cast<double>();
+    Vector3<Scalar> ray(Scalar(0), Scalar(0), Scalar(1));
+    Vector2<Scalar> pixel = pixels[i];
+    Matrix23<Scalar> J = Matrix23<Scalar>::Zero();
+    const auto is_near = [&](double x) { return std::abs(x) < max_coordinate; };
+    if (!(w > 0) || !is_finite(w) || !is_near(p.x()) || !is_near(p.y()) || !is_near(p.z())) continue;
+    if (!is_finite(pixel.x()) || !is_finite(pixel.y())) continue;
+    if (!camera.unproject(pixel, ray) || !camera.project(ray, pixel, &J)) continue;
+    const auto by = [&](int r, int c) { return static_cast<double>(J(r, c)); };
+    const double a = std::sqrt(by(0, 0) * by(0, 0) + by(1, 0) * by(1, 0));
+    const double b = a > 0 ? (by(0, 0) * by(0, 1) + by(1, 0) * by(1, 1)) / a : 0.0;
+    const double c = std::sqrt((std::max)(by(0, 1) * by(0, 1) + by(1, 1) * by(1, 1) - b * b, 0.0));
+    if (!(a > 0 && c > 0) || !is_finite(a * c)) continue;
+    out.push(i, {p.x(), p.y(), p.z(), static_cast<double>(ray.x()), static_cast<double>(ray.y()), a, b, c, w});
+  }
+  for (std::size_t r = X; r <= Z; ++r) {
+    for (std::size_t i = 0; i < out.size; ++i) out.origin[r] += out.row(r)[i] / static_cast<double>(out.size);
+    for (std::size_t i = 0; i < out.size; ++i) out.row(r)[i] -= out.origin[r];
+  }
+  finish(out);
+}
+
+// Whether the points lie on a line or in one place, to the rounding of float coordinates.
+[[nodiscard]] inline bool on_a_line(const ObservationArrays& in) noexcept {
+  const auto point = [&](std::size_t i) { return Vector3<double>(in.row(X)[i], in.row(Y)[i], in.row(Z)[i]); };
+  Vector3<double> far = Vector3<double>::Zero();
+  for (std::size_t i = 0; i < in.size; ++i) far = point(i).squaredNorm() > far.squaredNorm() ? point(i) : far;
+  for (std::size_t i = 0; i < in.size; ++i) {
+    if (cross(far, point(i)).norm() > 1e-6 * far.squaredNorm()) return false;
+  }
+  return true;
+}
+
+// The reprojections of as many observations as P has lanes, from the i-th on: residual (u, v) in px, linearised at the
+// measurement, and its square, infinite behind the camera.
+template <typename P>
+struct LinearReprojection {
+  using T = simd::scalar_of<P>;
+  P inverse_z, x, y, u, v, distance_sq;
+
+  LinearReprojection(const ObservationArrays& in, const SE3<T>& pose, std::size_t i) noexcept {
+    const auto load = [&](std::size_t row) { return simd::load<P>(in.row(row) + i); };
+    const P wx = load(X), wy = load(Y), wz = load(Z);
+    const auto moved = [&](int r) -> P {
+      return P(pose.rotation(r, 0)) * wx + P(pose.rotation(r, 1)) * wy + P(pose.rotation(r, 2)) * wz +
+             P(pose.translation[r]);
+    };
+    const P z = moved(2);
+    const auto in_front = P(Tolerance<T>::min_depth) < z;
+    inverse_z = simd::select(in_front, P(T(1)) / z, P(T(0)));
+    x = moved(0) * inverse_z;
+    y = moved(1) * inverse_z;
+    const P dx = x - load(ray_x), dy = y - load(ray_y);
+    u = load(s11) * dx + load(s12) * dy;
+    v = load(s22) * dy;
+    distance_sq = simd::select(in_front, u * u + v * v, P(std::numeric_limits<T>::infinity()));
+  }
+};
+
+}  // namespace CFP_ISA
+}  // namespace cfp::detail
