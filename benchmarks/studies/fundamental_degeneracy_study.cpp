@@ -65,16 +65,18 @@ enum class Kind {
   walker_turn_30,
   one_line,
   two_lines,
-  one_pixel,  // volume, but two thirds of the pairs end in one pixel
-  copies,     // ten pairs, thirty times each
-  random,     // no relation at all
-  shift,      // a picture moved by whole pixels
+  one_pixel,      // volume, but two thirds of the pairs end in one pixel
+  copies,         // ten pairs, thirty times each
+  random,         // no relation at all
+  shift,          // a picture moved by whole pixels
+  broad_rest_20,  // what moves is 400 x 240 px: somebody close, or several side by side
+  broad_turn_20,
   count
 };
-const char* const names[] = {"volume",    "few (20)",  "plane + 20", "volume + walker", "plane",     "rotation",
-                             "rest",      "rest, 10%", "rest, 20%",  "rest, 30%",       "turn, 10%", "turn, 20%",
-                             "turn, 30%", "one line",  "two lines",  "one pixel",       "copies",    "random",
-                             "shift"};
+const char* const names[] = {"volume",    "few (20)",    "plane + 20", "volume + walker", "plane",     "rotation",
+                             "rest",      "rest, 10%",   "rest, 20%",  "rest, 30%",       "turn, 10%", "turn, 20%",
+                             "turn, 30%", "one line",    "two lines",  "one pixel",       "copies",    "random",
+                             "shift",     "rest, broad", "turn, broad"};
 
 struct Problem {
   std::vector<Pixel> previous, current, exact_previous, exact_current;  // `exact`: 200 points of the static space
@@ -98,6 +100,8 @@ double walker_share(Kind kind) {
     case Kind::walker_rest_20:
     case Kind::walker_turn_20:
     case Kind::moving_walker:
+    case Kind::broad_rest_20:
+    case Kind::broad_turn_20:
       return 0.2;
     case Kind::walker_rest_30:
     case Kind::walker_turn_30:
@@ -108,10 +112,12 @@ double walker_share(Kind kind) {
 }
 
 bool rests(Kind k) {
-  return k == Kind::rest || k == Kind::walker_rest_10 || k == Kind::walker_rest_20 || k == Kind::walker_rest_30;
+  return k == Kind::rest || k == Kind::walker_rest_10 || k == Kind::walker_rest_20 || k == Kind::walker_rest_30 ||
+         k == Kind::broad_rest_20;
 }
 bool turns(Kind k) {
-  return k == Kind::rotation || k == Kind::walker_turn_10 || k == Kind::walker_turn_20 || k == Kind::walker_turn_30;
+  return k == Kind::rotation || k == Kind::walker_turn_10 || k == Kind::walker_turn_20 || k == Kind::walker_turn_30 ||
+         k == Kind::broad_turn_20;
 }
 
 Problem make_problem(Kind kind, double noise, double outliers, double base_m, bool exact_to_float,
@@ -122,7 +128,9 @@ Problem make_problem(Kind kind, double noise, double outliers, double base_m, bo
   if (!rests(kind) && !turns(kind)) motion.translation = base_m * cfp_test::random_direction(random);
   const Vector3<double> tilt(random.uniform(-0.4, 0.4), random.uniform(-0.4, 0.4), 0.5);
   const Vector2<double> walk = 6 * Vector2<double>(random.normal(), random.normal()).normalized();
-  const double walker_x = random.uniform(0, 500), shift_x = random.uniform(3, 9), shift_y = random.uniform(-5, 5);
+  const bool broad = kind == Kind::broad_rest_20 || kind == Kind::broad_turn_20;
+  const double walker_x = random.uniform(0, broad ? 240 : 500), shift_x = random.uniform(3, 9),
+               shift_y = random.uniform(-5, 5);
   Vector3<double> line_point[2], line_direction[2];
   for (int k = 0; k < 2; ++k) {
     line_point[k] = Vector3<double>(random.uniform(-0.8, 0.8), random.uniform(-0.5, 0.5), random.uniform(2, 4));
@@ -144,9 +152,16 @@ Problem make_problem(Kind kind, double noise, double outliers, double base_m, bo
       continue;
     }
     const bool walker = i < walkers;
-    Vector2<double> u = walker ? Vector2<double>(walker_x + random.uniform(0, 130), random.uniform(60, 440))
-                               : Vector2<double>(random.uniform(0, 640), random.uniform(0, 480)),
-                    v = u;
+    const double width = !walker ? 640
+                         : broad ? 400
+                                 : 130,
+                 top = !walker ? 0
+                       : broad ? 230
+                               : 60,
+                 bottom = !walker ? 480
+                          : broad ? 470
+                                  : 440;
+    Vector2<double> u((walker ? walker_x : 0) + random.uniform(0, width), random.uniform(top, bottom)), v = u;
     Vector3<double> ray;
     (void)camera.unproject(u, ray);
     const bool on_plane = kind == Kind::plane || (kind == Kind::mostly_plane && i >= 20);

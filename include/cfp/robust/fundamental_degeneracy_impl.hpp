@@ -107,10 +107,12 @@ struct DegeneracyCheck {
     if (!evidence.stands_out()) return false;
     evidence.stride = (std::max)(pairs.size / PairArrays::enough, std::size_t(1));
     typename FundamentalEvidence<T>::Verdict with_H = evidence.judge(H);
-    const bool person_possible = find_homography_beside(with_H.window);
-    if (person_possible) with_H = evidence.judge(H);
+    const bool broad_possible = with_H.beside_broad < with_H.beside_person && find_homography_beside(with_H.broad);
+    const bool possible = broad_possible || find_homography_beside(with_H.person);
+    if (possible) with_H = evidence.judge(H);
     const auto stands = [&](const typename FundamentalEvidence<T>::Verdict& v, T factor) {
-      return v.distinct >= least && v.all > 11 * factor && (!person_possible || v.outside > 3 * factor);
+      const T beside = broad_possible ? (std::min)(v.beside_broad, v.beside_person) : v.beside_person;
+      return v.distinct >= least && v.all > 11 * factor && (!possible || beside > 3 * factor);
     };
     const auto suffices = [&](T factor) {
       return stands(with_H, factor) && !evidence.rests_on_lines(factor) &&
@@ -133,10 +135,10 @@ struct DegeneracyCheck {
   // Looks for the homography of the pairs outside the window of a person, who bends H towards F. H becomes that one,
   // and the answer is true, where it explains most of what F explains there, as it does if a person is all that moves,
   // or F explains too little to tell.
-  [[nodiscard]] bool find_homography_beside(std::size_t window) noexcept {
+  [[nodiscard]] bool find_homography_beside(const typename FundamentalEvidence<T>::Window& window) noexcept {
     if (search.list.size() < 4) return true;
     const Matrix3<T> before = H;
-    const auto inside = [&](std::size_t i) { return FundamentalEvidence<T>::in_window(pairs.row(0)[i], window); };
+    const auto inside = [&](std::size_t i) { return window.contains(pairs.row(0)[i], pairs.row(1)[i]); };
     PairColumns<float> columns = thinned_columns(pairs);
     std::array<float, PairArrays::enough> weights = {};
     for (std::size_t k = 0; k < columns.size; ++k)

@@ -23,8 +23,8 @@ inline namespace CFP_ISA {
 // in every range of d. T is double.
 template <typename T>
 struct FundamentalEvidence {
-  static constexpr std::size_t strips = 16, person = 5;  // over the extent of the pairs; the width of a person in them
-  static constexpr std::size_t ranges = 6, shares = 5;   // of d, doubling
+  static constexpr std::size_t cells = 16;              // over the extent of the pairs, either way
+  static constexpr std::size_t ranges = 6, shares = 5;  // of d, doubling
   static constexpr T share[shares] = {T(0), T(0.1), T(0.3), T(0.6), T(0.9)};
 
   const FundamentalSearch<T>& search;
@@ -38,10 +38,21 @@ struct FundamentalEvidence {
   T* const range = gain + pairs.capacity;
   std::size_t count = 0;
 
+  // Cells of the previous image.
+  struct Window {
+    std::size_t column, row, width, height;
+
+    [[nodiscard]] bool contains(T u, T v) const noexcept {
+      return cell_of(u) - column < width && cell_of(v) - row < height;
+    }
+  };
   struct Verdict {
-    T distinct;          // distinct pairs that F explains
-    T all, outside;      // evidence of all pairs, and least of those outside a window that may hold a moving person
-    std::size_t window;  // first strip of that window
+    T distinct;  // distinct pairs that F explains
+    T all;       // evidence of all pairs
+    // Least evidence beside a window in which something may move: a person who stands, and what is broad, as somebody
+    // close or several side by side; and these windows.
+    T beside_person = 0, beside_broad = 0;
+    Window person = {}, broad = {};
   };
 
   // The logarithm of a product, taken before it leaves the range of numbers.
@@ -57,11 +68,9 @@ struct FundamentalEvidence {
     [[nodiscard]] T value() const noexcept { return log + std::log(rest); }
   };
 
-  // By the previous x.
-  [[nodiscard]] static std::size_t strip_of(T x) noexcept {
-    return static_cast<std::size_t>((std::min)((std::max)(T(0.2) * x + T(0.5), T(0)), T(0.999)) * strips);
+  [[nodiscard]] static std::size_t cell_of(T x) noexcept {
+    return static_cast<std::size_t>((std::min)((std::max)(T(0.2) * x + T(0.5), T(0)), T(0.999)) * cells);
   }
-  [[nodiscard]] static bool in_window(T x, std::size_t window) noexcept { return strip_of(x) - window < person; }
   [[nodiscard]] std::size_t range_of(std::size_t k) const noexcept { return static_cast<std::size_t>(range[k]); }
 
   // Whether more pairs lie near their lines than the pairs up to three times as far let chance put there: the binomial
@@ -86,14 +95,8 @@ struct FundamentalEvidence {
     T best[ranges];
     leave_out_loudest();
     const T all = nats(best);
-    LogProduct products[strips];
-    for (std::size_t k = 0; k < count; ++k) products[strip_of(x[k])].multiply(1 + best[range_of(k)] * gain[k]);
-    Verdict out{distinct, all, all, 0};
-    for (std::size_t first = 0; first + person <= strips; ++first) {
-      T rest = all;
-      for (std::size_t k = first; k < first + person; ++k) rest -= products[k].value();
-      if (rest < out.outside) out.outside = rest, out.window = first;
-    }
+    Verdict out{distinct, all};
+    find_windows(best, out);
     leave_out_loudest();
     out.all = nats(best);
     return out;
@@ -126,6 +129,31 @@ struct FundamentalEvidence {
     }
     std::fill(gain + count, gain + (count + pairs.block - 1) / pairs.block * pairs.block, T(0));
     return distinct * static_cast<T>(stride);
+  }
+
+  // The windows without which the pairs say least, each pair with the share of its range.
+  void find_windows(const T (&share_of_range)[ranges], Verdict& out) const noexcept {
+    LogProduct products[cells][cells];
+    for (std::size_t k = 0; k < count; ++k)
+      products[cell_of(y[k])][cell_of(x[k])].multiply(1 + share_of_range[range_of(k)] * gain[k]);
+    T sums[cells + 1][cells + 1] = {};  // of all cells above and to the left
+    for (std::size_t r = 0; r < cells; ++r) {
+      for (std::size_t c = 0; c < cells; ++c)
+        sums[r + 1][c + 1] = products[r][c].value() + sums[r][c + 1] + sums[r + 1][c] - sums[r][c];
+    }
+    const auto least = [&](std::size_t width, std::size_t height, Window& window) {
+      T rest = out.all;
+      for (std::size_t r = 0; r + height <= cells; ++r) {
+        for (std::size_t c = 0; c + width <= cells; ++c) {
+          const T inside = sums[r + height][c + width] - sums[r][c + width] - sums[r + height][c] + sums[r][c];
+          if (out.all - inside < rest) rest = out.all - inside, window = {c, r, width, height};
+        }
+      }
+      return rest;
+    };
+    out.beside_person = least(5, cells, out.person);
+    // One of the many broad windows holds most of little evidence by chance.
+    out.beside_broad = least(10, 6, out.broad) + (std::max)(T(16) - out.all / 5, T(0));
   }
 
   void leave_out_loudest() noexcept {
