@@ -18,9 +18,11 @@
 // the median error of MAGSAC is at most twice that of the floor (0.01 px at least): how many, mean, and how many above
 // 5 %.
 //
-// CFP_STUDY_ALONE=1 CFP_STUDY_SEED=77 cfp_fundamental_degeneracy_study 100: wrong 0.85 %; 79 of 1242 cells are surely
-// above 1 %, in 43 of them the pairs tell (volume + walker 19, turn 8, two lines 7, few 6, rest 3).
-// CFP_STUDY_SEED=11 cfp_fundamental_degeneracy_study 40 0 1 2 3: of 127 known cells 28 lose more than 5 %, 26 of them
+// CFP_STUDY_ALONE=1 CFP_STUDY_SEED=77 cfp_fundamental_degeneracy_study 100: wrong 1.25 %; 109 of 1302 cells are surely
+// above 1 %, in 67 of them the pairs tell (broad movers 25, volume + walker 19, turn 8, two lines 6, few 6, rest 3).
+// Broad movers: wrong 8.7 % (0.5 px or less, no more than 40 % of mismatches: 0 to 11), 78 % before windows were that
+// wide.
+// CFP_STUDY_SEED=11 cfp_fundamental_degeneracy_study 40 0 1 2 3: of 189 known cells 45 lose more than 5 %, 43 of them
 // with 20 pairs.
 //
 // Arguments: [problems per cell, default 40] [kinds by number, default all] or --smoke. CFP_STUDY_ALONE: without the
