@@ -117,8 +117,8 @@ inline namespace CFP_ISA {
 /// A homography that holds most inliers is looked for first: with parallax beside it the F is completed from both.
 /// There is no F, and `status` says why, unless more pairs lie near its lines than the best of all samples gathers by
 /// chance (30 true pairs among 300 are not told from that), and its lines explain the pairs better than chance does
-/// beside that homography and beside no motion, without any part of the image as wide as a near person, and without any
-/// two lines of points (`degenerate`). Pairs that begin or end in one place (a cell of two thresholds) count as one
+/// beside that homography and beside no motion, without any part of the image that somebody near may fill, and without
+/// any two lines of points (`degenerate`). Pairs that begin or end in one place (a cell of two thresholds) count as one
 /// there. Where most pairs are mismatches a moving region may still be taken for parallax. The result is refined under
 /// a Geman-McClure loss of 2.25 standard deviations of the noise that the pairs themselves show, from several starts,
 /// as a short baseline gives the cost several minima. Cost per sample about 1 us plus 0.3 us per 200 pairs, and some
