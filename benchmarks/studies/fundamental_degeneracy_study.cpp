@@ -37,6 +37,7 @@
 #include <Eigen/Geometry>
 
 #include "../../tests/support/two_view_scene.hpp"
+#include "cfp/geometry/box.hpp"
 #include "cfp/robust/fundamental_ransac.hpp"
 
 #ifdef CFP_HAVE_OPENCV
@@ -133,6 +134,8 @@ Problem make_problem(Kind kind, double noise, double outliers, double base_m, bo
   const bool broad = kind == Kind::broad_rest_20 || kind == Kind::broad_turn_20;
   const double walker_x = random.uniform(0, broad ? 240 : 500), shift_x = random.uniform(3, 9),
                shift_y = random.uniform(-5, 5);
+  const cfp::Box<double> walker_region = broad ? cfp::Box<double>{walker_x, 230, walker_x + 400, 470}
+                                               : cfp::Box<double>{walker_x, 60, walker_x + 130, 440};
   Vector3<double> line_point[2], line_direction[2];
   for (int k = 0; k < 2; ++k) {
     line_point[k] = Vector3<double>(random.uniform(-0.8, 0.8), random.uniform(-0.5, 0.5), random.uniform(2, 4));
@@ -154,16 +157,8 @@ Problem make_problem(Kind kind, double noise, double outliers, double base_m, bo
       continue;
     }
     const bool walker = i < walkers;
-    const double width = !walker ? 640
-                         : broad ? 400
-                                 : 130,
-                 top = !walker ? 0
-                       : broad ? 230
-                               : 60,
-                 bottom = !walker ? 480
-                          : broad ? 470
-                                  : 440;
-    Vector2<double> u((walker ? walker_x : 0) + random.uniform(0, width), random.uniform(top, bottom)), v = u;
+    const cfp::Box<double> region = walker ? walker_region : cfp::Box<double>{0, 0, 640, 480};
+    Vector2<double> u(random.uniform(region.x1, region.x2), random.uniform(region.y1, region.y2)), v = u;
     Vector3<double> ray;
     (void)camera.unproject(u, ray);
     const bool on_plane = kind == Kind::plane || (kind == Kind::mostly_plane && i >= 20);

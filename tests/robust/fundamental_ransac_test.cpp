@@ -39,6 +39,15 @@ TwoViewOptions noisy(std::size_t pairs, double outlier_share) {
   return options;
 }
 
+/// Pairs before a camera that rests, or turns by `rotation_rad`.
+TwoViewOptions without_parallax(std::size_t pairs, double outlier_share, double noise_px, double rotation_rad) {
+  TwoViewOptions options = noisy(pairs, outlier_share);
+  options.noise_px = noise_px;
+  options.translation_m = 0;
+  options.rotation_rad = rotation_rad;
+  return options;
+}
+
 /// Makes the first `count` pairs those of somebody this deep in front of the camera, whose image moves by `step` beside
 /// the camera's motion.
 void put_walker(std::size_t count, double depth_m, const cfp::Vector2<double>& step, cfp::Random& random,
@@ -436,11 +445,7 @@ TEST_CASE("A walker with more pairs than the room is no parallax", "[robust]") {
   cfp::Random random(48, "walker and mismatches");
   int found = 0;
   for (int trial = 0; trial < 30; ++trial) {
-    TwoViewOptions options = noisy(300, 0.9);
-    options.noise_px = 0;
-    options.translation_m = 0;
-    options.rotation_rad = 0.035;
-    auto scene = make_two_view_scene<double>(random, options);
+    auto scene = make_two_view_scene<double>(random, without_parallax(300, 0.9, 0, 0.035));
     put_walker(90, 1, {5, 3}, random, scene);
     const auto result = fundamental_ransac(PointPairs{scene.prev, scene.cur}, FundamentalRansacOptions{}, workspace);
     found += result.found() ? 1 : 0;
@@ -475,11 +480,7 @@ TEST_CASE("A person who moves before a camera at rest or turning gives no F", "[
     for (const double rotation_rad : {0.0, 0.035}) {
       for (const double share : {0.1, 0.2, 0.3}) {
         for (int trial = 0; trial < 5; ++trial) {
-          TwoViewOptions options = noisy(300, 0);
-          options.noise_px = noise_px;
-          options.translation_m = 0;
-          options.rotation_rad = rotation_rad;
-          auto scene = make_two_view_scene<double>(random, options);
+          auto scene = make_two_view_scene<double>(random, without_parallax(300, 0, noise_px, rotation_rad));
           const double left = random.uniform(0, 500);
           std::size_t walkers = 0;
           for (std::size_t i = 0; i < 300; ++i) {
@@ -511,11 +512,7 @@ TEST_CASE("What is broad and moves before a camera at rest or turning gives no F
   for (const double noise_px : {0.1, 0.5}) {
     for (const double rotation_rad : {0.0, 0.035}) {
       for (int trial = 0; trial < 40; ++trial) {
-        TwoViewOptions options = noisy(300, 0.1);
-        options.noise_px = noise_px;
-        options.translation_m = 0;
-        options.rotation_rad = rotation_rad;
-        auto scene = make_two_view_scene<double>(random, options);
+        auto scene = make_two_view_scene<double>(random, without_parallax(300, 0.1, noise_px, rotation_rad));
         const double left = random.uniform(0, 240), top = random.uniform(0, 240);
         const cfp::Vector2<double> flow =
             random.uniform(6, 20) * cfp::Vector2<double>(random.normal(), random.normal()).normalized();
@@ -592,11 +589,7 @@ TEST_CASE("A person at the edge of the image, away from all other pairs, gives n
   for (const double mirrored : {0.0, 640.0}) {
     for (const double rotation_rad : {0.0, 0.035}) {
       for (int trial = 0; trial < 15; ++trial) {
-        TwoViewOptions options = noisy(300, 0);
-        options.noise_px = 0.1;
-        options.translation_m = 0;
-        options.rotation_rad = rotation_rad;
-        auto scene = make_two_view_scene<double>(random, options);
+        auto scene = make_two_view_scene<double>(random, without_parallax(300, 0, 0.1, rotation_rad));
         std::vector<std::array<double, 2>> prev, cur;
         for (std::size_t i = 0; i < 300; ++i) {
           const double x = std::abs(scene.prev[i][0] - mirrored);

@@ -107,12 +107,13 @@ struct DegeneracyCheck {
     if (!evidence.stands_out()) return false;
     evidence.stride = (std::max)(pairs.size / PairArrays::enough, std::size_t(1));
     typename FundamentalEvidence<T>::Verdict with_H = evidence.judge(H);
-    const bool broad_possible = with_H.beside_broad < with_H.beside_person && find_homography_beside(with_H.broad);
-    const bool possible = broad_possible || find_homography_beside(with_H.person);
+    const bool broad_possible =
+        with_H.broad.evidence < with_H.person.evidence && find_homography_beside(with_H.broad.window);
+    const bool possible = broad_possible || find_homography_beside(with_H.person.window);
     if (possible) with_H = evidence.judge(H);
     const auto stands = [&](const typename FundamentalEvidence<T>::Verdict& v, T factor) {
-      const T beside = broad_possible ? (std::min)(v.beside_broad, v.beside_person) : v.beside_person;
-      return v.distinct >= least && v.all > 11 * factor && (!possible || beside > 3 * factor);
+      if (!(v.distinct >= least && v.all > 11 * factor)) return false;
+      return (!possible || v.person.evidence > 3 * factor) && (!broad_possible || v.broad.evidence > 3 * factor);
     };
     const auto suffices = [&](T factor) {
       return stands(with_H, factor) && !evidence.rests_on_lines(factor) &&

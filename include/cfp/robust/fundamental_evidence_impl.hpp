@@ -46,13 +46,16 @@ struct FundamentalEvidence {
       return cell_of(u) - column < width && cell_of(v) - row < height;
     }
   };
+
+  // A window in which something may move, and the evidence of the pairs beside it.
+  struct Beside {
+    T evidence;
+    Window window;
+  };
   struct Verdict {
-    T distinct;  // distinct pairs that F explains
-    T all;       // evidence of all pairs
-    // Least evidence beside a window in which something may move: a person who stands, and what is broad, as somebody
-    // close or several side by side; and these windows.
-    T beside_person = 0, beside_broad = 0;
-    Window person = {}, broad = {};
+    T distinct;            // distinct pairs that F explains
+    T all;                 // evidence of all pairs
+    Beside person, broad;  // least of evidence beside a person, and beside somebody close or several side by side
   };
 
   // The logarithm of a product, taken before it leaves the range of numbers.
@@ -95,7 +98,7 @@ struct FundamentalEvidence {
     T best[ranges];
     leave_out_loudest();
     const T all = nats(best);
-    Verdict out{distinct, all};
+    Verdict out = {distinct, all, {all, {}}, {all, {}}};
     find_windows(best, out);
     leave_out_loudest();
     out.all = nats(best);
@@ -141,19 +144,18 @@ struct FundamentalEvidence {
       for (std::size_t c = 0; c < cells; ++c)
         sums[r + 1][c + 1] = products[r][c].value() + sums[r][c + 1] + sums[r + 1][c] - sums[r][c];
     }
-    const auto least = [&](std::size_t width, std::size_t height, Window& window) {
-      T rest = out.all;
+    const auto find_least = [&](std::size_t width, std::size_t height, Beside& least) {
       for (std::size_t r = 0; r + height <= cells; ++r) {
         for (std::size_t c = 0; c + width <= cells; ++c) {
           const T inside = sums[r + height][c + width] - sums[r][c + width] - sums[r + height][c] + sums[r][c];
-          if (out.all - inside < rest) rest = out.all - inside, window = {c, r, width, height};
+          if (out.all - inside < least.evidence) least = {out.all - inside, {c, r, width, height}};
         }
       }
-      return rest;
     };
-    out.beside_person = least(5, cells, out.person);
+    find_least(5, cells, out.person);
+    find_least(10, 6, out.broad);
     // One of the many broad windows holds most of little evidence by chance.
-    out.beside_broad = least(10, 6, out.broad) + (std::max)(T(16) - out.all / 5, T(0));
+    out.broad.evidence += (std::max)(T(16) - out.all / 5, T(0));
   }
 
   void leave_out_loudest() noexcept {
