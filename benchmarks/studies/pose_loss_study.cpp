@@ -70,6 +70,32 @@ std::vector<Schedule> schedules() {
   return list;
 }
 
+// Shares in per cent of all problems with n observations.
+void print_few(int n, double stereo_share, int problems) {
+  std::printf("  n %2d%s", n, stereo_share > 0 ? ", depths |" : "         |");
+  cfp::PoseWorkspace<double> workspace;
+  for (const int rows : {6, 8, 10, 12, 14}) {
+    int wrong = 0, refused = 0;
+    for (int i = 0; i < problems; ++i) {
+      cfp_test::PoseSceneOptions scene_options;
+      scene_options.points = n, scene_options.stereo_share = stereo_share, scene_options.outlier_share = i % 10 * 0.1;
+      const auto scene = cfp_test::make_pose_scene<double>(static_cast<std::uint64_t>(i), scene_options);
+      const auto refine = [&](int min_inlier_rows) {
+        cfp::PoseOptions options;
+        options.min_inlier_rows = min_inlier_rows;
+        return cfp::refine_pose(scene.observations(), scene.camera, scene.start, options, workspace);
+      };
+      const cfp::PoseResult any = refine(6), result = refine(rows);
+      if (!cfp::is_solved(any.status)) continue;
+      const cfp::Vector6<double> error = cfp::se3_log(any.T_cam_world * scene.truth.inverse());
+      const bool is_wrong = !(error.dot(any.information * error) <= 60), answered = cfp::is_solved(result.status);
+      wrong += is_wrong && answered ? 1 : 0, refused += !is_wrong && !answered ? 1 : 0;
+    }
+    std::printf(" %5.1f / %4.1f |", 100.0 * wrong / problems, 100.0 * refused / problems);
+  }
+  std::printf("\n");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -116,4 +142,9 @@ int main(int argc, char** argv) {
     }
     std::printf("\n");
   }
+  std::printf(
+      "\nwrong / right but refused (%%), by rows asked for\n         rows |      6       |      8       |      10      "
+      "|      12      |      14\n");
+  for (const double stereo_share : {0.0, 1.0})
+    for (const int n : {3, 4, 5, 6, 8, 10, 15, 20, 30, 60}) print_few(n, stereo_share, 10 * problems);
 }

@@ -74,6 +74,7 @@ void pose(FuzzInput& in) {
   cfp_fuzz::disturb(in, options,
                     {&options.chi2_mono, &options.chi2_stereo, &options.rounds[0].scale, &options.rounds[1].scale,
                      &options.min_decrease, &options.handover_decrease});
+  options.min_inlier_rows = 6 + static_cast<int>(in.count(12));
   const cfp::PoseResult result = cfp::refine_pose(observations, camera, start, options, workspace);
   if (result.status == cfp::SolverStatus::invalid_input) return;
   CFP_PROMISE(result.used + result.zero_weight + result.invalid == static_cast<int>(seen.points.size()));

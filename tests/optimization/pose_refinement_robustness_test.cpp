@@ -79,6 +79,33 @@ TEMPLATE_TEST_CASE("Pose refinement: three observations suffice", "[optimization
   CHECK(found >= 15);  // the rest: near the danger cylinder, or another of P3P's solutions
 }
 
+TEST_CASE("Pose refinement: where observations disagree, more must agree than fit any pose", "[optimization]") {
+  const double with_depth = GENERATE(0.0, 1.0);
+  PoseSceneOptions scene_options;
+  scene_options.start_m = 0.015, scene_options.start_deg = 0.5, scene_options.stereo_share = with_depth;
+  const auto count_wrong = [&](int min_inlier_rows, int& solved) {
+    cfp::PoseOptions options;
+    options.min_inlier_rows = min_inlier_rows;
+    cfp::PoseWorkspace<double> workspace;
+    int wrong = 0;
+    for (std::uint64_t seed = 0; seed < 200; ++seed) {
+      for (const int points : {4, 6, 10, 20}) {
+        scene_options.points = points, scene_options.outlier_share = 0.7;
+        const auto scene = make_pose_scene<double>(seed, scene_options);
+        const auto result = cfp::refine_pose(scene.observations(), scene.camera, scene.start, options, workspace);
+        if (!cfp::is_solved(result.status)) continue;
+        ++solved;
+        wrong += centre_distance(result.T_cam_world, scene.truth) > 0.2 ? 1 : 0;
+      }
+    }
+    return wrong;
+  };
+  int before = 0, now = 0;
+  CHECK(count_wrong(6, before) >= (with_depth > 0 ? 15 : 150));
+  CHECK(count_wrong(10, now) <= 4);
+  CHECK(now >= 100);  // most poses of six true observations of twenty
+}
+
 TEMPLATE_TEST_CASE("Pose refinement: collinear and coincident points are degenerate", "[optimization]", float, double) {
   for (const bool coincident : {false, true}) {
     for (std::uint64_t seed = 0; seed < 100; ++seed) {
@@ -270,6 +297,7 @@ TEST_CASE("Pose refinement: options outside their range are named", "[optimizati
   CHECK(named([](auto& o) { o.chi2_mono = 0; }) == "chi2_mono");
   CHECK(named([](auto& o) { o.chi2_stereo = std::nan(""); }) == "chi2_stereo");
   CHECK(named([](auto& o) { o.min_observations = 2; }) == "min_observations");
+  CHECK(named([](auto& o) { o.min_inlier_rows = 5; }) == "min_inlier_rows");
   CHECK(named([](auto& o) { o.round_count = 0; }) == "round_count");
   CHECK(named([](auto& o) { o.round_count = 5; }) == "round_count");
   CHECK(named([](auto& o) { o.rounds[1].loss = static_cast<cfp::LossType>(9); }) == "rounds.loss");

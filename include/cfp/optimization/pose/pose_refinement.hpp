@@ -54,10 +54,12 @@ template <typename Scalar, typename Input, typename Camera>
   detail::NormalEquations<6> equations;
   result.status = detail::run_rounds(model, start, result, pose, equations);
   result.evaluations = model.evaluations;
-  double counted = 0;
+  detail::PoseInliers agreed;
   if (is_solved(result.status)) {
-    counted = detail::count_inliers(options, model.columns, result, inliers);
-    if (result.inliers < options.min_observations) result.status = SolverStatus::not_enough_inliers;
+    agreed = detail::count_inliers(options, model.columns, result, inliers);
+    const int needed_rows = result.inliers < result.used ? options.min_inlier_rows : 6;
+    if (result.inliers < options.min_observations || agreed.rows < needed_rows)
+      result.status = SolverStatus::not_enough_inliers;
   }
   if (!is_solved(result.status)) {
     for (char& inlier : inliers) inlier = 0;
@@ -65,7 +67,7 @@ template <typename Scalar, typename Input, typename Camera>
     return result;
   }
   result.T_cam_world = {pose.rotation, pose.translation - pose.rotation * centre};
-  const double scale = model.influence > 0 ? counted / model.influence : 1.0;
+  const double scale = model.influence > 0 ? agreed.weight / model.influence : 1.0;
   const Matrix6<double> H = equations.H.selfadjointView<Eigen::Upper>();
   result.information = H * model.columns.mean_weight * scale;
   return result;

@@ -75,20 +75,26 @@ int keep_inliers(const PoseOptions& options, PoseColumns<Scalar>& columns, bool&
   return count;
 }
 
-/// Counts and marks the inliers by the stored errors, and sums their w s; returns the sum of their weights in the last
-/// round.
+struct PoseInliers {
+  int rows = 0;       // two of a pixel, three with a depth
+  double weight = 0;  // in the last round
+};
+
+/// Counts and marks the inliers by the stored errors, and sums their w s.
 template <typename Scalar>
-double count_inliers(const PoseOptions& options, const PoseColumns<Scalar>& columns, PoseResult& result,
-                     span<char> inliers) noexcept {
-  double active = 0, chi2_sum = 0;
+PoseInliers count_inliers(const PoseOptions& options, const PoseColumns<Scalar>& columns, PoseResult& result,
+                          span<char> inliers) noexcept {
+  PoseInliers out;
+  double chi2_sum = 0;
   for_each_observation(columns, options, [&](std::size_t i, bool inlier) {
     result.inliers += inlier ? 1 : 0;
+    out.rows += inlier ? (i < columns.stereo_begin ? 2 : 3) : 0;
     chi2_sum += inlier ? static_cast<double>(columns.weight[i] * columns.error[i]) : 0.0;
-    active += inlier ? static_cast<double>(columns.active[i]) : 0.0;
+    out.weight += inlier ? static_cast<double>(columns.active[i]) : 0.0;
     if (!inliers.empty()) inliers[columns.index[i]] = inlier ? 1 : 0;
   });
   result.chi2 = chi2_sum * columns.mean_weight;
-  return active;
+  return out;
 }
 
 /// When a round ends. Gauss-Newton until a step fails.
