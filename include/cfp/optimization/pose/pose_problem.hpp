@@ -49,10 +49,9 @@ struct PoseOptions {
   double chi2_mono = 5.991;    ///< outlier threshold on s of a pixel, 95 % of chi^2 with 2 degrees of freedom, > 0
   double chi2_stereo = 7.815;  ///< the same with a depth, 3 degrees of freedom, > 0
   int min_observations = 3;    ///< fewer usable observations, or inliers, leave the pose untouched, >= 3
-  /// Unless all observations agree, fewer rows of inliers (two of a pixel, three with a depth) leave the pose
-  /// untouched,
-  /// >= 6. Three pixels fit some pose whatever they show: of 4 to 60 observations with up to 90 % mismatches 45 to 6 %
-  /// were solved wrongly with 6, with 10 at most 1 % (cfp_pose_loss_study).
+  /// Unless all observations agree, fewer rows of inliers (two of a pixel, three with a depth) leave the pose as it
+  /// was, >= 6. Three pixels fit some pose whatever they show: of poses from 4 to 60 observations with up to 90 %
+  /// mismatches 6 to 45 % were solved and wrong with 6 rows, at most 1 % with 10 (cfp_pose_loss_study).
   int min_inlier_rows = 10;
   /// The rounds, in order. Default: Geman-McClure, so wide that most starts reach the minimum, until pixels move by
   /// half a sigma, then narrow to 0.1 sigma of the pose. Its error is 2 % to 4 % above least squares on the true

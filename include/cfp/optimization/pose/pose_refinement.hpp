@@ -57,9 +57,8 @@ template <typename Scalar, typename Input, typename Camera>
   detail::PoseInliers agreed;
   if (is_solved(result.status)) {
     agreed = detail::count_inliers(options, model.columns, result, inliers);
-    const int needed_rows = result.inliers < result.used ? options.min_inlier_rows : 6;
-    if (result.inliers < options.min_observations || agreed.rows < needed_rows)
-      result.status = SolverStatus::not_enough_inliers;
+    const bool untested = result.inliers < result.used && agreed.rows < options.min_inlier_rows;
+    if (untested || result.inliers < options.min_observations) result.status = SolverStatus::not_enough_inliers;
   }
   if (!is_solved(result.status)) {
     for (char& inlier : inliers) inlier = 0;
