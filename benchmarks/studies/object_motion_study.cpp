@@ -2,10 +2,14 @@
 // positions and the foreground bring over the paper's epipolar distance. Prints, for 0 and 15 % wrong depths, per way
 // of scoring: AUC; moving people missed at 5 % false alarms, over all and in the worst cell from 0.5 m/s on; static
 // people called moving (O <= O_Th) at each noise; share of the frames in which O is known.
+// "pairs one by one" leaves out what they share, "shared, 5 pairs" and "60 pairs" are other ObjectProbabilityOptions::
+// shift_pairs.
 // Then the same in a bare room, whose motion says little of a person who is near; "motion taken as exact" leaves its
 // covariance out; "a host's motion" is the true one with errors of 3 mm and 1 mrad, and these as its sigmas. Then with
 // 5, 15 and 30 % of the depths wrong by anything before furniture and walls, with
-// CameraMotionOptions::shared_depth_ratio and without. Then with one camera, no depths at all, in five kinds of scene
+// CameraMotionOptions::shared_depth_ratio and without. Then how soon somebody who sways counts as moving, and how often
+// somebody at rest does whom a rolling shutter, a lens or a focal length that nobody told displaces, by shift_pairs.
+// Then with one camera, no depths at all, in five kinds of scene
 // and at three frame rates: with the fundamental matrix alone, and with the motion up to scale where there is none.
 //   cfp_object_motion_study [N per cell, default 20] [seed, default 1] | --smoke
 //
@@ -51,6 +55,16 @@ struct Cell {
     return text;
   }
 };
+
+/// What the pairs of a frame share without having moved.
+struct Fault {
+  const char* name = "none";
+  double rolling_s = 0;    // from the first row to the last
+  double radial = 0;       // k1 of a lens that is taken for a pinhole
+  double focal_ratio = 1;  // of the camera to the one that is told
+};
+constexpr std::array<Fault, 4> faults = {
+    {{"none"}, {"rolling shutter 20 ms", 0.02}, {"k1 of 0.03", 0, 0.03}, {"focal length 1 % off", 0, 0, 1.01}}};
 
 struct Scene {
   std::vector<std::array<double, 2>> previous, current;
@@ -111,7 +125,7 @@ constexpr std::array<Room, 3> rooms_of_wrong_depths = {{{"a furnished room", 350
 
 /// One frame. `who` draws the camera's motion and the person, `random` the points and the noise.
 Scene simulate(const Cell& cell, const Room& room, double frame_s, double wrong_depths, cfp::Random& who,
-               cfp::Random& random) {
+               cfp::Random& random, const Fault& fault = faults[0]) {
   Scene scene;
   V3 velocity, turn;
   draw_camera(cell.camera, who, velocity, turn);
@@ -125,16 +139,26 @@ Scene simulate(const Cell& cell, const Room& room, double frame_s, double wrong_
   twist << -velocity * frame_s, -turn * frame_s;
   scene.T_cur_prev = cfp::se3_exp(twist);
   const cfp::DepthNoise depth_noise;
+  // Where the faulty camera sees a point that it would see at the pixel p with a global shutter.
+  const auto seen = [&](V2 p, const V3& X) {
+    const double late_s = (p.y() / 480 - 0.5) * fault.rolling_s;
+    if (fault.rolling_s > 0) (void)camera.project(cfp::se3_exp(cfp::Vector6<double>(late_s / frame_s * twist)) * X, p);
+    const V2 centre(camera.cx, camera.cy), from_centre = p - centre;
+    const double radius_sq = from_centre.squaredNorm() / (camera.fx * camera.fy);
+    return V2(centre + fault.focal_ratio * (1 + fault.radial * radius_sq) * from_centre);
+  };
   const auto add = [&](const V2& p, double z, const V3& step, double other_side) {
     V3 ray;
     V2 q;
     if (!camera.unproject(p, ray) || !camera.project(scene.T_cur_prev * V3(z * ray + step), q)) return;
     if (q.x() < 5 || q.y() < 5 || q.x() > 634 || q.y() > 474) return;
+    q = seen(q, scene.T_cur_prev * V3(z * ray + step));
+    const V2 before = seen(p, z * ray);
     q += noises[cell.noise] * V2(random.normal(), random.normal());
     if (random.uniform() < 0.04) q += V2(random.uniform(-6, 6), random.uniform(-6, 6));
     const bool is_wrong = random.uniform() < wrong_depths;
     const double measured = !is_wrong ? z : room.wrong_anywhere ? random.uniform(0.5, 8) : other_side;
-    scene.previous.push_back({p.x(), p.y()});
+    scene.previous.push_back({before.x(), before.y()});
     scene.current.push_back({q.x(), q.y()});
     scene.depths.push_back(measured + depth_noise.sigma_m(measured) * random.normal());
   };
@@ -174,7 +198,7 @@ struct Way {
 constexpr double host_error_m = 0.003, host_error_rad = 0.001;
 
 std::vector<Way> ways() {
-  std::vector<Way> all(10);
+  std::vector<Way> all(13);
   all[0].name = "as printed";
   all[1].name = "without depths";
   all[2].name = "depth";
@@ -185,6 +209,9 @@ std::vector<Way> ways() {
   all[7].name = "depth, motion taken as exact";
   all[8].name = "depth, a host's motion as exact";
   all[9].name = "depth, a host's motion";
+  all[10].name = "depth, pairs one by one";
+  all[11].name = "depth, shared, 5 pairs";
+  all[12].name = "depth, shared, 60 pairs";
   all[0].options.coarse.flow.use_motion_up_to_scale = false;
   all[0].options.coarse.flow.use_depth = all[1].options.coarse.flow.use_depth = false;
   all[0].options.coarse.object.noise_factor = all[4].options.coarse.object.noise_factor = 0;
@@ -194,6 +221,9 @@ std::vector<Way> ways() {
   all[7].given = Given::pairs_as_exact;
   all[8].given = Given::prediction_as_exact;
   all[9].given = Given::prediction;
+  all[10].options.coarse.object.shift_pairs = 0;
+  all[11].options.coarse.object.shift_pairs = 5;
+  all[12].options.coarse.object.shift_pairs = 60;
   return all;
 }
 
@@ -334,6 +364,46 @@ void follow(const char* name, const cfp::FrameOptions& options, const Room& room
               percent(resting_static, resting), percent(caught, boxes));
 }
 
+/// Share of the people who sway across at this speed and count as moving, over all cameras and noises.
+double called_moving(double speed, const Fault& fault, double shift_pairs, int repetitions, std::uint64_t seed) {
+  cfp::Random random(seed, "sway");
+  cfp::FrameOptions options;
+  options.coarse.object.shift_pairs = shift_pairs;
+  cfp::FrameState<double> state;
+  int moving = 0, all = 0;
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    for (std::size_t n = 0; n < noises.size(); ++n) {
+      for (int i = 0; i < 4 * repetitions; ++i, ++all) {
+        const Scene scene = simulate({c, 1, n, speed}, rooms[0], 1 / 30.0, 0.05, random, random, fault);
+        cfp::Frame<double> frame;
+        frame.flow = {scene.previous, scene.current, scene.depths};
+        state.boxes.resize(1);
+        state.boxes[0].box = scene.box;
+        estimate_objects(frame, camera, options, state);
+        moving += state.objects[0].static_probability <= options.object_threshold ? 1 : 0;
+      }
+    }
+  }
+  return 100.0 * moving / all;
+}
+
+void print_shared(int repetitions, std::uint64_t seed) {
+  constexpr std::array<double, 5> pairs = {0, 5, 15, 30, 60};
+  std::printf("\na furnished room, 5 %% wrong depths: called moving (%%), by shift_pairs\n%-34s", "");
+  for (const double p : pairs) std::printf("%8.0f", p);
+  const auto row = [&](const char* name, double speed, const Fault& fault) {
+    std::printf("\n%-34s", name);
+    for (const double p : pairs) std::printf("%8.1f", called_moving(speed, fault, p, repetitions, seed));
+  };
+  for (const Fault& fault : faults) row((std::string("at rest, fault: ") + fault.name).c_str(), 0, fault);
+  for (const double speed : {0.02, 0.05, 0.1, 0.2, 0.5}) {
+    char name[64];
+    std::snprintf(name, sizeof name, "across at %.2f m/s", speed);
+    row(name, speed, faults[0]);
+  }
+  std::printf("\n");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -380,6 +450,8 @@ int main(int argc, char** argv) {
       judge("  all depths take part", way, cells, room, 1 / 30.0, wrong_depths, repetitions, seed);
     }
   }
+
+  print_shared(repetitions, seed);
 
   print_head("one camera, no depths; then F alone; a host's motion");
   Way one_camera;

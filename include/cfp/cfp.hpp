@@ -47,6 +47,7 @@
 #include "cfp/frame/weigh_keypoints.hpp"
 #include "cfp/geometry/box.hpp"
 #include "cfp/geometry/camera.hpp"
+#include "cfp/geometry/common_shift.hpp"
 #include "cfp/geometry/depth_noise.hpp"
 #include "cfp/geometry/distance.hpp"
 #include "cfp/geometry/epipolar.hpp"

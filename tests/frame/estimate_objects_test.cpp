@@ -294,7 +294,7 @@ namespace {
 
 // Of a hundred scenes, which `fill` makes of random numbers, those in which the person in the box is called moving.
 template <typename Fill>
-int called_moving(const char* name, bool with_depths, const Fill& fill) {
+int called_moving(const char* name, bool with_depths, const Fill& fill, const cfp::FrameOptions& options = {}) {
   int moving = 0;
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     cfp::Random random(seed, name);
@@ -304,7 +304,7 @@ int called_moving(const char* name, bool with_depths, const Fill& fill) {
     FrameRun<double> run(scene);
     cfp::Frame<double> frame = run.frame();
     if (with_depths) frame.flow.previous_depths = scene.depths;
-    const cfp::FlowModelKind kind = run.coarse({}, frame, scene.camera).flow_model;
+    const cfp::FlowModelKind kind = run.coarse(options, frame, scene.camera).flow_model;
     CHECK(kind != cfp::FlowModelKind::none);
     CHECK((kind == cfp::FlowModelKind::motion) == with_depths);
     moving += run.state.objects[0].static_probability <= 0.9 ? 1 : 0;
@@ -313,6 +313,27 @@ int called_moving(const char* name, bool with_depths, const Fill& fill) {
 }
 
 }  // namespace
+
+TEST_CASE("Who moves by no more than the flow's noise moves by what the pairs share", "[frame]") {
+  const auto called = [](double person_motion_m, double shift_pairs) {
+    cfp::FrameOptions options;
+    options.coarse.object.shift_pairs = shift_pairs;
+    return called_moving(
+        "together", true,
+        [&](DynamicScene<double>& scene, cfp::Random& random) {
+          scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.005, 0.002, 0.004, 0.001, -0.002, 0.001));
+          for (int k = 0; k < 300; ++k)
+            add_pair(scene, {random.uniform(20, 620), random.uniform(20, 460)}, random.uniform(2.5, 5), 0, 0.4, random);
+          for (int k = 0; k < 60; ++k)
+            add_pair(scene, {random.uniform(270, 370), random.uniform(120, 420)}, random.uniform(1.95, 2.05),
+                     person_motion_m, 0.4, random);
+        },
+        options);
+  };
+  CHECK(called(0, 15) <= 4);
+  CHECK(called(0.0025, 0) <= 35);  // 0.7 px
+  CHECK(called(0.0025, 15) >= 92);
+}
 
 TEST_CASE("The motion that a far, bare wall gives does not make a near person at rest move", "[frame]") {
   const auto called = [](double person_motion_m) {

@@ -71,6 +71,7 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
                        &flow.ransac.threshold_px,
                        &object.sigma_px,
                        &object.noise_factor,
+                       &object.shift_pairs,
                        &object.unknown_object_probability,
                        &fine.min_pose_inliers,
                        &fine.min_translation_m,

@@ -151,7 +151,8 @@ template <typename Scalar>
 
 inline namespace CFP_ISA {
 
-/// Sets state.objects: O of every box from the flow pairs whose current point lies in it. Without flow, without a model
+/// Sets state.objects: O of every box from the flow pairs whose current point lies in it, one by one and, where depths
+/// are known, together: the lower of the two. Without flow, without a model
 /// or with too few pairs in the box, O is unknown and counts as unknown_object_probability.
 template <typename Scalar, typename Camera>
 void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const FrameOptions& options,
@@ -187,12 +188,19 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     // What lies behind an object says nothing of it, and a pair on its silhouette may have either depth.
     scratch.samples.clear();
+    scratch.members.clear();
     for (std::size_t i = 0; i < n; ++i) {
-      if (scratch.pair_label[b * n + i] == KeypointLabel::foreground)
-        scratch.samples.push_back(state.flow_distances[i]);
+      if (scratch.pair_label[b * n + i] != KeypointLabel::foreground) continue;
+      scratch.samples.push_back(state.flow_distances[i]);
+      scratch.members.push_back(static_cast<std::int32_t>(i));
     }
-    state.objects[b] = object_probability(scratch.samples, scored, scratch.scratch);
-    if (state.objects[b].status == Status::ok) --report.unknown_objects;
+    ObjectProbability& object = state.objects[b];
+    object = object_probability(scratch.samples, scored, scratch.scratch);
+    if (object.status != Status::ok) continue;
+    --report.unknown_objects;
+    if (!(scored.shift_pairs > 0)) continue;
+    const double shift = flow_shift(model, flow, scratch.members, pinhole, coarse.flow, scored.shift_pairs);
+    object.static_probability = (std::min)(object.static_probability, shift_probability(shift));
   }
 }
 

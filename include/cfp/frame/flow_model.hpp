@@ -10,6 +10,7 @@
 #include "cfp/core/span.hpp"
 #include "cfp/frame/camera_motion.hpp"
 #include "cfp/geometry/camera.hpp"
+#include "cfp/geometry/common_shift.hpp"
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/robust/fundamental_ransac.hpp"
 
@@ -77,6 +78,11 @@ inline namespace CFP_ISA {
 /// How many coordinates of a pixel the distances see: across a line one of two.
 [[nodiscard]] constexpr int coordinates_of(FlowModelKind kind) noexcept {
   return kind == FlowModelKind::fundamental ? 1 : 2;
+}
+
+template <typename Scalar>
+[[nodiscard]] Scalar noise_of(const FlowModel<Scalar>& model, const FlowModelOptions& options) noexcept {
+  return model.sigma_px > Scalar(0) ? model.sigma_px : Scalar(options.motion.min_sigma_px);
 }
 
 /// The camera's motion as a model of the given kind; none where it is not known.
@@ -158,8 +164,18 @@ void flow_distances(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flo
     distance.unknown_depth = options.nearer_than_room;
     depths = {};
   }
-  const Scalar sigma_px = model.sigma_px > Scalar(0) ? model.sigma_px : Scalar(options.motion.min_sigma_px);
-  motion_distances(flow.previous, depths, flow.current, model.motion, camera, sigma_px, distance, out);
+  motion_distances(flow.previous, depths, flow.current, model.motion, camera, detail::noise_of(model, options),
+                   distance, out);
+}
+
+/// What the pairs `members` share beyond the camera's motion (common_shift); 0 where depths are not known.
+template <typename Scalar>
+[[nodiscard]] double flow_shift(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow,
+                                span<const std::int32_t> members, const PinholeCamera<Scalar>& camera,
+                                const FlowModelOptions& options, double most_pairs) noexcept {
+  if (model.kind != FlowModelKind::motion) return 0;
+  return common_shift(flow.previous, flow.previous_depths, flow.current, members, model.motion, camera,
+                      detail::noise_of(model, options), options.motion.distance, most_pairs);
 }
 
 /// What the pairs of the undistorted image are judged by, from those that `outside` marks as on no object: the

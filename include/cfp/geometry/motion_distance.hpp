@@ -30,6 +30,92 @@ inline namespace CFP_ISA {
   return nested("unknown_depth", invalid_field(o.unknown_depth));
 }
 
+}  // namespace CFP_ISA
+
+namespace detail {
+
+/// A flow pair against the camera's motion.
+template <typename Scalar>
+struct MotionResidual {
+  Vector2<Scalar> r;      // pixel_cur - project(p), px
+  Vector2<Scalar> along;  // J = d project / d z, px/m
+  Scalar sigma_z;         // of the depth, m
+  Scalar M[2][6];         // d project / d xi
+};
+
+inline namespace CFP_ISA {
+
+/// False for a pixel without a ray or a point behind the current camera.
+template <typename Camera, typename Scalar>
+[[nodiscard]] bool motion_residual(const Vector2<Scalar>& pixel_prev, const Scalar& depth_prev,
+                                   const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
+                                   const Camera& camera, const MotionDistanceOptions& options,
+                                   MotionResidual<Scalar>& out) noexcept {
+  Vector3<Scalar> ray;
+  if (!camera.unproject(pixel_prev, ray)) return false;
+  const bool measured = is_valid_depth(depth_prev);
+  const Scalar z = measured ? depth_prev : Scalar(1 / options.unknown_depth.inverse_mean);
+  out.sigma_z = measured ? Scalar(options.depth_noise.sigma_m(static_cast<double>(z)))
+                         : z * z * Scalar(options.unknown_depth.inverse_sigma);
+  const Vector3<Scalar> turned = T_cur_prev.rotation * ray, point = turned * z + T_cur_prev.translation;
+  Vector2<Scalar> projected;
+  Matrix23<Scalar> jacobian;
+  if (!camera.project(point, projected, &jacobian)) return false;
+  out.r = pixel_cur - projected;
+  out.along = jacobian * turned;
+  // The rows of the Jacobian, and what turning the point about the camera makes of them.
+  for (int row = 0; row < 2; ++row) {
+    const Vector3<Scalar> by_point(jacobian(row, 0), jacobian(row, 1), jacobian(row, 2)),
+        turning = cross(point, by_point);
+    for (int i = 0; i < 3; ++i) out.M[row][i] = by_point[i], out.M[row][i + 3] = turning[i];
+  }
+  return true;
+}
+
+/// sigma sqrt(r^T (sigma^2 I + sigma_z^2 J J^T + M C M^T)^-1 r); no covariance: an exact motion.
+template <typename Scalar>
+[[nodiscard]] Scalar distance_of(const MotionResidual<Scalar>& pair,
+                                 const Eigen::Matrix<Scalar, 6, 6, Eigen::DontAlign>* covariance,
+                                 const Scalar& sigma_px) noexcept {
+  using std::sqrt;
+  // W = I + M C M^T / sigma^2, and its inverse.
+  Scalar a = Scalar(1), b = Scalar(0), c = Scalar(1);
+  if (covariance != nullptr) {
+    const Scalar per_variance = Scalar(1) / (sigma_px * sigma_px);
+    Scalar C_M[2][6];
+    for (int row = 0; row < 2; ++row) {
+      for (int k = 0; k < 6; ++k) {
+        C_M[row][k] = Scalar(0);
+        for (int i = 0; i < 6; ++i) C_M[row][k] += pair.M[row][i] * (*covariance)(i, k);
+      }
+    }
+    a = b = c = Scalar(0);
+    for (int k = 0; k < 6; ++k) {
+      a += C_M[0][k] * pair.M[0][k];
+      b += C_M[0][k] * pair.M[1][k];
+      c += C_M[1][k] * pair.M[1][k];
+    }
+    a = Scalar(1) + per_variance * a, b = per_variance * b, c = Scalar(1) + per_variance * c;
+  }
+  const Scalar det = a * c - b * b;
+  const auto times_inverse = [&](const Vector2<Scalar>& v) {
+    return Vector2<Scalar>((c * v[0] - b * v[1]) / det, (a * v[1] - b * v[0]) / det);
+  };
+  // Sherman and Morrison: the inverse of W + kappa J J^T takes r its part along J but for 1 / (1 + kappa J^T W^-1 J).
+  const Vector2<Scalar> along_w = times_inverse(pair.along);
+  const Scalar spread = pair.sigma_z / sigma_px, kappa = spread * spread;
+  const Scalar explained = pair.r.dot(along_w), length_sq = pair.along.dot(along_w);
+  const Scalar distance_sq =
+      pair.r.dot(times_inverse(pair.r)) - explained * explained * (kappa / (Scalar(1) + kappa * length_sq));
+  const Scalar distance = sqrt(distance_sq > Scalar(0) ? distance_sq : Scalar(0));
+  return has_distance(distance) && is_finite(distance_sq) ? distance : Scalar(no_distance<double>);
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
+
+inline namespace CFP_ISA {
+
 /// d = sigma sqrt(r^T (sigma^2 I + sigma_z^2 J J^T + M C M^T)^-1 r), in pixels, with r = pixel_cur - project(p), p =
 /// T_cur_prev X, X the previous pixel at its depth z, J = d project / d z, M = d project / d xi and C the motion's
 /// covariance: the Mahalanobis distance of the pair, times sigma_px, so that (d / sigma)^2 has two degrees of freedom.
@@ -45,51 +131,10 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
                                      const UncertainMotion<non_deduced<Scalar>>& motion, const Camera& camera,
                                      const non_deduced<Scalar>& sigma_px,
                                      const MotionDistanceOptions& options) noexcept {
-  using std::sqrt;
-  const Scalar none = Scalar(no_distance<double>);
-  Vector3<Scalar> ray;
-  if (!camera.unproject(pixel_prev, ray)) return none;
-  const bool measured = is_valid_depth(depth_prev);
-  const Scalar z = measured ? depth_prev : Scalar(1 / options.unknown_depth.inverse_mean);
-  const Scalar sigma_z = measured ? Scalar(options.depth_noise.sigma_m(static_cast<double>(z)))
-                                  : z * z * Scalar(options.unknown_depth.inverse_sigma);
-  const Vector3<Scalar> turned = motion.T_cur_prev.rotation * ray, point = turned * z + motion.T_cur_prev.translation;
-  Vector2<Scalar> projected;
-  Matrix23<Scalar> jacobian;
-  if (!camera.project(point, projected, &jacobian)) return none;
-  const Vector2<Scalar> r = pixel_cur - projected, along = jacobian * turned;
-  // M = d project / d xi: the rows of the Jacobian, and what turning the point about the camera makes of them.
-  Scalar M[2][6], MC[2][6];
-  for (int row = 0; row < 2; ++row) {
-    const Vector3<Scalar> by_point(jacobian(row, 0), jacobian(row, 1), jacobian(row, 2)),
-        turning = cross(point, by_point);
-    for (int i = 0; i < 3; ++i) M[row][i] = by_point[i], M[row][i + 3] = turning[i];
-    for (int k = 0; k < 6; ++k) {
-      MC[row][k] = Scalar(0);
-      for (int i = 0; i < 6; ++i) MC[row][k] += M[row][i] * motion.covariance(i, k);
-    }
-  }
-  // W = I + M C M^T / sigma^2, and its inverse.
-  const Scalar per_variance = Scalar(1) / (sigma_px * sigma_px);
-  Scalar a = Scalar(0), b = Scalar(0), c = Scalar(0);
-  for (int k = 0; k < 6; ++k) {
-    a += MC[0][k] * M[0][k];
-    b += MC[0][k] * M[1][k];
-    c += MC[1][k] * M[1][k];
-  }
-  a = Scalar(1) + per_variance * a, b = per_variance * b, c = Scalar(1) + per_variance * c;
-  const Scalar det = a * c - b * b;
-  const auto times_inverse = [&](const Vector2<Scalar>& v) {
-    return Vector2<Scalar>((c * v[0] - b * v[1]) / det, (a * v[1] - b * v[0]) / det);
-  };
-  // Sherman and Morrison: the inverse of W + kappa J J^T takes r its part along J but for 1 / (1 + kappa J^T W^-1 J).
-  const Vector2<Scalar> along_w = times_inverse(along);
-  const Scalar spread = sigma_z / sigma_px, kappa = spread * spread;
-  const Scalar explained = r.dot(along_w), length_sq = along.dot(along_w);
-  const Scalar distance_sq =
-      r.dot(times_inverse(r)) - explained * explained * (kappa / (Scalar(1) + kappa * length_sq));
-  const Scalar distance = sqrt(distance_sq > Scalar(0) ? distance_sq : Scalar(0));
-  return has_distance(distance) && is_finite(distance_sq) ? distance : none;
+  detail::MotionResidual<Scalar> pair;
+  const bool seen = detail::motion_residual<Camera, Scalar>(pixel_prev, depth_prev, pixel_cur, motion.T_cur_prev,
+                                                            camera, options, pair);
+  return seen ? detail::distance_of(pair, &motion.covariance, sigma_px) : Scalar(no_distance<double>);
 }
 
 /// motion_distance of every pair. `depths_prev` may be empty: none is known. Sizes must agree. Allocates nothing.
@@ -100,9 +145,13 @@ void motion_distances(const PointSpan<non_deduced<Scalar>, 2>& prev, span<const 
                       span<non_deduced<Scalar>> out) noexcept {
   CFP_ASSERT(prev.size() == out.size() && cur.size() == out.size());
   CFP_ASSERT(detail::fits(out.size(), depths_prev));
+  const auto* covariance = motion.covariance.isZero(0) ? nullptr : &motion.covariance;
   for (std::size_t i = 0; i < out.size(); ++i) {
     const Scalar depth = depths_prev.empty() ? Scalar(0) : depths_prev[i];
-    out[i] = motion_distance(prev[i], depth, cur[i], motion, camera, sigma_px, options);
+    detail::MotionResidual<Scalar> pair;
+    const bool seen =
+        detail::motion_residual<Camera, Scalar>(prev[i], depth, cur[i], motion.T_cur_prev, camera, options, pair);
+    out[i] = seen ? detail::distance_of(pair, covariance, sigma_px) : Scalar(no_distance<double>);
   }
 }
 

@@ -1,0 +1,104 @@
+/// @file common_shift.hpp
+/// Whether flow pairs have moved together: each of them may lie within the noise, and what they share far outside of
+/// it. Not in the paper, whose O ranks the pairs one by one.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+#include "cfp/geometry/motion_distance.hpp"
+#include "cfp/math/normal_equations.hpp"
+#include "cfp/math/uncertain_motion.hpp"
+
+namespace cfp {
+
+namespace detail {
+inline namespace CFP_ISA {
+
+/// Sums of the pairs in units of the noise: H += w M^T W^-1 M, g -= w M^T W^-1 r, W of the noise and of the depth's
+/// error, w of a Geman-McClure loss at `moved`. Returns w, 0 of what is not finite.
+template <typename Scalar>
+double add_to_shift(const MotionResidual<Scalar>& pair, double sigma_px, const Vector6<double>& moved,
+                    NormalEquations<6>& sums) noexcept {
+  constexpr double loss_sq = 32;  // 4 sigma per coordinate
+  double r[2], e[2], j[2], M[2][6];
+  for (int q = 0; q < 2; ++q) {
+    e[q] = r[q] = static_cast<double>(pair.r[q]) / sigma_px;
+    j[q] = static_cast<double>(pair.along[q] * pair.sigma_z) / sigma_px;
+    for (int k = 0; k < 6; ++k) {
+      M[q][k] = static_cast<double>(pair.M[q][k]) / sigma_px;
+      e[q] -= M[q][k] * moved[k];
+    }
+  }
+  const double kept = 1 / (1 + j[0] * j[0] + j[1] * j[1]), explained = j[0] * e[0] + j[1] * e[1];
+  const double root = 1 / (1 + (e[0] * e[0] + e[1] * e[1] - explained * explained * kept) / loss_sq), w = root * root;
+  if (!is_finite(w)) return 0;
+  for (int a = 0; a < 6; ++a) {
+    const double share = (j[0] * M[0][a] + j[1] * M[1][a]) * kept;
+    const double m0 = w * (M[0][a] - j[0] * share), m1 = w * (M[1][a] - j[1] * share);
+    sums.g[a] -= m0 * r[0] + m1 * r[1];
+    for (int b = a; b < 6; ++b) sums.H(a, b) += m0 * M[0][b] + m1 * M[1][b];
+  }
+  return w;
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
+
+inline namespace CFP_ISA {
+
+/// How much better the pairs `members` are explained by one translation D of what they show than by a world at rest:
+/// D^T Cov(D)^-1 D of the D that fits best, chi-squared with three degrees of freedom at rest. With r, M, J and the
+/// motion's covariance C of motion_distance,
+///
+///   r_i = M_i (xi + (D, 0)) + J_i dz_i + noise,   xi ~ N(0, C) the same for all pairs, dz_i the error of a depth,
+///
+/// so that what the motion's error explains is no evidence, however many the pairs. A robust fit: mismatches take no
+/// part, and of a shift far beyond the noise little is left, which the pairs' distances tell. Neighbours share errors
+/// that are no noise (rolling shutter, lens, focal length): pairs count as `most_pairs` independent ones at most, > 0.
+/// 0 where nothing can be fitted. sigma_px > 0; depths may be empty. O(members), allocates nothing.
+template <typename Camera, typename Scalar = typename Camera::ScalarType>
+[[nodiscard]] double common_shift(const PointSpan<non_deduced<Scalar>, 2>& prev,
+                                  span<const non_deduced<Scalar>> depths_prev,
+                                  const PointSpan<non_deduced<Scalar>, 2>& cur, span<const std::int32_t> members,
+                                  const UncertainMotion<non_deduced<Scalar>>& motion, const Camera& camera,
+                                  non_deduced<Scalar> sigma_px, const MotionDistanceOptions& options,
+                                  double most_pairs) noexcept {
+  CFP_ASSERT(cur.size() == prev.size() && detail::fits(prev.size(), depths_prev));
+  constexpr int passes = 2;
+  // A micrometre and a microradian of error are none, and give every covariance an inverse.
+  Matrix6<double> covariance, information, inverse;
+  for (int k = 0; k < 36; ++k) covariance.data()[k] = static_cast<double>(motion.covariance.data()[k]);
+  for (int k = 0; k < 6; ++k) covariance(k, k) += 1e-12;
+  if (!invert_normal_equations<6>(covariance, 1e-14, information)) return 0;
+
+  double chi_squared = 0;
+  Vector6<double> moved = Vector6<double>::Zero();  // xi + (D, 0)
+  for (int pass = 0; pass < passes; ++pass) {
+    detail::NormalEquations<6> sums;
+    double count = 0;
+    for (const std::int32_t member : members) {
+      const auto i = static_cast<std::size_t>(member);
+      const Scalar depth = depths_prev.empty() ? Scalar(0) : depths_prev[i];
+      detail::MotionResidual<Scalar> pair;
+      if (detail::motion_residual<Camera, Scalar>(prev[i], depth, cur[i], motion.T_cur_prev, camera, options, pair))
+        count += detail::add_to_shift(pair, static_cast<double>(sigma_px), moved, sums);
+    }
+    const double share = count > most_pairs ? most_pairs / count : 1;
+    const Vector6<double> g = -share * sums.g;
+    const Matrix6<double> H = share * Matrix6<double>(sums.H.template selfadjointView<Eigen::Upper>());
+    if (!invert_normal_equations<6>(Matrix6<double>(H + information), 1e-14, inverse)) return 0;
+    // xi eliminated: S D = s with S = H - H (H + C^-1)^-1 H, without the difference.
+    const Vector6<double> s = information.lazyProduct(inverse.lazyProduct(g));
+    const Matrix6<double> S = information.lazyProduct(Matrix6<double>(inverse.lazyProduct(H)));
+    Eigen::Matrix<double, 3, 1> D;
+    if (!solve_normal_equations<3>(S.template topLeftCorner<3, 3>(), -s.template head<3>(), 0, 1e-14, D)) return 0;
+    chi_squared = D.dot(s.template head<3>());
+    moved = inverse.lazyProduct(Vector6<double>(g - H.template leftCols<3>().lazyProduct(D)));
+    moved.template head<3>() += D;
+  }
+  return (std::max)(chi_squared, 0.0);
+}
+
+}  // namespace CFP_ISA
+}  // namespace cfp
