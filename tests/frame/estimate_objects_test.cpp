@@ -64,6 +64,27 @@ TEST_CASE("The host's motion is taken as it is", "[frame]") {
   CHECK(other.state.objects[0].static_probability < objects[0].static_probability);
 }
 
+TEST_CASE("A motion that a host calls exact is not believed to a tenth of a pixel", "[frame]") {
+  cfp_test::DynamicSceneOptions standing;
+  standing.person_motion_m = 0;
+  const cfp::SE3<double> error = cfp::se3_exp(cfp::Vector6<double>(0.001, -0.001, 0.001, 0.0005, 0.0005, -0.0005));
+  for (const std::uint64_t seed : {61U, 62U, 63U}) {
+    const DynamicScene<double> scene = make_dynamic_scene<double>(standing, seed);
+    cfp::FrameOptions options;
+    const auto judged = [&](double shift_pairs) {
+      options.coarse.object.shift_pairs = shift_pairs;
+      FrameRun<double> run(scene);
+      cfp::Frame<double> frame = run.frame();
+      frame.flow.previous_depths = scene.previous_depths;
+      frame.T_cur_prev = {error * scene.T_cur_prev, 0, 0};
+      run.coarse(options, frame, scene.camera);
+      return run.state.objects[0].static_probability;
+    };
+    CHECK(judged(15) == judged(0));
+    CHECK(judged(15) > options.object_threshold);
+  }
+}
+
 TEST_CASE("A host's motion that errs as it says makes nobody who stands move", "[frame]") {
   cfp_test::DynamicSceneOptions standing;
   standing.person_motion_m = 0;

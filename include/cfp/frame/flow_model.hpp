@@ -168,12 +168,13 @@ void flow_distances(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flo
                    distance, out);
 }
 
-/// What the pairs `members` share beyond the camera's motion (common_shift); 0 where depths are not known.
+/// What the pairs `members` share beyond the camera's motion and its error (common_shift); 0 where depths are not
+/// known, and under a motion that a host calls exact: its error, which all pairs share, would be taken for theirs.
 template <typename Scalar>
 [[nodiscard]] double flow_shift(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow,
                                 span<const std::int32_t> members, const PinholeCamera<Scalar>& camera,
                                 const FlowModelOptions& options, double most_pairs) noexcept {
-  if (model.kind != FlowModelKind::motion) return 0;
+  if (model.kind != FlowModelKind::motion || model.motion.covariance.isZero(0)) return 0;
   return common_shift(flow.previous, flow.previous_depths, flow.current, members, model.motion, camera,
                       detail::noise_of(model, options), options.motion.distance, most_pairs);
 }

@@ -56,7 +56,7 @@ inline namespace CFP_ISA {
 /// so that what the motion's error explains is no evidence, however many the pairs. A robust fit: mismatches take no
 /// part, and of a shift far beyond the noise little is left, which the pairs' distances tell. Neighbours share errors
 /// that are no noise (rolling shutter, lens, focal length): pairs count as `most_pairs` independent ones at most, > 0.
-/// 0 where nothing can be fitted. sigma_px > 0; depths may be empty. O(members), allocates nothing.
+/// Pairs without a depth take no part; 0 where nothing can be fitted. sigma_px > 0. O(members), allocates nothing.
 template <typename Camera, typename Scalar = typename Camera::ScalarType>
 [[nodiscard]] double common_shift(const PointSpan<non_deduced<Scalar>, 2>& prev,
                                   span<const non_deduced<Scalar>> depths_prev,
@@ -70,7 +70,7 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
   Matrix6<double> covariance, information, inverse;
   for (int k = 0; k < 36; ++k) covariance.data()[k] = static_cast<double>(motion.covariance.data()[k]);
   for (int k = 0; k < 6; ++k) covariance(k, k) += 1e-12;
-  if (!invert_normal_equations<6>(covariance, 1e-14, information)) return 0;
+  if (depths_prev.empty() || !invert_normal_equations<6>(covariance, 1e-14, information)) return 0;
 
   double chi_squared = 0;
   Vector6<double> moved = Vector6<double>::Zero();  // xi + (D, 0)
@@ -79,9 +79,10 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
     double count = 0;
     for (const std::int32_t member : members) {
       const auto i = static_cast<std::size_t>(member);
-      const Scalar depth = depths_prev.empty() ? Scalar(0) : depths_prev[i];
+      const Scalar depth = depths_prev[i];
       detail::MotionResidual<Scalar> pair;
-      if (detail::motion_residual<Camera, Scalar>(prev[i], depth, cur[i], motion.T_cur_prev, camera, options, pair))
+      if (is_valid_depth(depth) &&
+          detail::motion_residual<Camera, Scalar>(prev[i], depth, cur[i], motion.T_cur_prev, camera, options, pair))
         count += detail::add_to_shift(pair, static_cast<double>(sigma_px), moved, sums);
     }
     const double share = count > most_pairs ? most_pairs / count : 1;
