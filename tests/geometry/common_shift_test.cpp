@@ -14,7 +14,7 @@ namespace {
 
 using V3 = cfp::Vector3<double>;
 
-const cfp::PinholeCamera<double> camera{535.4, 539.2, 320.1, 247.6};
+const cfp::PinholeCamera<double> pinhole{535.4, 539.2, 320.1, 247.6};
 constexpr double sigma_px = 0.3, every_pair = 1e9;
 
 /// Points of somebody about 2 m away, seen before and after.
@@ -25,8 +25,8 @@ struct Object {
 
   [[nodiscard]] double shift(const cfp::UncertainMotion<double>& motion, double most_pairs = every_pair) const {
     return cfp::common_shift(cfp::PointSpan<double, 2>(previous), cfp::span<const double>(depths),
-                             cfp::PointSpan<double, 2>(current), cfp::span<const std::int32_t>(members), motion, camera,
-                             sigma_px, cfp::MotionDistanceOptions(), most_pairs);
+                             cfp::PointSpan<double, 2>(current), cfp::span<const std::int32_t>(members), motion,
+                             pinhole, sigma_px, cfp::MotionDistanceOptions(), most_pairs);
   }
 };
 
@@ -37,8 +37,8 @@ Object make_object(const cfp::SE3<double>& T_cur_prev, const V3& step, int point
     const double z = random.uniform(1.9, 2.1);
     V3 ray;
     cfp::Vector2<double> q(0, 0);
-    (void)camera.unproject(p, ray);
-    (void)camera.project(T_cur_prev * V3(ray * z) + step, q);
+    (void)pinhole.unproject(p, ray);
+    (void)pinhole.project(T_cur_prev * V3(ray * z) + step, q);
     object.previous.push_back({p.x(), p.y()});
     object.current.push_back({q.x() + sigma_px * random.normal(), q.y() + sigma_px * random.normal()});
     object.depths.push_back(z + cfp::DepthNoise().sigma_m(z) * random.normal());
@@ -47,7 +47,7 @@ Object make_object(const cfp::SE3<double>& T_cur_prev, const V3& step, int point
   return object;
 }
 
-cfp::SE3<double> any_motion(cfp::Random& random, double metres = 0.02, double radians = 0.01) {
+cfp::SE3<double> drawn_motion(cfp::Random& random, double metres = 0.02, double radians = 0.01) {
   cfp::Vector6<double> xi;
   for (int i = 0; i < 6; ++i) xi[i] = (i < 3 ? metres : radians) * random.normal();
   return cfp::se3_exp(xi);
@@ -62,10 +62,10 @@ TEST_CASE("The common shift of what is at rest has three degrees of freedom", "[
   int above = 0;
   constexpr int runs = 2000;
   for (int i = 0; i < runs; ++i) {
-    const cfp::SE3<double> T = any_motion(random);
+    const cfp::SE3<double> T = drawn_motion(random);
     const Object object = make_object(T, V3::Zero(), 40, random);
     // The motion errs as its covariance says: by much more than the mean of forty pairs.
-    const double shift = object.shift({any_motion(random, error_m, error_rad) * T, error_m, error_rad});
+    const double shift = object.shift({drawn_motion(random, error_m, error_rad) * T, error_m, error_rad});
     sum += shift;
     above += cfp::chi_squared_survival(shift, 3) < 0.05 ? 1 : 0;
   }
@@ -77,7 +77,7 @@ TEST_CASE("The common shift of what is at rest has three degrees of freedom", "[
 TEST_CASE("A motion that errs by more than it says is taken for a shift", "[geometry][common_shift]") {
   cfp::Random random(2, "exact");
   for (int i = 0; i < 100; ++i) {
-    const cfp::SE3<double> T = any_motion(random);
+    const cfp::SE3<double> T = drawn_motion(random);
     const Object object = make_object(T, V3::Zero(), 40, random);
     const cfp::SE3<double> wrong{T.rotation, T.translation + V3(0.004, 0, 0)};
     CHECK(object.shift(cfp::UncertainMotion<double>(wrong)) > 3 * object.shift({wrong, 0.004, 0.0}));
@@ -89,7 +89,7 @@ TEST_CASE("What moves together by less than its noise is found, along the axis, 
   const V3 step = GENERATE(V3(0.0011, 0, 0), V3(0, -0.0011, 0), V3(0, 0, 0.012));  // 0.3 px, on average
   int found = 0;
   for (int i = 0; i < 200; ++i) {
-    const cfp::SE3<double> T = any_motion(random);
+    const cfp::SE3<double> T = drawn_motion(random);
     const Object object = make_object(T, step, 60, random);
     found += object.shift(cfp::UncertainMotion<double>(T)) > 11.3 ? 1 : 0;  // 1 % at rest
   }
@@ -100,7 +100,7 @@ TEST_CASE("A quarter of mismatches neither makes nor hides a common shift", "[ge
   cfp::Random random(4, "mismatches");
   int at_rest = 0, moving = 0;
   for (int i = 0; i < 200; ++i) {
-    const cfp::SE3<double> T = any_motion(random);
+    const cfp::SE3<double> T = drawn_motion(random);
     for (const bool moves : {false, true}) {
       Object object = make_object(T, moves ? V3(0.003, 0, 0) : V3::Zero(), 60, random);
       for (std::size_t k = 0; k < 15; ++k) object.current[k] = {random.uniform(200, 450), random.uniform(30, 470)};
@@ -113,7 +113,7 @@ TEST_CASE("A quarter of mismatches neither makes nor hides a common shift", "[ge
 
 TEST_CASE("Pairs count as so many independent ones at most", "[geometry][common_shift]") {
   cfp::Random random(5, "most");
-  const cfp::UncertainMotion<double> motion(any_motion(random));
+  const cfp::UncertainMotion<double> motion(drawn_motion(random));
   const Object object = make_object(motion.T_cur_prev, V3(0.002, 0, 0), 60, random);
   const double all = object.shift(motion), fifteen = object.shift(motion, 15), five = object.shift(motion, 5);
   CHECK(all > 3 * fifteen);
@@ -122,7 +122,7 @@ TEST_CASE("Pairs count as so many independent ones at most", "[geometry][common_
 
 TEST_CASE("A common shift of nothing is none, and never NaN", "[geometry][common_shift]") {
   cfp::Random random(6, "nothing");
-  const cfp::UncertainMotion<double> motion(any_motion(random));
+  const cfp::UncertainMotion<double> motion(drawn_motion(random));
   CHECK(Object().shift(motion) == 0);
   const double bad = GENERATE(std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e300);
   const Object good = make_object(motion.T_cur_prev, V3(0.002, 0, 0), 30, random);
@@ -143,7 +143,7 @@ TEST_CASE("A common shift of nothing is none, and never NaN", "[geometry][common
 
 TEST_CASE("Pairs without a depth take no part in a common shift", "[geometry][common_shift]") {
   cfp::Random random(7, "unknown");
-  const cfp::UncertainMotion<double> motion(any_motion(random));
+  const cfp::UncertainMotion<double> motion(drawn_motion(random));
   Object object = make_object(motion.T_cur_prev, V3(0.004, 0, 0), 60, random), half = object;
   for (std::size_t i = 30; i < 60; ++i) object.depths[i] = i % 2 == 0 ? -1 : std::numeric_limits<double>::quiet_NaN();
   half.members.resize(30);
@@ -155,7 +155,7 @@ TEST_CASE("Pairs without a depth take no part in a common shift", "[geometry][co
 
 TEST_CASE("The common shift allocates nothing, and float sees what double sees", "[geometry][common_shift]") {
   cfp::Random random(8, "float");
-  const cfp::UncertainMotion<double> motion(any_motion(random), 0.001, 0.0002);
+  const cfp::UncertainMotion<double> motion(drawn_motion(random), 0.001, 0.0002);
   const Object object = make_object(motion.T_cur_prev, V3(0.002, 0, 0), 60, random);
   std::vector<std::array<float, 2>> previous, current;
   for (std::size_t i = 0; i < object.previous.size(); ++i) {
@@ -169,7 +169,7 @@ TEST_CASE("The common shift allocates nothing, and float sees what double sees",
   const double shift =
       cfp::common_shift(cfp::PointSpan<float, 2>(previous), cfp::span<const float>(depths),
                         cfp::PointSpan<float, 2>(current), cfp::span<const std::int32_t>(object.members),
-                        motion.cast<float>(), camera.cast<float>(), 0.3F, cfp::MotionDistanceOptions(), 15);
+                        motion.cast<float>(), pinhole.cast<float>(), 0.3F, cfp::MotionDistanceOptions(), 15);
   CHECK(cfp_test::allocation_count() == before);
   CHECK_THAT(shift, WithinAbs(object.shift(motion, 15), 0.02 * shift));
 }

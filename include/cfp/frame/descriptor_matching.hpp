@@ -10,6 +10,7 @@
 
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
+#include "cfp/frame/point_grid_impl.hpp"
 
 namespace cfp {
 
@@ -32,16 +33,12 @@ struct DescriptorMatchOptions {
 /// Scratch memory, reused: after a call, calls of at most the same sizes allocate nothing.
 template <typename Scalar>
 struct DescriptorMatchWorkspace {
-  struct Candidate {
-    Scalar x, y;
-    std::int32_t index;
-  };
   struct Holder {
     std::int32_t keypoint;  // of the current frame, -1: none
     int distance;
   };
-  std::vector<Candidate> candidates;  // sorted by y
-  std::vector<Holder> holders;        // one per keypoint of the previous frame
+  detail::PointGrid<Scalar> candidates;
+  std::vector<Holder> holders;  // one per keypoint of the previous frame
 };
 
 inline namespace CFP_ISA {
@@ -71,25 +68,19 @@ inline namespace CFP_ISA {
 namespace detail {
 inline namespace CFP_ISA {
 
-/// The previous keypoints that may be matched, by their predicted y; those that `match` names are held already.
+/// The previous keypoints that may be matched, by where they are expected; those that `match` names are held already.
 template <typename Scalar>
-void collect_candidates(const PointSpan<Scalar, 2>& predicted, span<const std::int32_t> match,
+void collect_candidates(const PointSpan<Scalar, 2>& predicted, span<const std::int32_t> match, Scalar radius_px,
                         DescriptorMatchWorkspace<Scalar>& workspace) {
-  using Candidate = typename DescriptorMatchWorkspace<Scalar>::Candidate;
   workspace.holders.assign(predicted.size(), {-1, 0});
   for (std::size_t i = 0; i < match.size(); ++i) {
     if (match[i] >= 0 && static_cast<std::size_t>(match[i]) < predicted.size())
       workspace.holders[static_cast<std::size_t>(match[i])].keypoint = static_cast<std::int32_t>(i);
   }
-  workspace.candidates.clear();
-  workspace.candidates.reserve(predicted.size());
-  for (std::size_t j = 0; j < predicted.size(); ++j) {
-    const Candidate candidate{predicted(j, 0), predicted(j, 1), static_cast<std::int32_t>(j)};
-    if (workspace.holders[j].keypoint < 0 && is_finite(candidate.x) && is_finite(candidate.y))
-      workspace.candidates.push_back(candidate);
-  }
-  std::sort(workspace.candidates.begin(), workspace.candidates.end(),
-            [](const Candidate& a, const Candidate& b) { return a.y < b.y || (a.y == b.y && a.index < b.index); });
+  const auto is_free = [&](std::size_t j) {
+    return workspace.holders[j].keypoint < 0 && is_finite(predicted(j, 0)) && is_finite(predicted(j, 1));
+  };
+  fill_grid(predicted, is_free, radius_px, workspace.candidates);
 }
 
 struct NearestDescriptor {
@@ -106,19 +97,17 @@ template <typename Scalar>
   const Scalar radius = static_cast<Scalar>(options.radius_px);
   const int bits = static_cast<int>(8 * previous.bytes);
   NearestDescriptor nearest{-1, (std::min)(options.max_distance, bits) + 1, bits};
-  auto at = std::lower_bound(workspace.candidates.begin(), workspace.candidates.end(), y - radius,
-                             [](const auto& candidate, Scalar limit) { return candidate.y < limit; });
-  for (; at != workspace.candidates.end() && at->y <= y + radius; ++at) {
-    const Scalar dx = at->x - x, dy = at->y - y;
-    if (!(dx * dx + dy * dy <= radius * radius)) continue;
-    const int distance =
-        hamming_distance(previous.row(static_cast<std::size_t>(at->index)), descriptor, previous.bytes);
+  for_each_near(workspace.candidates, x, y, [&](const auto& candidate) {
+    const Scalar dx = candidate.x - x, dy = candidate.y - y;
+    if (!(dx * dx + dy * dy <= radius * radius)) return;
+    const int distance = hamming_distance(previous.row(candidate.index), descriptor, previous.bytes);
     if (distance < nearest.distance) {
-      nearest = {at->index, distance, nearest.index >= 0 ? nearest.distance : nearest.second};
+      const int second = nearest.index >= 0 ? nearest.distance : nearest.second;
+      nearest = {static_cast<std::int32_t>(candidate.index), distance, second};
     } else {
       nearest.second = (std::min)(nearest.second, distance);
     }
-  }
+  });
   return nearest;
 }
 
@@ -132,7 +121,7 @@ inline namespace CFP_ISA {
 /// expected in the current image; one that is not finite, or that `match` names already, takes no part. A match lies
 /// within the radius, passes the distance and the ratio test, and each previous keypoint goes to the query whose
 /// descriptor is nearest (ties: the lower index). Returns how many were matched; 0 for descriptors of different sizes.
-/// O(queries x keypoints in a band of the image); allocates only when the workspace grows.
+/// O(queries x keypoints within the radius); allocates only when the workspace grows.
 template <typename Scalar>
 std::size_t match_descriptors(const PointSpan<Scalar, 2>& predicted, const DescriptorSpan& previous,
                               const PointSpan<Scalar, 2>& keypoints, const DescriptorSpan& current,
@@ -141,7 +130,8 @@ std::size_t match_descriptors(const PointSpan<Scalar, 2>& predicted, const Descr
   CFP_ASSERT(match.size() == keypoints.size());
   if (previous.bytes != current.bytes || current.bytes == 0) return 0;
   if (previous.size != predicted.size() || current.size != keypoints.size()) return 0;
-  detail::collect_candidates(predicted, span<const std::int32_t>(match), workspace);
+  detail::collect_candidates(predicted, span<const std::int32_t>(match), static_cast<Scalar>(options.radius_px),
+                             workspace);
   for (const std::int32_t query : queries) {
     const std::size_t i = static_cast<std::size_t>(query);
     const detail::NearestDescriptor nearest =

@@ -9,6 +9,7 @@
 #include "cfp/frame/estimate_objects.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
+#include "cfp/frame/point_grid_impl.hpp"
 #include "cfp/probability/first_stage_probability.hpp"
 
 namespace cfp {
@@ -21,30 +22,23 @@ inline namespace CFP_ISA {
 template <typename Scalar>
 void score_flow_at_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   const Scalar radius_px = static_cast<Scalar>(options.coarse.flow_radius_px);
-  if (radius_px <= 0 || state.report.flow_model == FlowModelKind::none) return;
+  if (radius_px <= 0 || state.report.flow_model == FlowModelKind::none || state.boxes.empty()) return;
   const ObjectProbabilityOptions scored = scaled_to_flow(options.coarse.object, state.report);
-  FrameScratch<Scalar>& scratch = state.scratch;
-  for (std::size_t b = 0; b < state.boxes.size(); ++b) {
-    scratch.points.clear();
-    scratch.samples.clear();
-    for (std::size_t p = 0; p < frame.flow.current.size(); ++p) {
-      const Scalar x = frame.flow.current(p, 0), y = frame.flow.current(p, 1);
-      if (!has_distance(state.flow_distances[p]) || !contains(state.boxes[b].box, x, y)) continue;
-      scratch.points.push_back({x, y});
-      scratch.samples.push_back(state.flow_distances[p]);
-    }
-    for (std::size_t i = 0; i < state.size(); ++i) {
-      if (state.box[i] != static_cast<std::int32_t>(b)) continue;
-      const auto& [x, y] = state.current.keypoints[i];
-      Scalar nearest_sq = radius_px * radius_px, distance = Scalar(-1);
-      for (std::size_t p = 0; p < scratch.points.size(); ++p) {
-        const Scalar dx = scratch.points[p][0] - x, dy = scratch.points[p][1] - y, apart_sq = dx * dx + dy * dy;
-        if (!(apart_sq < nearest_sq)) continue;
-        nearest_sq = apart_sq;
-        distance = scratch.samples[p];
-      }
-      if (has_distance(distance)) state.flow_probability[i] = object_score(distance, scored);
-    }
+  PointGrid<Scalar>& grid = state.scratch.grid;
+  const auto is_known = [&](std::size_t p) { return has_distance(state.flow_distances[p]); };
+  fill_grid(frame.flow.current, is_known, radius_px, grid);
+  for (std::size_t i = 0; i < state.size(); ++i) {
+    if (state.box[i] == no_box) continue;
+    const Box<Scalar>& box = state.boxes[static_cast<std::size_t>(state.box[i])].box;
+    const auto& [x, y] = state.current.keypoints[i];
+    Scalar nearest_sq = radius_px * radius_px, distance = Scalar(-1);
+    for_each_near(grid, x, y, [&, x = x, y = y](const auto& pair) {
+      const Scalar dx = pair.x - x, dy = pair.y - y, apart_sq = dx * dx + dy * dy;
+      if (!(apart_sq < nearest_sq) || !contains(box, pair.x, pair.y)) return;
+      nearest_sq = apart_sq;
+      distance = state.flow_distances[pair.index];
+    });
+    if (has_distance(distance)) state.flow_probability[i] = object_score(distance, scored);
   }
 }
 

@@ -1,0 +1,90 @@
+/// @file point_grid_impl.hpp
+/// Points of an image in cells, to find those near a place. Not an interface.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <vector>
+
+#include "cfp/core/numeric.hpp"
+#include "cfp/core/span.hpp"
+#include "cfp/core/types.hpp"
+
+namespace cfp::detail {
+
+/// Memory of a grid, reused: after points, at most as many allocate nothing.
+template <typename Scalar>
+struct PointGrid {
+  struct Point {
+    Scalar x, y;
+    std::uint32_t index;  // in what the grid was made of
+  };
+  std::vector<Point> points, unsorted;  // by cell, row by row; of one cell by index
+  std::vector<std::uint32_t> first;     // of each cell
+  Scalar left = 0, top = 0, per_side = 1, reach = 0;
+  std::size_t columns = 1, rows = 1;
+};
+
+inline namespace CFP_ISA {
+
+/// Which of so many columns or rows a place lies in; the outermost ones hold all beyond.
+template <typename Scalar>
+[[nodiscard]] std::size_t cell_at(Scalar offset, Scalar per_side, std::size_t count) noexcept {
+  return static_cast<std::size_t>((std::min)((std::max)(Scalar(0), offset * per_side), static_cast<Scalar>(count - 1)));
+}
+
+/// Puts those of the points for which `keep(index)` holds, all finite, into cells. Later `reach` is how near is near.
+template <typename Scalar, typename Keep>
+void fill_grid(const PointSpan<Scalar, 2>& points, const Keep& keep, Scalar reach, PointGrid<Scalar>& grid) {
+  const std::size_t most = points.size();
+  grid.points.reserve(most), grid.unsorted.reserve(most), grid.first.reserve(12 * most + 8);
+  grid.unsorted.clear();
+  const Scalar huge = std::numeric_limits<Scalar>::infinity();
+  Vector2<Scalar> low(huge, huge), high = -low;
+  for (std::size_t i = 0; i < most; ++i) {
+    if (!keep(i)) continue;
+    grid.unsorted.push_back({points(i, 0), points(i, 1), static_cast<std::uint32_t>(i)});
+    low = low.cwiseMin(points[i]), high = high.cwiseMax(points[i]);
+  }
+  // A cell of what is near, but no more than a dozen cells per point.
+  const Vector2<Scalar> size = high - low;
+  const Scalar n = static_cast<Scalar>(4 * grid.unsorted.size());
+  grid.left = low.x(), grid.top = low.y(), grid.reach = reach;
+  grid.per_side = 1 / (std::max)({reach, std::sqrt(size.prod() / n), size.maxCoeff() / n});
+  const auto count = [&](Scalar extent) {
+    const Scalar cells = extent * grid.per_side;
+    return cells <= n ? static_cast<std::size_t>(cells) + 1 : std::size_t(1);
+  };
+  grid.columns = count(size.x()), grid.rows = count(size.y());
+  const auto cell = [&](const auto& p) {
+    return cell_at(p.y - grid.top, grid.per_side, grid.rows) * grid.columns +
+           cell_at(p.x - grid.left, grid.per_side, grid.columns);
+  };
+  grid.first.assign(grid.columns * grid.rows + 2, 0);
+  for (const auto& p : grid.unsorted) ++grid.first[cell(p) + 2];
+  std::partial_sum(grid.first.begin(), grid.first.end(), grid.first.begin());
+  grid.points.resize(grid.unsorted.size());
+  for (const auto& p : grid.unsorted) grid.points[grid.first[cell(p) + 1]++] = p;
+}
+
+/// Calls visit(point) for the points at most the reach away in x and in y.
+template <typename Scalar, typename Visit>
+void for_each_near(const PointGrid<Scalar>& grid, Scalar x, Scalar y, const Visit& visit) {
+  const Scalar from_left = x - grid.left, from_top = y - grid.top;
+  const auto column = [&](Scalar offset) { return cell_at(from_left + offset, grid.per_side, grid.columns); };
+  const auto row = [&](Scalar offset) { return cell_at(from_top + offset, grid.per_side, grid.rows); };
+  const std::size_t left = column(-grid.reach), right = column(grid.reach), bottom = row(grid.reach);
+  for (std::size_t r = row(-grid.reach); r <= bottom; ++r) {
+    const std::size_t end = grid.first[r * grid.columns + right + 1];
+    for (std::size_t k = grid.first[r * grid.columns + left]; k < end; ++k) {
+      const auto& p = grid.points[k];
+      if (std::abs(p.x - x) <= grid.reach && std::abs(p.y - y) <= grid.reach) visit(p);
+    }
+  }
+}
+
+}  // namespace CFP_ISA
+}  // namespace cfp::detail
