@@ -97,9 +97,9 @@ template <typename Scalar>
   const Scalar radius = static_cast<Scalar>(options.radius_px);
   const int bits = static_cast<int>(8 * previous.bytes);
   NearestDescriptor nearest{-1, (std::min)(options.max_distance, bits) + 1, bits};
-  for_each_near(workspace.candidates, x, y, [&](const auto& candidate) {
+  visit_near(workspace.candidates, x, y, [&](const auto& candidate) {
     const Scalar dx = candidate.x - x, dy = candidate.y - y;
-    if (!(dx * dx + dy * dy <= radius * radius)) return;
+    if (!(dx * dx + dy * dy <= radius * radius)) return false;
     const int distance = hamming_distance(previous.row(candidate.index), descriptor, previous.bytes);
     if (distance < nearest.distance) {
       const int second = nearest.index >= 0 ? nearest.distance : nearest.second;
@@ -107,6 +107,7 @@ template <typename Scalar>
     } else {
       nearest.second = (std::min)(nearest.second, distance);
     }
+    return false;
   });
   return nearest;
 }

@@ -32,11 +32,12 @@ void score_flow_at_keypoints(const Frame<Scalar>& frame, const FrameOptions& opt
     const Box<Scalar>& box = state.boxes[static_cast<std::size_t>(state.box[i])].box;
     const auto& [x, y] = state.current.keypoints[i];
     Scalar nearest_sq = radius_px * radius_px, distance = Scalar(-1);
-    for_each_near(grid, x, y, [&, x = x, y = y](const auto& pair) {
+    visit_near(grid, x, y, [&, x = x, y = y](const auto& pair) {
       const Scalar dx = pair.x - x, dy = pair.y - y, apart_sq = dx * dx + dy * dy;
-      if (!(apart_sq < nearest_sq) || !contains(box, pair.x, pair.y)) return;
+      if (!(apart_sq < nearest_sq) || !contains(box, pair.x, pair.y)) return false;
       nearest_sq = apart_sq;
       distance = state.flow_distances[pair.index];
+      return false;
     });
     if (has_distance(distance)) state.flow_probability[i] = object_score(distance, scored);
   }

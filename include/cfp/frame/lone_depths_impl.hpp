@@ -50,10 +50,11 @@ template <typename Scalar>
   for (const auto& point : workspace.grid.points) {
     const Scalar depth = points[point.index][2];
     int neighbours = -1, alike = -1;  // itself is none
-    for_each_near(workspace.grid, point.x, point.y, [&](const auto& other) {
+    visit_near(workspace.grid, point.x, point.y, [&](const auto& other) {
       const Scalar its = points[other.index][2];
       ++neighbours;
       alike += std::abs(depth - its) <= ratio * (std::min)(depth, its) ? 1 : 0;
+      return alike >= 2;
     });
     if (neighbours >= 2 && alike < 2) workspace.alone.push_back(point.index);
   }

@@ -70,9 +70,9 @@ void fill_grid(const PointSpan<Scalar, 2>& points, const Keep& keep, Scalar reac
   for (const auto& p : grid.unsorted) grid.points[grid.first[cell(p) + 1]++] = p;
 }
 
-/// Calls visit(point) for the points at most the reach away in x and in y.
+/// Calls visit(point) for the points at most the reach away in x and in y, until it returns true.
 template <typename Scalar, typename Visit>
-void for_each_near(const PointGrid<Scalar>& grid, Scalar x, Scalar y, const Visit& visit) {
+void visit_near(const PointGrid<Scalar>& grid, Scalar x, Scalar y, const Visit& visit) {
   const Scalar from_left = x - grid.left, from_top = y - grid.top;
   const auto column = [&](Scalar offset) { return cell_at(from_left + offset, grid.per_side, grid.columns); };
   const auto row = [&](Scalar offset) { return cell_at(from_top + offset, grid.per_side, grid.rows); };
@@ -81,7 +81,7 @@ void for_each_near(const PointGrid<Scalar>& grid, Scalar x, Scalar y, const Visi
     const std::size_t end = grid.first[r * grid.columns + right + 1];
     for (std::size_t k = grid.first[r * grid.columns + left]; k < end; ++k) {
       const auto& p = grid.points[k];
-      if (std::abs(p.x - x) <= grid.reach && std::abs(p.y - y) <= grid.reach) visit(p);
+      if (std::abs(p.x - x) <= grid.reach && std::abs(p.y - y) <= grid.reach && visit(p)) return;
     }
   }
 }
