@@ -7,7 +7,8 @@
 // Then the same in a bare room, whose motion says little of a person who is near; "motion taken as exact" leaves its
 // covariance out; "a host's motion" is the true one with errors of 3 mm and 1 mrad, and these as its sigmas. Then with
 // 5, 15 and 30 % of the depths wrong by anything before furniture and walls, with
-// CameraMotionOptions::shared_depth_ratio and without. Then how soon somebody who sways counts as moving, and how often
+// CameraMotionOptions::shared_depth_ratio and without. Then with 10 to 14 points on the person, by
+// ObjectProbabilityOptions::min_pairs. Then how soon somebody who sways counts as moving, and how often
 // somebody at rest does whom a rolling shutter, a lens or a focal length that nobody told displaces, by shift_pairs.
 // Then with one camera, no depths at all, in five kinds of scene
 // and at three frame rates: with the fundamental matrix alone, and with the motion up to scale where there is none.
@@ -110,8 +111,9 @@ struct Room {
   const char* name;
   int points;
   double (*depth)(const V2& pixel);
-  double nearest_m, farthest_m;  // a person in it
-  bool wrong_anywhere = false;   // a wrong depth is any from 0.5 to 8 m, not that of the other side of a silhouette
+  double nearest_m, farthest_m;    // a person in it
+  bool wrong_anywhere = false;     // a wrong depth is any from 0.5 to 8 m, not that of the other side of a silhouette
+  double fewest = 30, most = 120;  // points on the person
 };
 constexpr std::array<Room, 5> rooms = {{{"a furnished room", 350, furnished_depth, 1.5, 3.5},
                                         {"a bare room", 60, bare_depth, 0.8, 1.6},
@@ -119,6 +121,7 @@ constexpr std::array<Room, 5> rooms = {{{"a furnished room", 350, furnished_dept
                                         {"a floor and a slanted wall", 200, slanted_depth, 1.5, 3.5},
                                         {"a street", 250, street_depth, 3, 10}}};
 constexpr std::size_t rooms_with_depth = 2;
+constexpr Room few_pairs = {"10 to 14 pairs", 350, furnished_depth, 1.5, 3.5, false, 10, 15};
 constexpr std::array<Room, 3> rooms_of_wrong_depths = {{{"a furnished room", 350, furnished_depth, 1.5, 3.5, true},
                                                         {"a slanted wall", 200, wall_depth, 1.5, 2.4, true},
                                                         {"a far wall", 60, far_wall_depth, 1.5, 4, true}}};
@@ -174,7 +177,7 @@ Scene simulate(const Cell& cell, const Room& room, double frame_s, double wrong_
         std::pow((p.x() - centre.x()) / half_width, 2) + std::pow((p.y() - centre.y()) / half_height, 2);
     if (beside > 1) add(p, room.depth(p), V3::Zero(), beside < 1.5 ? z : room.depth(p));
   }
-  const int on_person = static_cast<int>(who.uniform(30, 120));
+  const int on_person = static_cast<int>(who.uniform(room.fewest, room.most));
   for (int i = 0; i < on_person; ++i) {
     const double angle = random.uniform(0, 2 * cfp::pi<double>), radius = std::sqrt(random.uniform());
     const V2 p(centre.x() + half_width * radius * std::cos(angle), centre.y() + half_height * radius * std::sin(angle));
@@ -451,6 +454,12 @@ int main(int argc, char** argv) {
     }
   }
 
+  print_head("a furnished room, 10 to 14 points on the person, 15 % wrong depths, by min_pairs");
+  for (const std::size_t min_pairs : {4U, 6U, 8U, 10U, 12U}) {
+    Way way;
+    way.options.coarse.object.min_pairs = min_pairs;
+    judge(std::to_string(min_pairs).c_str(), way, cells, few_pairs, 1 / 30.0, 0.15, repetitions, seed);
+  }
   print_shared(repetitions, seed);
 
   print_head("one camera, no depths; then F alone; a host's motion");

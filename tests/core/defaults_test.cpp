@@ -40,7 +40,7 @@ TEST_CASE("The defaults of the flow and of objects", "[core]") {
   CHECK(flow.motion.search_above_px == 0.25);
   CHECK(flow.motion.shared_depth_ratio == 0.12);
   CHECK((o.object.score == cfp::ObjectScore::survival && o.object.degrees_of_freedom == 2));
-  CHECK((o.object.sigma_px == 1 && o.object.noise_factor == 5.8 && o.object.min_pairs == 10));
+  CHECK((o.object.sigma_px == 1 && o.object.noise_factor == 5.8 && o.object.min_pairs == 8));
   CHECK(o.object.shift_pairs == 15);
   CHECK((o.object.positions == std::array<double, 3>{0.2, 0.3, 0.4}));
   CHECK(o.object.unknown_object_probability == 0.5);

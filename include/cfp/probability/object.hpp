@@ -43,8 +43,8 @@ struct ObjectProbabilityOptions {
   /// Where depths are known, what the pairs share is judged, too (common_shift): they count as so many independent ones
   /// at most, lest errors that neighbours share look like motion; >= 0. 0: the pairs are judged one by one.
   double shift_pairs = 15;
-  /// Fewer usable pairs than this, and O is unknown (>= 1; benchmarks/studies/object_score_study).
-  std::size_t min_pairs = 10;
+  /// Fewer usable pairs than this, and O is unknown (>= 1; benchmarks/studies/object_motion_study).
+  std::size_t min_pairs = 8;
   /// What an unknown object counts as, in [0, 1]. Below O_Th: an object is dynamic until it is shown to be static.
   double unknown_object_probability = 0.5;
 };
