@@ -8,6 +8,7 @@
 #include "cfp/clustering/adaptive.hpp"
 #include "cfp/clustering/dbscan.hpp"
 #include "cfp/clustering/depth_foreground.hpp"
+#include "cfp/clustering/depth_foreground_types.hpp"
 #include "cfp/clustering/place_odds.hpp"
 #include "cfp/clustering/sorted_values.hpp"
 #include "cfp/core/numeric.hpp"

@@ -8,6 +8,7 @@
 #include "cfp/frame/flow_model.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
+#include "cfp/frame/object_members_impl.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/probability/object.hpp"
 
@@ -15,24 +16,6 @@ namespace cfp {
 
 namespace detail {
 inline namespace CFP_ISA {
-
-/// Whether the frame's labels tell what belongs to the object of a box; a compensated box has no label.
-template <typename Scalar>
-[[nodiscard]] bool has_label(const TrackedBox<Scalar>& box, const LabelImage& labels) noexcept {
-  return !labels.empty() && !box.compensated();
-}
-
-/// Whether a pixel belongs to an object: by its label if it has one, else by its box.
-template <typename Scalar>
-[[nodiscard]] bool lies_on(const TrackedBox<Scalar>& box, const LabelImage& labels, Scalar x, Scalar y) noexcept {
-  return has_label(box, labels) ? label_at(labels, x, y) == box.detection + 1 : contains(box.box, x, y);
-}
-
-/// Whether depth tells where an object stands, and what in its box or mask is farther.
-template <typename Scalar>
-[[nodiscard]] bool is_told_by_depth(const TrackedBox<Scalar>& box, const FrameOptions& options) noexcept {
-  return options.coarse.use_depth_foreground && is_non_rigid(box.class_id, options);
-}
 
 /// The options on the scale of the noise of this frame's flow.
 [[nodiscard]] inline ObjectProbabilityOptions scaled_to_flow(const ObjectProbabilityOptions& options,
@@ -62,31 +45,6 @@ template <typename Scalar>
   if (frame.fundamental) model.F = *frame.fundamental;
   measure_sigma(undistorted_flow, outside, camera, options, model, state.scratch.flow.distances);
   return model;
-}
-
-/// Sets scratch.members to the indices for which `belongs` holds, and marks in scratch.mask which of them lie on the
-/// object of the box: all where there are no depths, and where these cannot tell.
-template <typename Scalar, typename Belongs>
-ForegroundResult separate_members(const TrackedBox<Scalar>& box, const PointSpan<Scalar, 2>& pixels,
-                                  span<const Scalar> depths, const Belongs& belongs, const FrameOptions& options,
-                                  FrameState<Scalar>& state) {
-  FrameScratch<Scalar>& scratch = state.scratch;
-  scratch.members.clear();
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    if (belongs(i)) scratch.members.push_back(static_cast<std::int32_t>(i));
-  }
-  scratch.mask.assign(scratch.members.size(), char(1));
-  if (depths.empty()) return {};
-  scratch.depths.clear();
-  scratch.points.clear();
-  for (const std::int32_t member : scratch.members) {
-    const auto i = static_cast<std::size_t>(member);
-    scratch.depths.push_back(depths[i]);
-    scratch.points.push_back({pixels(i, 0), pixels(i, 1)});
-  }
-  ForegroundInput<Scalar> in{scratch.depths, scratch.points, box.box};
-  if (state.previous.known) in.previous_depth_m = object_depth(state.previous, box.id);
-  return depth_foreground(in, options.coarse.foreground, scratch.foreground, scratch.mask);
 }
 
 /// Labels invalid the pairs just outside of a box that may be on its object all the same: those not behind it.
@@ -152,8 +110,8 @@ template <typename Scalar>
 inline namespace CFP_ISA {
 
 /// Sets state.objects: O of every box from the flow pairs whose current point lies in it, one by one and, where depths
-/// are known, together: the lower of the two. Without flow, without a model
-/// or with too few pairs in the box, O is unknown and counts as unknown_object_probability.
+/// are known, together: the lower of the two. Without flow, without a model or with too few pairs in the box, O is
+/// unknown and counts as unknown_object_probability.
 template <typename Scalar, typename Camera>
 void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const FrameOptions& options,
                       FrameState<Scalar>& state) {

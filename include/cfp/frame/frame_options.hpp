@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "cfp/clustering/depth_foreground.hpp"
+#include "cfp/clustering/depth_foreground_types.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/detection/box_tracker_types.hpp"
 #include "cfp/frame/descriptor_matching.hpp"

@@ -5,10 +5,10 @@
 
 #include <algorithm>
 
-#include "cfp/clustering/depth_foreground.hpp"
 #include "cfp/frame/estimate_objects.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
+#include "cfp/frame/object_members_impl.hpp"
 #include "cfp/frame/point_grid_impl.hpp"
 #include "cfp/probability/first_stage_probability.hpp"
 

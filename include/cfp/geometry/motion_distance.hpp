@@ -72,12 +72,17 @@ template <typename Camera, typename Scalar>
   return true;
 }
 
-/// sigma sqrt(r^T (sigma^2 I + sigma_z^2 J J^T + M C M^T)^-1 r); no covariance: an exact motion.
-template <typename Scalar>
-[[nodiscard]] Scalar distance_of(const MotionResidual<Scalar>& pair,
-                                 const Eigen::Matrix<Scalar, 6, 6, Eigen::DontAlign>* covariance,
-                                 const Scalar& sigma_px) noexcept {
+/// motion_distance under a motion of this covariance; none: an exact motion.
+template <typename Camera, typename Scalar>
+[[nodiscard]] Scalar distance_under(const Vector2<Scalar>& pixel_prev, const Scalar& depth_prev,
+                                    const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
+                                    const Eigen::Matrix<Scalar, 6, 6, Eigen::DontAlign>* covariance,
+                                    const Camera& camera, const Scalar& sigma_px,
+                                    const MotionDistanceOptions& options) noexcept {
   using std::sqrt;
+  const Scalar none = Scalar(no_distance<double>);
+  MotionResidual<Scalar> pair;
+  if (!motion_residual(pixel_prev, depth_prev, pixel_cur, T_cur_prev, camera, options, pair)) return none;
   // W = I + M C M^T / sigma^2, and its inverse.
   Scalar a = Scalar(1), b = Scalar(0), c = Scalar(1);
   if (covariance != nullptr) {
@@ -108,7 +113,7 @@ template <typename Scalar>
   const Scalar distance_sq =
       pair.r.dot(times_inverse(pair.r)) - explained * explained * (kappa / (Scalar(1) + kappa * length_sq));
   const Scalar distance = sqrt(distance_sq > Scalar(0) ? distance_sq : Scalar(0));
-  return has_distance(distance) && is_finite(distance_sq) ? distance : Scalar(no_distance<double>);
+  return has_distance(distance) && is_finite(distance_sq) ? distance : none;
 }
 
 }  // namespace CFP_ISA
@@ -131,10 +136,8 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
                                      const UncertainMotion<non_deduced<Scalar>>& motion, const Camera& camera,
                                      const non_deduced<Scalar>& sigma_px,
                                      const MotionDistanceOptions& options) noexcept {
-  detail::MotionResidual<Scalar> pair;
-  const bool seen = detail::motion_residual<Camera, Scalar>(pixel_prev, depth_prev, pixel_cur, motion.T_cur_prev,
-                                                            camera, options, pair);
-  return seen ? detail::distance_of(pair, &motion.covariance, sigma_px) : Scalar(no_distance<double>);
+  return detail::distance_under<Camera, Scalar>(pixel_prev, depth_prev, pixel_cur, motion.T_cur_prev,
+                                                &motion.covariance, camera, sigma_px, options);
 }
 
 /// motion_distance of every pair. `depths_prev` may be empty: none is known. Sizes must agree. Allocates nothing.
@@ -148,10 +151,8 @@ void motion_distances(const PointSpan<non_deduced<Scalar>, 2>& prev, span<const 
   const auto* covariance = motion.covariance.isZero(0) ? nullptr : &motion.covariance;
   for (std::size_t i = 0; i < out.size(); ++i) {
     const Scalar depth = depths_prev.empty() ? Scalar(0) : depths_prev[i];
-    detail::MotionResidual<Scalar> pair;
-    const bool seen =
-        detail::motion_residual<Camera, Scalar>(prev[i], depth, cur[i], motion.T_cur_prev, camera, options, pair);
-    out[i] = seen ? detail::distance_of(pair, covariance, sigma_px) : Scalar(no_distance<double>);
+    out[i] = detail::distance_under<Camera, Scalar>(prev[i], depth, cur[i], motion.T_cur_prev, covariance, camera,
+                                                    sigma_px, options);
   }
 }
 
