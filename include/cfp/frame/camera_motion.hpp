@@ -31,7 +31,7 @@ struct CameraMotionOptions {
   /// which a third of such pairs seldom mislead (cfp_camera_motion_study); px, > 0.
   double search_above_px = 0.25;
   /// A depth that fewer than two of some seven neighbours in the image share to this ratio takes no part, unless that
-  /// is over a third of them; a ratio without unit, >= 0. 0: all take part (cfp_object_motion_study).
+  /// is over three eighths of them; a ratio without unit, >= 0. 0: all take part (cfp_object_motion_study).
   double shared_depth_ratio = 0.12;
   MotionDistanceOptions distance;
   PoseOptions pose;

@@ -58,7 +58,7 @@ template <typename Scalar>
     });
     if (neighbours >= 2 && alike < 2) workspace.alone.push_back(point.index);
   }
-  if (3 * workspace.alone.size() > taken) return taken;
+  if (8 * workspace.alone.size() > 3 * taken) return taken;
   for (const std::uint32_t i : workspace.alone) points[i][0] = std::numeric_limits<Scalar>::quiet_NaN();
   return taken - workspace.alone.size();
 }
