@@ -84,16 +84,6 @@ template <typename Camera>
   return {jacobian(0, 0), jacobian(1, 1), centre.x(), centre.y()};
 }
 
-/// The pixel of `camera` in its undistorted image, that of `pinhole` = undistorted_camera(camera). False, and
-/// undistorted untouched, where the pixel has no ray.
-template <typename Camera>
-[[nodiscard]] bool undistort(const Camera& camera, const PinholeCamera<typename Camera::ScalarType>& pinhole,
-                             const Vector2<typename Camera::ScalarType>& pixel,
-                             Vector2<typename Camera::ScalarType>& undistorted) noexcept {
-  Vector3<typename Camera::ScalarType> ray;
-  return camera.unproject(pixel, ray) && pinhole.project(ray, undistorted);
-}
-
 /// The points in the camera's undistorted image, kept in `storage`, which the returned view refers to; a pinhole
 /// camera's points are their own, and storage is not touched. A pixel without a ray becomes NaN, which no distance
 /// accepts. Allocates only to grow storage.
@@ -108,8 +98,10 @@ template <typename Camera>
     const PinholeCamera<Scalar> pinhole = undistorted_camera(camera);
     storage.resize(points.size());
     for (std::size_t i = 0; i < points.size(); ++i) {
+      Vector3<Scalar> ray;
       Vector2<Scalar> pixel;
-      if (!undistort(camera, pinhole, points[i], pixel)) pixel.setConstant(std::numeric_limits<Scalar>::quiet_NaN());
+      if (!camera.unproject(points[i], ray) || !pinhole.project(ray, pixel))
+        pixel.setConstant(std::numeric_limits<Scalar>::quiet_NaN());
       storage[i] = {pixel.x(), pixel.y()};
     }
     return PointSpan<Scalar, 2>(storage);
