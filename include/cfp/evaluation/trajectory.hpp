@@ -90,26 +90,20 @@ template <typename First, typename Second>
                                                const AssociationOptions& options = {}) {
   const std::vector<std::size_t> first_order = time_order(first), second_order = time_order(second);
   const auto second_time = [&](std::size_t j) { return second[second_order[j]].time_s + options.offset_s; };
-  struct Candidate {
-    double difference_s;
-    std::size_t first, second;  // positions in the orders
-  };
-  std::vector<Candidate> candidates;
+  std::vector<std::tuple<double, std::size_t, std::size_t>> candidates;  // difference, positions in the orders
   for (std::size_t i = 0, begin = 0; i < first_order.size(); ++i) {
     const double time = first[first_order[i]].time_s;
     while (begin < second_order.size() && time - second_time(begin) >= options.max_difference_s) ++begin;
     for (std::size_t j = begin; j < second_order.size() && second_time(j) - time < options.max_difference_s; ++j)
-      candidates.push_back({std::abs(time - second_time(j)), i, j});
+      candidates.emplace_back(std::abs(time - second_time(j)), i, j);
   }
-  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
-    return std::tie(a.difference_s, a.first, a.second) < std::tie(b.difference_s, b.first, b.second);
-  });
+  std::sort(candidates.begin(), candidates.end());
   std::vector<char> first_taken(first_order.size()), second_taken(second_order.size());
   std::vector<TimeMatch> matches;
-  for (const Candidate& pair : candidates) {
-    if (first_taken[pair.first] != 0 || second_taken[pair.second] != 0) continue;
-    first_taken[pair.first] = second_taken[pair.second] = 1;
-    matches.push_back({first_order[pair.first], second_order[pair.second]});
+  for (const auto& [difference_s, i, j] : candidates) {
+    if (first_taken[i] != 0 || second_taken[j] != 0) continue;
+    first_taken[i] = second_taken[j] = 1;
+    matches.push_back({first_order[i], second_order[j]});
   }
   std::sort(matches.begin(), matches.end(),
             [&](const TimeMatch& a, const TimeMatch& b) { return first[a.first].time_s < first[b.first].time_s; });
