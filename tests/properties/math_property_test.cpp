@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "cfp/math/chi_squared.hpp"
-#include "cfp/math/logistic.hpp"
 #include "cfp/math/order_statistic.hpp"
+#include "cfp/probability/distance_sigmoid.hpp"
 
 using cfp_test::any_number;
 using cfp_test::real;
