@@ -57,11 +57,10 @@ inline namespace CFP_ISA {
 /// quaternions are rounded, and an all-zero one, the TUM files' "no pose", must fail).
 template <typename Scalar>
 [[nodiscard]] bool is_usable(const StampedPose<Scalar>& pose) noexcept {
-  const Matrix3<Scalar>& R = pose.T_world_cam.rotation;
-  const Scalar volume = determinant(R);
-  const Vector3<Scalar>& t = pose.T_world_cam.translation;
-  return is_finite(pose.time_s) && is_finite(t.x()) && is_finite(t.y()) && is_finite(t.z()) && volume > Scalar(0.5) &&
-         volume < Scalar(2) && R.squaredNorm() < Scalar(12);
+  const SE3<Scalar>& T = pose.T_world_cam;
+  const Scalar volume = determinant(T.rotation);
+  return is_finite(pose.time_s) && T.translation.allFinite() && volume > Scalar(0.5) && volume < Scalar(2) &&
+         T.rotation.squaredNorm() < Scalar(12);
 }
 
 /// Indices of the usable poses in order of time; of several with one stamp the last in the array stays, as in the
@@ -158,7 +157,6 @@ std::size_t closest_index(std::size_t n, double target, const Value& value) noex
       difference = std::abs(value(middle) - target);
       best = middle;
     }
-    if (value(middle) == target) return middle;
     if (value(middle) > target) {
       end = middle;
     } else {
