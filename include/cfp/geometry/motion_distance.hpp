@@ -23,15 +23,6 @@ struct MotionDistanceOptions {
   UnknownDepth unknown_depth;  ///< of all others
 };
 
-inline namespace CFP_ISA {
-
-[[nodiscard]] constexpr OptionPath invalid_field(const MotionDistanceOptions& o) noexcept {
-  if (const OptionPath field = nested("depth_noise", invalid_field(o.depth_noise))) return field;
-  return nested("unknown_depth", invalid_field(o.unknown_depth));
-}
-
-}  // namespace CFP_ISA
-
 namespace detail {
 
 /// A flow pair against the camera's motion.
@@ -115,6 +106,11 @@ template <typename Camera, typename Scalar>
 }  // namespace detail
 
 inline namespace CFP_ISA {
+
+[[nodiscard]] constexpr OptionPath invalid_field(const MotionDistanceOptions& o) noexcept {
+  if (const OptionPath field = nested("depth_noise", invalid_field(o.depth_noise))) return field;
+  return nested("unknown_depth", invalid_field(o.unknown_depth));
+}
 
 /// d = sigma sqrt(r^T (sigma^2 I + sigma_z^2 J J^T + M C M^T)^-1 r), in pixels, with r = pixel_cur - project(p), p =
 /// T_cur_prev X, X the previous pixel at its depth z, J = d project / d z, M = d project / d xi and C the motion's
