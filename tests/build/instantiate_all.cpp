@@ -85,7 +85,6 @@ static void instantiate_geometry() noexcept {
           const cfp::PointPairs<Scalar>&, const cfp::PinholeCamera<Scalar>&, const cfp::FundamentalRansacOptions&,
           cfp::FundamentalRansacWorkspace&, cfp::span<char>)>(&cfp::fundamental_ransac<Scalar>));
   use(&cfp::reprojection_distances<cfp::PinholeCamera<Scalar>>);
-  use(&cfp::transfer_distances<Scalar>);
 }
 
 // ---- detection ----

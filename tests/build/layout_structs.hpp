@@ -63,9 +63,10 @@
   CFP_LAYOUT(cfp::TrajectoryCoverage, largest_stamp_difference_s)        \
   CFP_LAYOUT(cfp::AbsoluteErrorOptions, expected_poses)                  \
   CFP_LAYOUT(cfp::PoseErrors, rotation_deg)                              \
-  CFP_LAYOUT(cfp::AbsoluteErrorResult, status)                           \
+  CFP_LAYOUT(cfp::TrajectoryErrorResult, status)                         \
+  CFP_LAYOUT(cfp::AbsoluteErrorResult, alignment)                        \
   CFP_LAYOUT(cfp::RelativeErrorOptions, expected_poses)                  \
-  CFP_LAYOUT(cfp::RelativeErrorResult, status)                           \
+  CFP_LAYOUT(cfp::RelativeErrorResult, unit)                             \
   CFP_LAYOUT(cfp::Box<float>, y2)                                        \
   CFP_LAYOUT(cfp::Box<double>, y2)                                       \
   CFP_LAYOUT(cfp::PinholeCamera<float>, cy)                              \

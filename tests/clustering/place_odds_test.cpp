@@ -1,4 +1,4 @@
-#include "cfp/clustering/place_odds.hpp"
+#include "cfp/clustering/depth_foreground.hpp"
 
 #include <array>
 #include <cstdint>

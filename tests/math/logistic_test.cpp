@@ -1,4 +1,4 @@
-#include "cfp/math/logistic.hpp"
+#include "cfp/probability/distance_sigmoid.hpp"
 
 #include <cfenv>
 #include <cmath>

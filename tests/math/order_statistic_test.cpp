@@ -1,7 +1,6 @@
 #include "cfp/math/order_statistic.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -61,21 +60,6 @@ TEMPLATE_TEST_CASE("order_statistic equals the sorted array's element", "[math]"
   }
 }
 
-TEMPLATE_TEST_CASE("select_quantiles gives the three values of the object probability", "[math]", float, double) {
-  for (const std::size_t n : {1UL, 2UL, 9UL, 10UL, 11UL, 30UL, 100UL, 777UL, 3000UL}) {
-    for (const std::vector<TestType>& values : value_sets<TestType>(n)) {
-      std::vector<TestType> sorted = values;
-      std::sort(sorted.begin(), sorted.end());
-      for (const std::array<double, 3>& quantiles :
-           {std::array<double, 3>{0.1, 0.2, 0.3}, {0.0, 0.5, 1.0}, {0.8, 0.8, 0.8}}) {
-        std::vector<TestType> scratch = values;
-        const std::array<TestType, 3> selected = cfp::select_quantiles(span<TestType>(scratch), quantiles);
-        for (std::size_t i = 0; i < 3; ++i) CHECK(selected[i] == sorted[cfp::quantile_rank(quantiles[i], n) - 1]);
-      }
-    }
-  }
-}
-
 TEST_CASE("quantile_rank is the exact ceiling of the decimal product", "[math]") {
   for (std::size_t n = 1; n <= 3000; ++n) {
     for (std::size_t tenths = 1; tenths <= 10; ++tenths) {
@@ -110,7 +94,6 @@ TEST_CASE("A rank beyond the end counts as the last", "[math]") {
 
 TEMPLATE_TEST_CASE("no values give 0", "[math]", float, double) {
   CHECK(cfp::order_statistic(span<TestType>(), 0) == 0);
-  CHECK(cfp::select_quantiles(span<TestType>(), std::array<double, 2>{0.1, 0.9}) == std::array<TestType, 2>{});
 }
 
 TEMPLATE_TEST_CASE("order_statistic ends and stays in memory when values are NaN", "[math]", float, double) {
@@ -129,7 +112,6 @@ TEMPLATE_TEST_CASE("order_statistic ends and stays in memory when values are NaN
         static_cast<std::size_t>(std::count_if(values.begin(), values.end(), [](TestType x) { return x == x; }));
     std::vector<TestType> kept = values;
     (void)cfp::order_statistic(span<TestType>(values), rank);
-    (void)cfp::select_quantiles(span<TestType>(values), std::array<double, 3>{0.1, 0.5, 0.9});
     // What comes out is one of the values that went in.
     const TestType selected = cfp::order_statistic(span<TestType>(kept), rank);
     CHECK(((numbers < kept.size() && selected != selected) || (selected >= TestType(-10) && selected <= TestType(10))));

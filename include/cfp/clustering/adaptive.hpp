@@ -31,6 +31,8 @@ struct AdaptiveOptions {
   double density = 0.3;         ///< share of the foreground's density that a core point must have; (0, 1]
 };
 
+inline namespace CFP_ISA {
+
 [[nodiscard]] constexpr OptionPath invalid_field(const AdaptiveOptions& o) noexcept {
   if (const OptionPath field = nested("fixed", invalid_field(o.fixed))) return field;
   if (const OptionPath field = nested("noise", invalid_field(o.noise))) return field;
@@ -42,8 +44,6 @@ struct AdaptiveOptions {
   if (!(o.density > 0.0 && o.density <= 1.0)) return "density";
   return {};
 }
-
-inline namespace CFP_ISA {
 
 /// eps (metres) and min_pts for depths that are valid and ascending.
 /// The rule reads the foreground's depth z at `min_share`, sets eps to `spacing_factor` mean spacings around it within

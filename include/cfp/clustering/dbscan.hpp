@@ -23,12 +23,6 @@ struct DbscanOptions {
   std::size_t min_pts = 5;  ///< a value with at least so many neighbours, itself included, is a core point; >= 1
 };
 
-[[nodiscard]] constexpr OptionPath invalid_field(const DbscanOptions& options) noexcept {
-  if (!detail::non_negative(options.eps)) return "eps";
-  if (options.min_pts < 1) return "min_pts";
-  return {};
-}
-
 struct DbscanResult {
   Status status = Status::ok;  ///< invalid_input: options outside their range, everything is noise. No clusters is ok.
   std::size_t clusters = 0;    ///< labels run from 0 to clusters - 1
@@ -76,6 +70,12 @@ void count_neighbours(span<const Scalar> values, Scalar eps, std::vector<std::ui
 }  // namespace detail
 
 inline namespace CFP_ISA {
+
+[[nodiscard]] constexpr OptionPath invalid_field(const DbscanOptions& options) noexcept {
+  if (!detail::non_negative(options.eps)) return "eps";
+  if (options.min_pts < 1) return "min_pts";
+  return {};
+}
 
 /// DBSCAN of values that are finite and ascending already (asserted in debug builds): `labels[i]` belongs to
 /// `values[i]`. As `dbscan` otherwise. O(n).

@@ -43,6 +43,8 @@ struct ForegroundOptions {
   bool invalid_is_foreground = true;  ///< label of points without a valid depth: true is the safe side
 };
 
+inline namespace CFP_ISA {
+
 [[nodiscard]] constexpr OptionPath invalid_field(const ForegroundOptions& o) noexcept {
   if (const OptionPath field = nested("adaptive", invalid_field(o.adaptive))) return field;
   if (!(o.near_share >= 0.0 && o.near_share < 1.0)) return "near_share";
@@ -58,6 +60,8 @@ struct ForegroundOptions {
   if (o.min_points < 1) return "min_points";
   return {};
 }
+
+}  // namespace CFP_ISA
 
 /// All but `ok` say that the depths cannot tell, and label every point with a valid depth foreground: the safe side, as
 /// the paper gives foreground points of a moving person the probability 0.

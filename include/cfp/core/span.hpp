@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <iterator>
 #include <type_traits>
 #include <utility>
 
@@ -22,11 +23,14 @@ template <typename C>
 struct is_strided_eigen<C, std::void_t<typename C::PlainObject>>
     : std::bool_constant<!std::is_same_v<typename C::PlainObject, C>> {};
 
-// Exists where C has data() and size() over adjacent elements that a span<T> may view.
-template <typename C, typename T, typename = decltype(std::declval<C&>().size())>
+// The elements of a contiguous range, as constant as a reference of type C& or, for a temporary, C const& sees them.
+template <typename C>
+using element_of = std::remove_pointer_t<decltype(std::data(std::declval<const C&>()))>;
+
+// Exists where C has adjacent elements that a span<T> may view.
+template <typename C, typename T, typename = decltype(std::size(std::declval<const C&>()))>
 using contiguous_of =
-    std::enable_if_t<std::is_convertible_v<std::remove_pointer_t<decltype(std::declval<C&>().data())> (*)[], T (*)[]> &&
-                     !is_strided_eigen<std::remove_const_t<C>>::value>;
+    std::enable_if_t<std::is_convertible_v<element_of<C> (*)[], T (*)[]> && !is_strided_eigen<std::decay_t<C>>::value>;
 
 }  // namespace detail
 
@@ -38,7 +42,7 @@ using non_deduced = std::common_type_t<T>;
 
 /// The element type of a contiguous range, without const.
 template <typename Range>
-using range_value_t = std::remove_cv_t<std::remove_pointer_t<decltype(std::declval<const Range&>().data())>>;
+using range_value_t = std::remove_cv_t<detail::element_of<Range>>;
 
 /// Pointer and length, as C++20's std::span with dynamic extent. Converts from arrays, std::vector, std::array, other
 /// spans, plain Eigen vectors: whatever has data() and size() over adjacent elements.
@@ -51,14 +55,8 @@ class span {
 
   constexpr span() noexcept = default;
   constexpr span(T* data, std::size_t size) noexcept : data_(data), size_(size) {}
-  template <std::size_t N>
-  constexpr span(T (&array)[N]) noexcept : data_(array), size_(N) {}
   template <typename C, typename = detail::contiguous_of<C, T>>
-  constexpr span(C& container) noexcept : data_(container.data()), size_(static_cast<std::size_t>(container.size())) {}
-  template <typename C, typename = detail::contiguous_of<const C, T>,
-            std::enable_if_t<std::is_const_v<T>, C>* = nullptr>
-  constexpr span(const C& container) noexcept
-      : data_(container.data()), size_(static_cast<std::size_t>(container.size())) {}
+  constexpr span(C&& range) noexcept : data_(std::data(range)), size_(static_cast<std::size_t>(std::size(range))) {}
 
   [[nodiscard]] constexpr T* data() const noexcept { return data_; }
   [[nodiscard]] constexpr std::size_t size() const noexcept { return size_; }
@@ -80,7 +78,7 @@ class span {
 };
 
 template <typename C>
-span(C&) -> span<std::remove_pointer_t<decltype(std::declval<C&>().data())>>;
+span(C&&) -> span<detail::element_of<C>>;
 
 namespace detail {
 

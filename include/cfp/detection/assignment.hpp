@@ -110,18 +110,6 @@ struct AssignmentSearch {
     return distance.minCoeff();
   }
 
-  // A pair of the row and its cheapest column, if that is free. Before any search.
-  void take_cheapest(std::size_t row) noexcept {
-    const View cost(w.costs.data() + row * columns, static_cast<Eigen::Index>(columns));
-    const double least = cost.minCoeff();
-    const auto j = static_cast<std::size_t>(std::find(cost.begin(), cost.end(), least) - cost.begin());
-    if (least < infinity && w.row_of_column[j] == unassigned) pair(row, j);
-  }
-  void pair(std::size_t row, std::size_t column) noexcept {
-    column_of_row[row] = static_cast<int>(column);
-    w.row_of_column[column] = static_cast<int>(row);
-  }
-
   // Dijkstra from a row without a pair to the nearest free column, or to the dummy of any row on the way.
   void augment(std::size_t start) noexcept {
     std::fill(w.distance.begin(), w.distance.end(), infinity);
@@ -155,7 +143,8 @@ struct AssignmentSearch {
       end = static_cast<std::size_t>(
           std::min_element(w.visits.begin(), w.visits.begin() + std::ptrdiff_t(end), nearer) - w.visits.begin());
       const Visit& before = w.visits[end];
-      pair(before.row, j);
+      column_of_row[before.row] = column;
+      w.row_of_column[j] = static_cast<int>(before.row);
       column = before.column;
     }
     for (std::size_t k = 1; k < visits; ++k)
@@ -200,10 +189,7 @@ AssignmentResult solve_assignment(const CostMatrix<Scalar>& costs, double max_co
   const Eigen::Map<const Eigen::ArrayXd> allowed(workspace.costs.data(), Eigen::Index(workspace.costs.size()));
   const double gate = detail::effective_gate(allowed, max_cost, (std::min)(costs.rows, costs.cols));
   detail::AssignmentSearch<AssignmentWorkspace> search{workspace, column_of_row, gate};
-  for (std::size_t i = 0; i < costs.rows && costs.cols > 0; ++i) search.take_cheapest(i);
-  for (std::size_t i = 0; i < costs.rows && costs.cols > 0; ++i) {
-    if (column_of_row[i] == unassigned) search.augment(i);
-  }
+  for (std::size_t i = 0; i < costs.rows && costs.cols > 0; ++i) search.augment(i);
   for (std::size_t i = 0; i < costs.rows; ++i) {
     if (column_of_row[i] == unassigned) continue;
     result.cost += static_cast<double>(costs(i, static_cast<std::size_t>(column_of_row[i])));

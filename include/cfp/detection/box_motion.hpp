@@ -36,15 +36,6 @@ struct BoxMotionOptions {
   double initial_size_rate = 0.2;    ///< the same of the log size rate, per second, > 0
 };
 
-[[nodiscard]] inline OptionPath invalid_field(const BoxMotionOptions& o) noexcept {
-  if (!(o.edge_noise > 0 && o.edge_noise <= 1)) return "edge_noise";
-  if (!(o.centre_acceleration >= 0 && o.centre_acceleration <= 1e6)) return "centre_acceleration";
-  if (!(o.size_acceleration >= 0 && o.size_acceleration <= 1e6)) return "size_acceleration";
-  if (!(o.initial_centre_rate > 0 && o.initial_centre_rate <= 1e6)) return "initial_centre_rate";
-  if (!(o.initial_size_rate > 0 && o.initial_size_rate <= 1e6)) return "initial_size_rate";
-  return {};
-}
-
 /// Kalman filter of a value that changes at a nearly constant rate (per second): x <- x + dt x', white noise on the
 /// acceleration of spectral density q^2, so Q = q^2 [dt^3/3, dt^2/2; dt^2/2, dt]; one step of 2 dt equals two of dt.
 template <typename Scalar>
@@ -130,6 +121,15 @@ CFP_INLINE void for_each_innovation(Filter& filter, const Box<Scalar>& measured,
 }  // namespace detail
 
 inline namespace CFP_ISA {
+
+[[nodiscard]] inline OptionPath invalid_field(const BoxMotionOptions& o) noexcept {
+  if (!(o.edge_noise > 0 && o.edge_noise <= 1)) return "edge_noise";
+  if (!(o.centre_acceleration >= 0 && o.centre_acceleration <= 1e6)) return "centre_acceleration";
+  if (!(o.size_acceleration >= 0 && o.size_acceleration <= 1e6)) return "size_acceleration";
+  if (!(o.initial_centre_rate > 0 && o.initial_centre_rate <= 1e6)) return "initial_centre_rate";
+  if (!(o.initial_size_rate > 0 && o.initial_size_rate <= 1e6)) return "initial_size_rate";
+  return {};
+}
 
 /// A filter at rest on a detected box, which has to be proper (is_proper) with edges below 1e6 px in magnitude.
 template <typename Scalar>

@@ -56,6 +56,8 @@ struct BoxTrackerOptions {
   double image_height = 0;    ///< px
 };
 
+inline namespace CFP_ISA {
+
 [[nodiscard]] inline OptionPath invalid_field(const BoxTrackerOptions& o) noexcept {
   if (const OptionPath field = nested("motion", invalid_field(o.motion))) return field;
   if (!(o.min_iou >= 0 && o.min_iou < 1)) return "min_iou";
@@ -72,6 +74,8 @@ struct BoxTrackerOptions {
   if (!(o.image_height >= 0 && o.image_height <= 1e6)) return "image_height";
   return {};
 }
+
+}  // namespace CFP_ISA
 
 /// One frame's result. `boxes` views the tracker's memory and holds until its next call.
 template <typename Scalar>

@@ -58,38 +58,36 @@ inline namespace CFP_ISA {
 template <typename From, typename To>
 [[nodiscard]] AlignmentResult align_points(const From& from, const To& to, bool with_scale = false) noexcept {
   CFP_ASSERT(from.size() == to.size());
-  const auto size = [](const auto& point) { return point.template cast<double>().template lpNorm<Eigen::Infinity>(); };
-  const auto finite = [&](std::size_t i) { return from[i].allFinite() && to[i].allFinite(); };
+  const auto for_each_finite = [&](double unit, const auto& visit) {
+    for (std::size_t i = 0; i < from.size(); ++i) {
+      if (!from[i].allFinite() || !to[i].allFinite()) continue;
+      const Vector3<double> a = from[i].template cast<double>() / unit, b = to[i].template cast<double>() / unit;
+      visit(a, b);
+    }
+  };
   AlignmentResult result;
   double largest = 0;
-  for (std::size_t i = 0; i < from.size(); ++i) {
-    if (!finite(i)) continue;
+  for_each_finite(1, [&](const Vector3<double>& a, const Vector3<double>& b) {
     ++result.used;
-    largest = (std::max)({largest, size(from[i]), size(to[i])});
-  }
+    largest = (std::max)({largest, a.cwiseAbs().maxCoeff(), b.cwiseAbs().maxCoeff()});
+  });
   result.skipped = from.size() - result.used;
   if (result.used == 0) return result;
 
   // A common unit keeps a rigid motion rigid; the product with 1/unit would overflow for a subnormal unit, so divide.
   const double unit = (std::max)(largest, (std::numeric_limits<double>::min)());
-  const auto scaled = [unit](const auto& points, std::size_t i) -> Vector3<double> {
-    return points[i].template cast<double>() / unit;
-  };
   const double n = static_cast<double>(result.used);
   Vector3<double> from_mean = Vector3<double>::Zero(), to_mean = Vector3<double>::Zero();
-  for (std::size_t i = 0; i < from.size(); ++i) {
-    if (!finite(i)) continue;
-    from_mean += scaled(from, i) / n;
-    to_mean += scaled(to, i) / n;
-  }
+  for_each_finite(unit, [&](const Vector3<double>& a, const Vector3<double>& b) {
+    from_mean += a / n;
+    to_mean += b / n;
+  });
   Matrix3<double> H = Matrix3<double>::Zero();
   double from_spread = 0;
-  for (std::size_t i = 0; i < from.size(); ++i) {
-    if (!finite(i)) continue;
-    const Vector3<double> a = scaled(from, i) - from_mean;
-    H += (scaled(to, i) - to_mean) * a.transpose();
-    from_spread += a.squaredNorm();
-  }
+  for_each_finite(unit, [&](const Vector3<double>& a, const Vector3<double>& b) {
+    H += (b - to_mean) * (a - from_mean).transpose();
+    from_spread += (a - from_mean).squaredNorm();
+  });
   const SVD3<double> H_svd = svd(H);  // U and V are rotations, the last singular value has the sign of det H
   Similarity& S = result.S_to_from;
   S.rotation = H_svd.U * H_svd.V.transpose();

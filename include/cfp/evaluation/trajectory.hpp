@@ -57,11 +57,10 @@ inline namespace CFP_ISA {
 /// quaternions are rounded, and an all-zero one, the TUM files' "no pose", must fail).
 template <typename Scalar>
 [[nodiscard]] bool is_usable(const StampedPose<Scalar>& pose) noexcept {
-  const Matrix3<Scalar>& R = pose.T_world_cam.rotation;
-  const Scalar volume = determinant(R);
-  const Vector3<Scalar>& t = pose.T_world_cam.translation;
-  return is_finite(pose.time_s) && is_finite(t.x()) && is_finite(t.y()) && is_finite(t.z()) && volume > Scalar(0.5) &&
-         volume < Scalar(2) && R.squaredNorm() < Scalar(12);
+  const SE3<Scalar>& T = pose.T_world_cam;
+  const Scalar volume = determinant(T.rotation);
+  return is_finite(pose.time_s) && T.translation.allFinite() && volume > Scalar(0.5) && volume < Scalar(2) &&
+         T.rotation.squaredNorm() < Scalar(12);
 }
 
 /// Indices of the usable poses in order of time; of several with one stamp the last in the array stays, as in the
@@ -90,26 +89,20 @@ template <typename First, typename Second>
                                                const AssociationOptions& options = {}) {
   const std::vector<std::size_t> first_order = time_order(first), second_order = time_order(second);
   const auto second_time = [&](std::size_t j) { return second[second_order[j]].time_s + options.offset_s; };
-  struct Candidate {
-    double difference_s;
-    std::size_t first, second;  // positions in the orders
-  };
-  std::vector<Candidate> candidates;
+  std::vector<std::tuple<double, std::size_t, std::size_t>> candidates;  // difference, positions in the orders
   for (std::size_t i = 0, begin = 0; i < first_order.size(); ++i) {
     const double time = first[first_order[i]].time_s;
     while (begin < second_order.size() && time - second_time(begin) >= options.max_difference_s) ++begin;
     for (std::size_t j = begin; j < second_order.size() && second_time(j) - time < options.max_difference_s; ++j)
-      candidates.push_back({std::abs(time - second_time(j)), i, j});
+      candidates.emplace_back(std::abs(time - second_time(j)), i, j);
   }
-  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
-    return std::tie(a.difference_s, a.first, a.second) < std::tie(b.difference_s, b.first, b.second);
-  });
+  std::sort(candidates.begin(), candidates.end());
   std::vector<char> first_taken(first_order.size()), second_taken(second_order.size());
   std::vector<TimeMatch> matches;
-  for (const Candidate& pair : candidates) {
-    if (first_taken[pair.first] != 0 || second_taken[pair.second] != 0) continue;
-    first_taken[pair.first] = second_taken[pair.second] = 1;
-    matches.push_back({first_order[pair.first], second_order[pair.second]});
+  for (const auto& [difference_s, i, j] : candidates) {
+    if (first_taken[i] != 0 || second_taken[j] != 0) continue;
+    first_taken[i] = second_taken[j] = 1;
+    matches.push_back({first_order[i], second_order[j]});
   }
   std::sort(matches.begin(), matches.end(),
             [&](const TimeMatch& a, const TimeMatch& b) { return first[a.first].time_s < first[b.first].time_s; });
@@ -164,7 +157,6 @@ std::size_t closest_index(std::size_t n, double target, const Value& value) noex
       difference = std::abs(value(middle) - target);
       best = middle;
     }
-    if (value(middle) == target) return middle;
     if (value(middle) > target) {
       end = middle;
     } else {

@@ -35,15 +35,20 @@ struct PoseErrors {
   }
 };
 
-struct AbsoluteErrorResult {
-  ErrorStatistics translation_m;  ///< |t_truth − S t_estimate| after alignment; the field's "ATE" is its rmse
-  ErrorStatistics rotation_deg;   ///< angle of R_truthᵀ S.R R_estimate; not in the TUM script
+/// What the absolute and the relative error have in common.
+struct TrajectoryErrorResult {
+  ErrorStatistics translation_m, rotation_deg;
   PoseErrors errors;
+  TrajectoryCoverage coverage;
+  Status status = Status::not_enough_data;
+};
+
+/// translation_m: |t_truth − S t_estimate| after alignment; the field's "ATE" is its rmse. rotation_deg: angle of
+/// R_truthᵀ S.R R_estimate; not in the TUM script. degenerate: the matched poses do not fix the alignment's rotation;
+/// errors valid.
+struct AbsoluteErrorResult : TrajectoryErrorResult {
   Similarity S_truth_estimate;  ///< the alignment
   AlignmentMode alignment = AlignmentMode::rigid;
-  TrajectoryCoverage coverage;
-  /// degenerate: the matched poses do not fix the alignment's rotation; errors valid
-  Status status = Status::not_enough_data;
 };
 
 enum class DeltaUnit : std::uint8_t {
@@ -63,14 +68,10 @@ struct RelativeErrorOptions {
   std::size_t expected_poses = 0;       ///< as in AbsoluteErrorOptions
 };
 
-struct RelativeErrorResult {
-  ErrorStatistics translation_m;  ///< per interval, not divided by its length
-  ErrorStatistics rotation_deg;
-  PoseErrors errors;
+/// Errors per interval, not divided by its length. coverage.matched: poses that begin or end a pair.
+struct RelativeErrorResult : TrajectoryErrorResult {
   double delta = 1;
   DeltaUnit unit = DeltaUnit::seconds;
-  TrajectoryCoverage coverage;  ///< matched: poses that begin or end a pair
-  Status status = Status::not_enough_data;
 };
 
 inline namespace CFP_ISA {

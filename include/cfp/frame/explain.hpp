@@ -64,14 +64,6 @@ template <typename Scalar>
           static_cast<double>(evidence.confidence)};
 }
 
-template <typename Scalar>
-[[nodiscard]] WeightReason weight_reason(std::size_t i, Scalar m, const FrameOptions& options,
-                                         const FrameState<Scalar>& state) noexcept {
-  if (!(m >= Scalar(0))) return WeightReason::keypoint_alone;
-  if (is_raised(state.label[i], state.report.health.fallback)) return WeightReason::fallback;
-  return is_mismatched(i, m, options, state) ? WeightReason::mismatch : WeightReason::map_point;
-}
-
 /// Three decimals.
 [[nodiscard]] inline std::string number(double value) {
   std::string text = std::to_string(value + (value < 0 ? -0.0005 : 0.0005));
@@ -124,7 +116,10 @@ template <typename Scalar>
   }
   e.static_probability = static_cast<double>(state.static_probability[i]);
   e.map_point_probability = static_cast<double>(map_point_probability);
-  e.reason = detail::weight_reason(i, map_point_probability, options, state);
+  e.reason = !(map_point_probability >= Scalar(0))                     ? WeightReason::keypoint_alone
+             : is_raised(e.label, state.report.health.fallback)        ? WeightReason::fallback
+             : is_mismatched(i, map_point_probability, options, state) ? WeightReason::mismatch
+                                                                       : WeightReason::map_point;
   e.weight = static_cast<double>(keypoint_weight(i, map_point_probability, options, state));
   return e;
 }

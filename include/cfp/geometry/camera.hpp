@@ -1,7 +1,8 @@
 /// @file camera.hpp
 /// The camera interface: any type with the two members of PinholeCamera below (and the alias `ScalarType`) is a camera
 /// for cfp. Camera frame: x right, y down, z forward, metres; pixels with the origin of the caller's calibration.
-/// And the undistorted image of any such camera: epipolar geometry holds only there.
+/// And the undistorted image of any such camera: epipolar geometry holds only there; and what a camera that turns makes
+/// of it.
 #pragma once
 
 #include <array>
@@ -11,6 +12,7 @@
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/types.hpp"
+#include "cfp/math/matrix3.hpp"
 
 namespace cfp {
 
@@ -84,16 +86,6 @@ template <typename Camera>
   return {jacobian(0, 0), jacobian(1, 1), centre.x(), centre.y()};
 }
 
-/// The pixel of `camera` in its undistorted image, that of `pinhole` = undistorted_camera(camera). False, and
-/// undistorted untouched, where the pixel has no ray.
-template <typename Camera>
-[[nodiscard]] bool undistort(const Camera& camera, const PinholeCamera<typename Camera::ScalarType>& pinhole,
-                             const Vector2<typename Camera::ScalarType>& pixel,
-                             Vector2<typename Camera::ScalarType>& undistorted) noexcept {
-  Vector3<typename Camera::ScalarType> ray;
-  return camera.unproject(pixel, ray) && pinhole.project(ray, undistorted);
-}
-
 /// The points in the camera's undistorted image, kept in `storage`, which the returned view refers to; a pinhole
 /// camera's points are their own, and storage is not touched. A pixel without a ray becomes NaN, which no distance
 /// accepts. Allocates only to grow storage.
@@ -108,12 +100,22 @@ template <typename Camera>
     const PinholeCamera<Scalar> pinhole = undistorted_camera(camera);
     storage.resize(points.size());
     for (std::size_t i = 0; i < points.size(); ++i) {
+      Vector3<Scalar> ray;
       Vector2<Scalar> pixel;
-      if (!undistort(camera, pinhole, points[i], pixel)) pixel.setConstant(std::numeric_limits<Scalar>::quiet_NaN());
+      if (!camera.unproject(points[i], ray) || !pinhole.project(ray, pixel))
+        pixel.setConstant(std::numeric_limits<Scalar>::quiet_NaN());
       storage[i] = {pixel.x(), pixel.y()};
     }
     return PointSpan<Scalar, 2>(storage);
   }
+}
+
+/// The motion of the whole image when the camera turns by R (of T_cur_prev): K R K^-1 with the camera matrix K, pixels
+/// of the undistorted image. For the box tracker, which knows nothing of the camera.
+template <typename Scalar>
+[[nodiscard]] Matrix3<Scalar> rotation_homography(const PinholeCamera<Scalar>& camera,
+                                                  const Matrix3<non_deduced<Scalar>>& R) noexcept {
+  return camera.matrix() * R * inverse(camera.matrix());
 }
 
 }  // namespace CFP_ISA

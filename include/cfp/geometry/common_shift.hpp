@@ -67,8 +67,7 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
   CFP_ASSERT(cur.size() == prev.size() && detail::fits(prev.size(), depths_prev));
   constexpr int passes = 2;
   // A micrometre and a microradian of error are none, and give every covariance an inverse.
-  Matrix6<double> covariance, information, inverse;
-  for (int k = 0; k < 36; ++k) covariance.data()[k] = static_cast<double>(motion.covariance.data()[k]);
+  Matrix6<double> covariance = motion.template cast<double>().covariance, information, inverse;
   for (int k = 0; k < 6; ++k) covariance(k, k) += 1e-12;
   if (depths_prev.empty() || !invert_normal_equations<6>(covariance, 1e-14, information)) return 0;
 

@@ -23,15 +23,6 @@ struct MotionDistanceOptions {
   UnknownDepth unknown_depth;  ///< of all others
 };
 
-inline namespace CFP_ISA {
-
-[[nodiscard]] constexpr OptionPath invalid_field(const MotionDistanceOptions& o) noexcept {
-  if (const OptionPath field = nested("depth_noise", invalid_field(o.depth_noise))) return field;
-  return nested("unknown_depth", invalid_field(o.unknown_depth));
-}
-
-}  // namespace CFP_ISA
-
 namespace detail {
 
 /// A flow pair against the camera's motion.
@@ -72,33 +63,28 @@ template <typename Camera, typename Scalar>
   return true;
 }
 
-/// motion_distance under a motion of this covariance; none: an exact motion.
+/// motion_distance; of an exact motion the covariance is zero and takes no time.
 template <typename Camera, typename Scalar>
 [[nodiscard]] Scalar distance_under(const Vector2<Scalar>& pixel_prev, const Scalar& depth_prev,
-                                    const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
-                                    const Eigen::Matrix<Scalar, 6, 6, Eigen::DontAlign>* covariance,
+                                    const Vector2<Scalar>& pixel_cur, const UncertainMotion<Scalar>& motion, bool exact,
                                     const Camera& camera, const Scalar& sigma_px,
                                     const MotionDistanceOptions& options) noexcept {
   using std::sqrt;
   const Scalar none = Scalar(no_distance<double>);
   MotionResidual<Scalar> pair;
-  if (!motion_residual(pixel_prev, depth_prev, pixel_cur, T_cur_prev, camera, options, pair)) return none;
+  if (!motion_residual(pixel_prev, depth_prev, pixel_cur, motion.T_cur_prev, camera, options, pair)) return none;
   // W = I + M C M^T / sigma^2, and its inverse.
   Scalar a = Scalar(1), b = Scalar(0), c = Scalar(1);
-  if (covariance != nullptr) {
+  if (!exact) {
     const Scalar per_variance = Scalar(1) / (sigma_px * sigma_px);
-    Scalar C_M[2][6];
-    for (int row = 0; row < 2; ++row) {
-      for (int k = 0; k < 6; ++k) {
-        C_M[row][k] = Scalar(0);
-        for (int i = 0; i < 6; ++i) C_M[row][k] += pair.M[row][i] * (*covariance)(i, k);
-      }
-    }
     a = b = c = Scalar(0);
     for (int k = 0; k < 6; ++k) {
-      a += C_M[0][k] * pair.M[0][k];
-      b += C_M[0][k] * pair.M[1][k];
-      c += C_M[1][k] * pair.M[1][k];
+      Scalar first(0), second(0);  // of column k of M C
+      for (int i = 0; i < 6; ++i) first += pair.M[0][i] * motion.covariance(i, k);
+      for (int i = 0; i < 6; ++i) second += pair.M[1][i] * motion.covariance(i, k);
+      a += first * pair.M[0][k];
+      b += first * pair.M[1][k];
+      c += second * pair.M[1][k];
     }
     a = Scalar(1) + per_variance * a, b = per_variance * b, c = Scalar(1) + per_variance * c;
   }
@@ -121,6 +107,11 @@ template <typename Camera, typename Scalar>
 
 inline namespace CFP_ISA {
 
+[[nodiscard]] constexpr OptionPath invalid_field(const MotionDistanceOptions& o) noexcept {
+  if (const OptionPath field = nested("depth_noise", invalid_field(o.depth_noise))) return field;
+  return nested("unknown_depth", invalid_field(o.unknown_depth));
+}
+
 /// d = sigma sqrt(r^T (sigma^2 I + sigma_z^2 J J^T + M C M^T)^-1 r), in pixels, with r = pixel_cur - project(p), p =
 /// T_cur_prev X, X the previous pixel at its depth z, J = d project / d z, M = d project / d xi and C the motion's
 /// covariance: the Mahalanobis distance of the pair, times sigma_px, so that (d / sigma)^2 has two degrees of freedom.
@@ -136,8 +127,8 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
                                      const UncertainMotion<non_deduced<Scalar>>& motion, const Camera& camera,
                                      const non_deduced<Scalar>& sigma_px,
                                      const MotionDistanceOptions& options) noexcept {
-  return detail::distance_under<Camera, Scalar>(pixel_prev, depth_prev, pixel_cur, motion.T_cur_prev,
-                                                &motion.covariance, camera, sigma_px, options);
+  return detail::distance_under<Camera, Scalar>(pixel_prev, depth_prev, pixel_cur, motion, false, camera, sigma_px,
+                                                options);
 }
 
 /// motion_distance of every pair. `depths_prev` may be empty: none is known. Sizes must agree. Allocates nothing.
@@ -148,11 +139,10 @@ void motion_distances(const PointSpan<non_deduced<Scalar>, 2>& prev, span<const 
                       span<non_deduced<Scalar>> out) noexcept {
   CFP_ASSERT(prev.size() == out.size() && cur.size() == out.size());
   CFP_ASSERT(detail::fits(out.size(), depths_prev));
-  const auto* covariance = motion.covariance.isZero(0) ? nullptr : &motion.covariance;
+  const bool exact = motion.covariance.isZero(0);
   for (std::size_t i = 0; i < out.size(); ++i) {
     const Scalar depth = depths_prev.empty() ? Scalar(0) : depths_prev[i];
-    out[i] = detail::distance_under<Camera, Scalar>(prev[i], depth, cur[i], motion.T_cur_prev, covariance, camera,
-                                                    sigma_px, options);
+    out[i] = detail::distance_under<Camera, Scalar>(prev[i], depth, cur[i], motion, exact, camera, sigma_px, options);
   }
 }
 

@@ -132,12 +132,7 @@ struct RadialTangentialCamera {
     const Scalar x = point.x() * inv_z;
     const Scalar y = point.y() * inv_z;
     detail::DistortedPoint<Scalar> d;
-    if (!detail::distort(*this, x, y, d)) return false;
-    const Scalar u = fx * d.x + cx;
-    const Scalar v = fy * d.y + cy;
-    if (!is_finite(u) || !is_finite(v)) return false;
-    pixel[0] = u;
-    pixel[1] = v;
+    if (!detail::distort(*this, x, y, d) || !pinhole().project({d.x, d.y, Scalar(1)}, pixel)) return false;
     if (jacobian != nullptr) {
       const Scalar fx_z = fx * inv_z;
       const Scalar fy_z = fy * inv_z;

@@ -22,32 +22,29 @@ inline namespace CFP_ISA {
 /// Views of OpenCV's point vectors; valid while the vector is neither destroyed nor resized. Nothing is copied.
 template <typename Scalar>
 [[nodiscard]] PointSpan<Scalar, 2> view(const std::vector<cv::Point_<Scalar>>& points) noexcept {
-  return points.empty() ? PointSpan<Scalar, 2>()
-                        : PointSpan<Scalar, 2>(&points.front().x, points.size(), sizeof(cv::Point_<Scalar>));
+  return {reinterpret_cast<const Scalar*>(points.data()), points.size(), sizeof(cv::Point_<Scalar>)};
 }
 template <typename Scalar>
 [[nodiscard]] PointSpan<Scalar, 3> view(const std::vector<cv::Point3_<Scalar>>& points) noexcept {
-  return points.empty() ? PointSpan<Scalar, 3>()
-                        : PointSpan<Scalar, 3>(&points.front().x, points.size(), sizeof(cv::Point3_<Scalar>));
+  return {reinterpret_cast<const Scalar*>(points.data()), points.size(), sizeof(cv::Point3_<Scalar>)};
 }
 /// The positions `pt` of keypoints, in pixels, where they lie among the other fields.
 [[nodiscard]] inline PointSpan<float, 2> view(const std::vector<cv::KeyPoint>& keypoints) noexcept {
-  return keypoints.empty() ? PointSpan<float, 2>()
-                           : PointSpan<float, 2>(&keypoints.front().pt.x, keypoints.size(), sizeof(cv::KeyPoint));
+  return {reinterpret_cast<const float*>(keypoints.data()), keypoints.size(), sizeof(cv::KeyPoint)};
 }
 template <typename Element>
 void view(const std::vector<Element>&& temporary) = delete;
 
 /// The rows of a CV_8U matrix of binary descriptors, for Frame::descriptors; empty for any other matrix.
 [[nodiscard]] inline DescriptorSpan descriptor_view(const cv::Mat& descriptors) noexcept {
-  if (descriptors.data == nullptr || descriptors.dims != 2 || descriptors.type() != CV_8UC1) return {};
+  if (!detail::is_matrix(descriptors) || descriptors.type() != CV_8UC1) return {};
   return {descriptors.data, static_cast<std::size_t>(descriptors.rows), static_cast<std::size_t>(descriptors.cols),
           descriptors.step.p[0]};
 }
 
 /// A CV_8U label image, for Frame::labels; empty for any other image.
 [[nodiscard]] inline LabelImage label_view(const cv::Mat& labels) noexcept {
-  if (labels.data == nullptr || labels.dims != 2 || labels.type() != CV_8UC1) return {};
+  if (!detail::is_matrix(labels) || labels.type() != CV_8UC1) return {};
   return {labels.data, labels.cols, labels.rows, labels.step.p[0]};
 }
 

@@ -15,7 +15,6 @@
 #include "cfp/core/span.hpp"
 #include "cfp/core/status.hpp"
 #include "cfp/geometry/radial_tangential_camera.hpp"
-#include "cfp/math/matrix3.hpp"
 #include "cfp/math/se3.hpp"
 
 namespace cfp {
@@ -105,20 +104,16 @@ inline Status sample_depth(const cv::Mat& depth, const PointSpan<float, 2>& pixe
 
 /// A pose from the upper 3x4 part of a 4x4 or 3x4 matrix, CV_32F or CV_64F (ORB-SLAM2's Tcw is T_cam_world). The
 /// rotation is normalised, as products of float matrices drift. invalid_input, and pose untouched: another size or
-/// type, an element that is not finite, a reflection, or a rotation part R with an element of R R^T - I beyond 0.01.
+/// type, or what is no rigid motion (see `is_rigid_motion`).
 template <typename Scalar>
 Status to_se3(const cv::Mat& matrix, SE3<Scalar>& pose) noexcept {
   if (!detail::is_pose_matrix(matrix)) return Status::invalid_input;
-  SE3<double> read;
+  Matrix4<double> T = Matrix4<double>::Identity();
   for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 4; ++column) {
-      const double value = detail::element(matrix, row, column);
-      if (!is_finite(static_cast<Scalar>(value))) return Status::invalid_input;
-      (column < 3 ? read.rotation(row, column) : read.translation[row]) = value;
-    }
+    for (int column = 0; column < 4; ++column) T(row, column) = detail::element(matrix, row, column);
   }
-  const Matrix3<double> excess = read.rotation * read.rotation.transpose() - Matrix3<double>::Identity();
-  if (!(excess.cwiseAbs().maxCoeff() <= 0.01) || !(determinant(read.rotation) > 0)) return Status::invalid_input;
+  SE3<double> read = SE3<double>::from_matrix(T);
+  if (!is_rigid_motion(read)) return Status::invalid_input;
   read.rotation = normalized_rotation(read.rotation);
   pose = read.template cast<Scalar>();
   return Status::ok;
@@ -158,17 +153,16 @@ template <typename Scalar>
 template <typename Scalar>
 Status write_pose(const SE3<Scalar>& pose, cv::Mat& matrix) noexcept {
   if (!detail::is_pose_matrix(matrix)) return Status::invalid_input;
+  const Matrix4<Scalar> T = pose.matrix();
   for (int row = 0; row < matrix.rows; ++row) {
     for (int column = 0; column < 4; ++column) {
-      const Scalar value =
-          row == 3 ? Scalar(column == 3 ? 1 : 0) : (column < 3 ? pose.rotation(row, column) : pose.translation[row]);
       const auto write = [&](auto number) {
         std::memcpy(detail::element_address(matrix, row, column), &number, sizeof(number));
       };
       if (matrix.type() == CV_32FC1)
-        write(static_cast<float>(value));
+        write(static_cast<float>(T(row, column)));
       else
-        write(static_cast<double>(value));
+        write(static_cast<double>(T(row, column)));
     }
   }
   return Status::ok;

@@ -97,14 +97,12 @@ template <int N>
     reduced[r] = 0;
     for (int c = 0; c <= r; ++c) reduced[r] += T(r, c) * scale[c] * g[c];
   }
-  bool finite = true;
   for (int r = 0; r < N; ++r) {
     double sum = 0;
     for (int k = r; k < N; ++k) sum += T(k, r) * reduced[k];
     step[r] = -scale[r] * sum;
-    finite = finite && is_finite(step[r]);
   }
-  return finite;
+  return step.allFinite();
 }
 
 /// The inverse of H, which makes a covariance of an information; false, and the inverse meaningless, where
@@ -115,16 +113,14 @@ template <int N>
   Eigen::Matrix<double, N, 1> scale;
   Eigen::Matrix<double, N, N> T;
   if (!detail::invert_scaled(H, 0, tolerance, scale, T)) return false;
-  bool finite = true;
   for (int r = 0; r < N; ++r) {
     for (int c = 0; c <= r; ++c) {
       double sum = 0;
       for (int k = r; k < N; ++k) sum += T(k, r) * T(k, c);
       inverse(r, c) = inverse(c, r) = scale[r] * sum * scale[c];
-      finite = finite && is_finite(inverse(r, c));
     }
   }
-  return finite;
+  return inverse.allFinite();
 }
 
 /// By how much the quadratic model falls with that step: step^T (damping diag(H) step - g).

@@ -7,7 +7,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -79,22 +78,6 @@ template <typename Scalar>
   rank0 = (std::min)(rank0, values.size() - 1);
   detail::select_rank(values.data(), values.size(), rank0);
   return values[rank0];
-}
-
-/// The values at the quantile ranks of `quantiles` (ascending), as {0.1, 0.2, 0.3}. Reorders `values`. All 0 without
-/// values.
-template <typename Scalar, std::size_t Count>
-[[nodiscard]] std::array<Scalar, Count> select_quantiles(span<Scalar> values,
-                                                         const std::array<double, Count>& quantiles) noexcept {
-  const std::size_t n = values.size();
-  std::array<Scalar, Count> selected{};
-  for (std::size_t i = Count; i-- > 0 && n > 0;) {
-    const std::size_t rank0 = quantile_rank(quantiles[i], n) - 1;
-    CFP_ASSERT(rank0 < values.size());
-    selected[i] = order_statistic(values, rank0);
-    values = values.subspan(0, rank0 + 1);  // nothing larger stands before it
-  }
-  return selected;
 }
 
 }  // namespace CFP_ISA

@@ -33,7 +33,6 @@ template <typename Scalar>
 /// a = sin(t)/t, b = (1 - cos t)/t^2, t = |w|; Taylor expansion below Tolerance::small_angle. Never divides by zero.
 template <typename Scalar = double>
 [[nodiscard]] Matrix3<Scalar> so3_exp(const Vector3<Scalar>& w) noexcept {
-  using std::cos;
   using std::sin;
   using std::sqrt;
   const Scalar t2 = w.squaredNorm();
