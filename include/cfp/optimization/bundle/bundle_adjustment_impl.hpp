@@ -43,7 +43,7 @@ template <typename Camera, typename Scalar>
 void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& workspace, BundleResult& result) {
   const BundleIndex& index = workspace.index;
   BundleSchur& schur = workspace.schur;
-  const std::size_t poses = index.caller_pose.size(), slots = index.slot_pose.size();
+  const std::size_t poses = index.caller_pose.size(), slots = index.slots.size();
   if (index.eliminate_poses)
     find_envelope<6>(index, index.points, schur.envelope);
   else

@@ -33,15 +33,14 @@ struct BundleIndex {
   std::vector<BundleMeasurement> observations;
   std::vector<std::size_t> range_begin;
   // One slot per observation, by what is eliminated, in it by what is kept.
+  std::vector<BundleMeasurement> slots;
   std::vector<std::size_t> slot_begin;  // per eliminated pose or point
-  std::vector<int> slot_pose, slot_point;
   std::array<std::size_t, bundle_parts + 1> pose_part{}, eliminated_part{};
 
   // Scratch while building.
   std::vector<BundleMeasurement> kept;
-  std::vector<int> pose_number, point_number, order, by_pose, by_point;
+  std::vector<int> pose_number, point_number, order;
   std::vector<char> is_rigid, is_met;
-  std::vector<std::size_t> pose_begin, point_begin;
 };
 
 inline namespace CFP_ISA {

@@ -170,10 +170,10 @@ void linearize_pose(const BundleIndex& index, std::size_t k, const Camera& camer
 /// The points' own blocks, from their slots.
 inline void linearize_points(const BundleIndex& index, BundleLinearization& out) noexcept {
   std::fill(out.points.begin(), out.points.end(), 0.0);
-  for (std::size_t s = 0; s < index.slot_point.size();) {
-    const int j = index.slot_point[s];
+  for (std::size_t s = 0; s < index.slots.size();) {
+    const int j = index.slots[s].point;
     double sum[BundleLinearization::slot_doubles] = {};
-    for (; s < index.slot_point.size() && index.slot_point[s] == j; ++s) {
+    for (; s < index.slots.size() && index.slots[s].point == j; ++s) {
       for (std::size_t e = 0; e < BundleLinearization::slot_doubles; ++e)
         sum[e] += out.slots[BundleLinearization::slot_doubles * s + e];
     }
