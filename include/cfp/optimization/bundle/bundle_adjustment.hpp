@@ -56,7 +56,6 @@ template <typename Camera, typename Scalar, typename Executor,
 [[nodiscard]] BundleResult adjust_bundle(const BundleProblem<Camera, Scalar>& problem, const BundleOptions& options,
                                          BundleWorkspace& workspace, Executor&& executor,
                                          span<double> squared_errors = {}) {
-  detail::assert_shapes(problem);
   BundleResult result;
   detail::build_index(problem, workspace.index, result);
   detail::prepare(problem, workspace, result);
@@ -64,8 +63,7 @@ template <typename Camera, typename Scalar, typename Executor,
     with_loss<simd::Packet<double>>(options.loss, std::sqrt(options.chi2_mono), [&](auto mono) {
       auto stereo = mono;
       stereo.delta = std::sqrt(options.chi2_stereo);
-      detail::BundleLeastSquares<BundleProblem<Camera, Scalar>, decltype(mono), decltype(stereo),
-                                 std::remove_reference_t<Executor>>
+      detail::BundleLeastSquares<BundleProblem<Camera, Scalar>, decltype(mono), std::remove_reference_t<Executor>>
           least_squares{problem, mono, stereo, workspace, executor};
       static_cast<LeastSquaresResult&>(result) = minimize_least_squares(least_squares, options.levenberg_marquardt);
     });

@@ -29,15 +29,6 @@ struct BundleWorkspace {
 namespace cfp::detail {
 inline namespace CFP_ISA {
 
-template <typename Camera, typename Scalar>
-void assert_shapes([[maybe_unused]] const BundleProblem<Camera, Scalar>& problem) noexcept {
-  [[maybe_unused]] const auto& o = problem.observations;
-  [[maybe_unused]] const std::size_t n = o.pose.size();
-  CFP_ASSERT(o.point.size() == n && o.pixels.size() == n && fits(n, o.u_right, o.sigmas, o.weights));
-  CFP_ASSERT(fits(problem.poses.size(), problem.fixed_poses));
-  CFP_ASSERT(n == 0 || problem.cameras.size() == 1 || problem.cameras.size() == problem.poses.size());
-}
-
 /// Sizes every array and copies the poses and points that take part.
 template <typename Camera, typename Scalar>
 void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& workspace, BundleResult& result) {
@@ -95,13 +86,13 @@ void move(const BundleIndex& index, const State& state, const BundleSchur& schur
 }
 
 /// Bundle adjustment as minimize_least_squares wants it.
-template <typename Problem, typename MonoLoss, typename StereoLoss, typename Executor>
+template <typename Problem, typename Loss, typename Executor>
 struct BundleLeastSquares {
   // Below so many observations a phase is over before another thread has woken up.
   static constexpr std::size_t worth_sharing = 4000;
   const Problem& problem;
-  const MonoLoss& mono;
-  const StereoLoss& stereo;
+  const Loss& mono;
+  const Loss& stereo;
   BundleWorkspace& workspace;
   Executor& executor;
 
@@ -172,13 +163,11 @@ void write_back(const BundleProblem<Camera, Scalar>& problem, const BundleWorksp
 
 template <typename Camera, typename Scalar>
 void write_squared_errors(const BundleProblem<Camera, Scalar>& problem, span<double> squared_errors) noexcept {
-  const auto& observations = problem.observations;
-  CFP_ASSERT(squared_errors.size() == observations.pose.size());
+  CFP_ASSERT(squared_errors.size() == problem.observations.pose.size());
   for (std::size_t i = 0; i < squared_errors.size(); ++i) {
     BundleMeasurement m;
     double error = -1;
-    const bool judged = read_measurement(observations, i, problem.baseline_fx, m) && is_inside(problem, m) &&
-                        squared_error(problem, m, error);
+    const bool judged = read_measurement(problem, i, m) && squared_error(problem, m, error);
     squared_errors[i] = judged && is_finite(error) ? error : -1;
   }
 }

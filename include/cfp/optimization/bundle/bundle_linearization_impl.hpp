@@ -150,10 +150,9 @@ double linearize_range(span<const BundleMeasurement> range, const Camera& camera
 }
 
 /// All observations of pose k.
-template <typename Camera, typename MonoLoss, typename StereoLoss>
-void linearize_pose(const BundleIndex& index, std::size_t k, const Camera& camera, double baseline_fx,
-                    const MonoLoss& mono, const StereoLoss& stereo, const BundleState& state,
-                    BundleLinearization& out) noexcept {
+template <typename Camera, typename Loss>
+void linearize_pose(const BundleIndex& index, std::size_t k, const Camera& camera, double baseline_fx, const Loss& mono,
+                    const Loss& stereo, const BundleState& state, BundleLinearization& out) noexcept {
   BundlePoseSums sums = {};
   BundlePoseSums* const used = k < index.free_poses ? &sums : nullptr;
   const auto range = [&](std::size_t r) {
