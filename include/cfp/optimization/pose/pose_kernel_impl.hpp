@@ -35,8 +35,9 @@ inline namespace CFP_ISA {
 
 /// Pinhole pass over the packets [begin, end); sums in lanes, handed to double every 64 packets.
 template <bool stereo, typename Scalar, typename Loss, typename C>
-void add_pinhole(const PoseColumns<Scalar>& columns, std::size_t begin, std::size_t end, const PinholeCamera<C>& camera,
-                 double baseline_fx, const SE3<double>& T, const Loss& given_loss, PoseSystem& system) noexcept {
+void add_observations(const PoseColumns<Scalar>& columns, std::size_t begin, std::size_t end,
+                      const PinholeCamera<C>& camera, const SE3<double>& T, const Loss& given_loss,
+                      PoseSystem& system) noexcept {
   using P = simd::Packet<Scalar>;
   // clang-format off
   enum {
@@ -52,7 +53,7 @@ void add_pinhole(const PoseColumns<Scalar>& columns, std::size_t begin, std::siz
   const P r20 = constant(T.rotation(2, 0)), r21 = constant(T.rotation(2, 1)), r22 = constant(T.rotation(2, 2)),
           t2 = constant(T.translation.z());
   const double aspect = static_cast<double>(camera.fy) / static_cast<double>(camera.fx), aspect_sq = aspect * aspect;
-  const P kappa = constant(aspect_sq), base = constant(baseline_fx / static_cast<double>(camera.fx));
+  const P kappa = constant(aspect_sq), base = constant(columns.baseline_fx / static_cast<double>(camera.fx));
   const P near = constant(static_cast<double>(Tolerance<Scalar>::min_depth)), wide = constant(100), one = constant(1),
           zero = constant(0), tiny = (std::numeric_limits<Scalar>::min)();
   const P n = constant(stereo ? 2 : 1);
@@ -139,8 +140,8 @@ void add_pinhole(const PoseColumns<Scalar>& columns, std::size_t begin, std::siz
 
 /// Any camera of geometry/camera.hpp, point by point in double.
 template <bool stereo, typename Scalar, typename Loss, typename Camera>
-void add_camera(const PoseColumns<Scalar>& columns, std::size_t begin, std::size_t end, const Camera& camera,
-                double baseline_fx, const SE3<double>& T, const Loss& loss, PoseSystem& system) noexcept {
+void add_observations(const PoseColumns<Scalar>& columns, std::size_t begin, std::size_t end, const Camera& camera,
+                      const SE3<double>& T, const Loss& loss, PoseSystem& system) noexcept {
   using C = typename Camera::ScalarType;
   constexpr int rows = stereo ? 3 : 2;
   for (std::size_t i = begin; i < end; ++i) {
@@ -163,9 +164,9 @@ void add_camera(const PoseColumns<Scalar>& columns, std::size_t begin, std::size
     r[1] = static_cast<double>(pixel.y()) - static_cast<double>(columns.v[i]);
     D.template topRows<2>() = pixel_by_point.template cast<double>();
     if constexpr (stereo) {
-      r[2] = static_cast<double>(pixel.x()) - baseline_fx / p.z() - static_cast<double>(columns.u_right[i]);
+      r[2] = static_cast<double>(pixel.x()) - columns.baseline_fx / p.z() - static_cast<double>(columns.u_right[i]);
       D.row(2) = D.row(0);
-      D(2, 2) += baseline_fx / (p.z() * p.z());
+      D(2, 2) += columns.baseline_fx / (p.z() * p.z());
     }
     const double s = information * r.squaredNorm();
     columns.error[i] = static_cast<Scalar>(s);
