@@ -22,16 +22,6 @@
 namespace cfp {
 inline namespace CFP_ISA {
 
-/// An executor that does everything on the calling thread. Any type with `executor(count, task)`, which calls task(0),
-/// …, task(count - 1) in any order and on any thread and returns when all are done, is an executor; two_threads.hpp has
-/// one.
-struct SingleThread {
-  template <typename Task>
-  void operator()(int count, const Task& task) const {
-    for (int i = 0; i < count; ++i) task(i);
-  }
-};
-
 /// Adjusts the free poses and all points of the problem, in place.
 ///
 /// - Stops as LevenbergMarquardtOptions says; status, costs and counts are in the result. The cost never rises.

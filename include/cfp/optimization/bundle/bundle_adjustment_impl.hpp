@@ -53,10 +53,8 @@ void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& work
   schur.coupled_end.resize(index.eliminated_part.back());
   schur.pose_steps.resize(6 * index.free_poses);
   schur.point_steps.resize(3 * index.points);
-  for (BundleState* state : {&workspace.state, &workspace.next_state}) {
-    state->poses.resize(poses);
-    state->points.resize(index.points);
-  }
+  workspace.state.poses.resize(poses);
+  workspace.state.points.resize(index.points);
   for (BundleLinearization* linear : {&workspace.linear, &workspace.next_linear}) {
     linear->slots.resize(BundleLinearization::slot_doubles * slots);
     linear->points.resize(BundleLinearization::point_doubles * index.points);
@@ -70,13 +68,13 @@ void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& work
   }
   for (std::size_t j = 0; j < index.points; ++j)
     workspace.state.points[j] = problem.points[to_index(index.caller_point[j])];
+  workspace.next_state = workspace.state;
 }
 
-/// The steps applied; fixed poses are copied. State: BundleState; a template, so that it is compiled where it is
-/// called.
+/// The steps applied; fixed poses are the same in both. State: BundleState; a template, so that it is compiled where it
+/// is called.
 template <typename State>
 void move(const BundleIndex& index, const State& state, const BundleSchur& schur, State& next) noexcept {
-  std::copy(state.poses.begin(), state.poses.end(), next.poses.begin());
   for (std::size_t k = 0; k < index.free_poses; ++k) {
     const Eigen::Map<const Vector6<double>> xi(schur.pose_steps.data() + 6 * k);
     next.poses[k] = {state.poses[k].rotation * so3_exp(xi.tail<3>()), state.poses[k].center - xi.head<3>()};
@@ -116,11 +114,10 @@ struct BundleLeastSquares {
   template <typename Task>
   void run(const Task& task) {
     const int parts = static_cast<int>(bundle_parts);
-    if (workspace.index.observations.size() >= worth_sharing) {
+    if (workspace.index.observations.size() >= worth_sharing)
       executor(parts, task);
-    } else {
-      for (int part = 0; part < parts; ++part) task(part);
-    }
+    else
+      SingleThread()(parts, task);
   }
 
   double linearize_at(const BundleState& state, BundleLinearization& linear) {
