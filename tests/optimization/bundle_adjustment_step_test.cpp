@@ -110,8 +110,8 @@ void check_step(double delta, double stereo_share, const Camera& camera, bool fe
   cfp::detail::prepare(problem, work, result);
   REQUIRE(result.used == scene.pose.size());
   REQUIRE(work.index.eliminate_poses == few_points);
-  cfp::detail::BundleLeastSquares<cfp::BundleProblem<Camera>, Loss<Packet>, Loss<Packet>, cfp::SingleThread>
-      least_squares{problem, mono_packet, stereo_packet, work, executor};
+  cfp::detail::BundleLeastSquares<cfp::BundleProblem<Camera>, Loss<Packet>, cfp::SingleThread> least_squares{
+      problem, mono_packet, stereo_packet, work, executor};
   REQUIRE(cfp::is_finite(least_squares.linearize()));
 
   const DenseSystem system = dense_system(scene, work, mono, stereo);

@@ -64,6 +64,7 @@ TEMPLATE_TEST_CASE("Pose kernel: H and g equal those of numeric Jacobians, pixel
     const std::size_t lanes = P::lanes;
     std::vector<Scalar> storage[10];
     PoseColumns<Scalar> columns;
+    columns.baseline_fx = baseline_fx;
     Scalar** pointers[10] = {&columns.x,       &columns.y,           &columns.z,      &columns.u,     &columns.v,
                              &columns.u_right, &columns.information, &columns.active, &columns.error, &columns.weight};
     const auto fill = [&](bool normalised) {
@@ -97,11 +98,11 @@ TEMPLATE_TEST_CASE("Pose kernel: H and g equal those of numeric Jacobians, pixel
       constexpr bool s = decltype(is_stereo)::value;
       PoseSystem packet, general;
       fill(true);
-      cfp::detail::add_pinhole<s>(columns, 0, lanes, camera, baseline_fx, T, cfp::Trivial<P>{}, packet);
+      cfp::detail::add_observations<s>(columns, 0, lanes, camera, T, cfp::Trivial<P>{}, packet);
       CHECK(static_cast<double>(columns.error[0]) == Approx(information * r.squaredNorm()).epsilon(20 * tolerance));
       fill(false);
-      cfp::detail::add_camera<s>(columns, 0, 1, cfp_test::PlainCamera{camera}, baseline_fx, T, cfp::Trivial<double>{},
-                                 general);
+      cfp::detail::add_observations<s>(columns, 0, 1, cfp_test::PlainCamera{camera}, T, cfp::Trivial<double>{},
+                                       general);
       check(packet);
       check(general);
     };
@@ -121,14 +122,14 @@ TEST_CASE("Pose kernel: a point behind the camera keeps the error it last had in
   const cfp::SE3<double> front, behind{cfp::Matrix3<double>::Identity(), {0, 0, -3}};
   const std::size_t lanes = P::lanes;
   PoseSystem first, second, third;
-  cfp::detail::add_pinhole<false>(columns, 0, lanes, camera, 0, front, cfp::Trivial<P>{}, first);
+  cfp::detail::add_observations<false>(columns, 0, lanes, camera, front, cfp::Trivial<P>{}, first);
   CHECK(first.cost == Approx(25.0));
-  cfp::detail::add_pinhole<false>(columns, 0, lanes, camera, 0, behind, cfp::Trivial<P>{}, second);
+  cfp::detail::add_observations<false>(columns, 0, lanes, camera, behind, cfp::Trivial<P>{}, second);
   CHECK(second.cost == Approx(25.0));
   CHECK(second.equations.H.norm() == 0);
   CHECK(second.equations.g.norm() == 0);
   CHECK(error[0] < 0);
-  cfp::detail::add_pinhole<false>(columns, 0, lanes, camera, 0, front, cfp::Trivial<P>{}, third);
+  cfp::detail::add_observations<false>(columns, 0, lanes, camera, front, cfp::Trivial<P>{}, third);
   CHECK(third.cost == Approx(25.0));
   CHECK(error[0] == Approx(25.0));
 }
@@ -143,7 +144,7 @@ TEST_CASE("Pose kernel: a point is in view up to a hundred times as far aside as
   const double beyond = std::nextafter(100.0, 200.0);
   x = {0, 100, -100, beyond, -beyond, 0, 0, 0}, y = {0, 0, 0, 0, 0, 100, -100, beyond};
   PoseSystem system;
-  cfp::detail::add_pinhole<false>(columns, 0, 8, camera, 0, {}, cfp::Trivial<P>{}, system);
+  cfp::detail::add_observations<false>(columns, 0, 8, camera, {}, cfp::Trivial<P>{}, system);
   for (std::size_t i = 0; i < 8; ++i) {
     const bool in_view = std::abs(x[i]) <= 100 && std::abs(y[i]) <= 100;
     CAPTURE(i, error[i]);

@@ -1,4 +1,4 @@
-#include "cfp/robust/fundamental_refine_impl.hpp"
+#include "cfp/robust/fundamental_sampson_impl.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -43,7 +43,7 @@ FactoredF perturbed(const Matrix3<double>& F, double size, cfp::Random& random) 
   const FactoredF out(F);
   Eigen::Matrix<double, 7, 1> step;
   for (int k = 0; k < 7; ++k) step[k] = size * random.normal();
-  return out.moved(step);
+  return cfp::detail::SampsonModel<double>{}.moved(out, step);
 }
 
 }  // namespace
@@ -70,7 +70,8 @@ TEST_CASE("The Hessian's moments are those of the residuals' derivatives up to a
   const double scale = 4 * pairs.arrays.factor * pairs.arrays.factor, h = 1e-6;
   const FactoredF F(pairs.truth);
   SampsonSystem system;
-  cfp::detail::sampson_system(cfp::detail::exact_columns(pairs.arrays), F.matrix(), scale, system);
+  const cfp::detail::SampsonModel<double> model{cfp::detail::exact_columns(pairs.arrays), scale};
+  cfp::detail::sampson_system(model.pairs, F.matrix(), scale, system);
   Eigen::Matrix<double, 7, 7> expected = Eigen::Matrix<double, 7, 7>::Zero();
   const auto distance = [&](const Matrix3<double>& f, std::size_t i) {
     const Eigen::Vector3d p = cfp::detail::previous_point<double>(pairs.arrays, i),
@@ -80,8 +81,8 @@ TEST_CASE("The Hessian's moments are those of the residuals' derivatives up to a
   for (std::size_t i = 0; i < pairs.arrays.size; ++i) {
     Eigen::Matrix<double, 7, 1> J;
     for (int k = 0; k < 7; ++k) {
-      const FactoredF minus = F.moved(-h * Eigen::Matrix<double, 7, 1>::Unit(k)),
-                      plus = F.moved(h * Eigen::Matrix<double, 7, 1>::Unit(k));
+      const FactoredF minus = model.moved(F, -h * Eigen::Matrix<double, 7, 1>::Unit(k)),
+                      plus = model.moved(F, h * Eigen::Matrix<double, 7, 1>::Unit(k));
       J[k] = (distance(plus.matrix(), i) - distance(minus.matrix(), i)) / (2 * h);
     }
     const double d = distance(F.matrix(), i), share = 1 / (1 + d * d / scale);

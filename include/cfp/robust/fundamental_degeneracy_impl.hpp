@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <numeric>
 
 #include "cfp/core/numeric.hpp"
@@ -107,9 +106,8 @@ struct DegeneracyCheck {
     if (!evidence.stands_out()) return false;
     evidence.stride = (std::max)(pairs.size / PairArrays::enough, std::size_t(1));
     typename FundamentalEvidence<T>::Verdict with_H = evidence.judge(H);
-    const bool broad_possible =
-        with_H.broad.evidence < with_H.person.evidence && find_homography_beside(with_H.broad.window);
-    const bool possible = broad_possible || find_homography_beside(with_H.person.window);
+    const bool broad_possible = with_H.broad.evidence < with_H.person.evidence && find_homography_beside(with_H.broad);
+    const bool possible = broad_possible || find_homography_beside(with_H.person);
     if (possible) with_H = evidence.judge(H);
     const auto stands = [&](const typename FundamentalEvidence<T>::Verdict& v, T factor) {
       if (!(v.distinct >= least && v.all > 11 * factor)) return false;

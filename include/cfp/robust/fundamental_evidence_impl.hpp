@@ -38,8 +38,9 @@ struct FundamentalEvidence {
   T* const range = gain + pairs.capacity;
   std::size_t count = 0;
 
-  // Cells of the previous image.
+  // Cells of the previous image in which something may move, and the evidence of the pairs beside them.
   struct Window {
+    T evidence;
     std::size_t column, row, width, height;
 
     [[nodiscard]] bool contains(T u, T v) const noexcept {
@@ -47,15 +48,10 @@ struct FundamentalEvidence {
     }
   };
 
-  // A window in which something may move, and the evidence of the pairs beside it.
-  struct Beside {
-    T evidence;
-    Window window;
-  };
   struct Verdict {
     T distinct;            // distinct pairs that F explains
     T all;                 // evidence of all pairs
-    Beside person, broad;  // least of evidence beside a person, and beside somebody close or several side by side
+    Window person, broad;  // least of evidence beside a person, and beside somebody close or several side by side
   };
 
   // The logarithm of a product, taken before it leaves the range of numbers.
@@ -98,7 +94,7 @@ struct FundamentalEvidence {
     T best[ranges];
     leave_out_loudest();
     const T all = nats(best);
-    Verdict out = {distinct, all, {all, {}}, {all, {}}};
+    Verdict out = {distinct, all, {all, 0, 0, 0, 0}, {all, 0, 0, 0, 0}};
     find_windows(best, out);
     leave_out_loudest();
     out.all = nats(best);
@@ -144,11 +140,11 @@ struct FundamentalEvidence {
       for (std::size_t c = 0; c < cells; ++c)
         sums[r + 1][c + 1] = products[r][c].value() + sums[r][c + 1] + sums[r + 1][c] - sums[r][c];
     }
-    const auto find_least = [&](std::size_t width, std::size_t height, Beside& least) {
+    const auto find_least = [&](std::size_t width, std::size_t height, Window& least) {
       for (std::size_t r = 0; r + height <= cells; ++r) {
         for (std::size_t c = 0; c + width <= cells; ++c) {
           const T inside = sums[r + height][c + width] - sums[r][c + width] - sums[r + height][c] + sums[r][c];
-          if (out.all - inside < least.evidence) least = {out.all - inside, {c, r, width, height}};
+          if (out.all - inside < least.evidence) least = {out.all - inside, c, r, width, height};
         }
       }
     };

@@ -13,7 +13,7 @@
 #include "cfp/geometry/fundamental.hpp"
 #include "cfp/math/matrix3.hpp"
 #include "cfp/robust/fundamental_pairs_impl.hpp"
-#include "cfp/robust/fundamental_refine_impl.hpp"
+#include "cfp/robust/fundamental_sampson_impl.hpp"
 #include "cfp/robust/ransac.hpp"
 
 namespace cfp::detail {

@@ -100,9 +100,8 @@ template <typename T>
 void refine_homography(const PairColumns<T>& pairs, double scale, int max_steps, Matrix3<double>& H) noexcept {
   const Matrix3<double> start = H / H(2, 2);
   if (!start.allFinite()) return;
-  TransferModel<T> model{pairs, scale};
   H = start;
-  refine<8>(model, max_steps, 1e-3, H);
+  refine<8>(TransferModel<T>{pairs, scale}, max_steps, 1e-3, H);
 }
 
 }  // namespace CFP_ISA

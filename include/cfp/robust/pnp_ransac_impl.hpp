@@ -114,8 +114,7 @@ struct PnpProblem {
   }
 
   void refine(T scale, int max_steps, Model& pose) const {
-    ReprojectionModel<T> model{in, scale};
-    cfp::detail::refine<6>(model, max_steps, 1e-4, pose);
+    cfp::detail::refine<6>(ReprojectionModel<T>{in, scale}, max_steps, 1e-4, pose);
   }
 
   // A wide loss: four squared thresholds.

@@ -58,7 +58,7 @@ void finish(RansacColumns<Rows>& columns) noexcept {
 // Takes at most max_steps that each lower the model's cost by more than `tolerance` of it. Returns the cost, infinite
 // when it is not finite at the start.
 template <int N, typename Model, typename State>
-double refine(Model& model, int max_steps, double tolerance, State& state) {
+double refine(Model model, int max_steps, double tolerance, State& state) {
   LevenbergMarquardtOptions options;
   options.max_iterations = max_steps;
   options.initial_damping = 1e-6;

@@ -22,16 +22,6 @@
 namespace cfp {
 inline namespace CFP_ISA {
 
-/// An executor that does everything on the calling thread. Any type with `executor(count, task)`, which calls task(0),
-/// …, task(count - 1) in any order and on any thread and returns when all are done, is an executor; two_threads.hpp has
-/// one.
-struct SingleThread {
-  template <typename Task>
-  void operator()(int count, const Task& task) const {
-    for (int i = 0; i < count; ++i) task(i);
-  }
-};
-
 /// Adjusts the free poses and all points of the problem, in place.
 ///
 /// - Stops as LevenbergMarquardtOptions says; status, costs and counts are in the result. The cost never rises.
@@ -56,7 +46,6 @@ template <typename Camera, typename Scalar, typename Executor,
 [[nodiscard]] BundleResult adjust_bundle(const BundleProblem<Camera, Scalar>& problem, const BundleOptions& options,
                                          BundleWorkspace& workspace, Executor&& executor,
                                          span<double> squared_errors = {}) {
-  detail::assert_shapes(problem);
   BundleResult result;
   detail::build_index(problem, workspace.index, result);
   detail::prepare(problem, workspace, result);
@@ -64,8 +53,7 @@ template <typename Camera, typename Scalar, typename Executor,
     with_loss<simd::Packet<double>>(options.loss, std::sqrt(options.chi2_mono), [&](auto mono) {
       auto stereo = mono;
       stereo.delta = std::sqrt(options.chi2_stereo);
-      detail::BundleLeastSquares<BundleProblem<Camera, Scalar>, decltype(mono), decltype(stereo),
-                                 std::remove_reference_t<Executor>>
+      detail::BundleLeastSquares<BundleProblem<Camera, Scalar>, decltype(mono), std::remove_reference_t<Executor>>
           least_squares{problem, mono, stereo, workspace, executor};
       static_cast<LeastSquaresResult&>(result) = minimize_least_squares(least_squares, options.levenberg_marquardt);
     });

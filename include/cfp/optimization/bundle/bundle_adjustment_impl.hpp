@@ -29,21 +29,12 @@ struct BundleWorkspace {
 namespace cfp::detail {
 inline namespace CFP_ISA {
 
-template <typename Camera, typename Scalar>
-void assert_shapes([[maybe_unused]] const BundleProblem<Camera, Scalar>& problem) noexcept {
-  [[maybe_unused]] const auto& o = problem.observations;
-  [[maybe_unused]] const std::size_t n = o.pose.size();
-  CFP_ASSERT(o.point.size() == n && o.pixels.size() == n && fits(n, o.u_right, o.sigmas, o.weights));
-  CFP_ASSERT(fits(problem.poses.size(), problem.fixed_poses));
-  CFP_ASSERT(n == 0 || problem.cameras.size() == 1 || problem.cameras.size() == problem.poses.size());
-}
-
 /// Sizes every array and copies the poses and points that take part.
 template <typename Camera, typename Scalar>
 void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& workspace, BundleResult& result) {
   const BundleIndex& index = workspace.index;
   BundleSchur& schur = workspace.schur;
-  const std::size_t poses = index.caller_pose.size(), slots = index.slot_pose.size();
+  const std::size_t poses = index.caller_pose.size(), slots = index.slots.size();
   if (index.eliminate_poses)
     find_envelope<6>(index, index.points, schur.envelope);
   else
@@ -62,10 +53,8 @@ void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& work
   schur.coupled_end.resize(index.eliminated_part.back());
   schur.pose_steps.resize(6 * index.free_poses);
   schur.point_steps.resize(3 * index.points);
-  for (BundleState* state : {&workspace.state, &workspace.next_state}) {
-    state->poses.resize(poses);
-    state->points.resize(index.points);
-  }
+  workspace.state.poses.resize(poses);
+  workspace.state.points.resize(index.points);
   for (BundleLinearization* linear : {&workspace.linear, &workspace.next_linear}) {
     linear->slots.resize(BundleLinearization::slot_doubles * slots);
     linear->points.resize(BundleLinearization::point_doubles * index.points);
@@ -79,13 +68,13 @@ void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& work
   }
   for (std::size_t j = 0; j < index.points; ++j)
     workspace.state.points[j] = problem.points[to_index(index.caller_point[j])];
+  workspace.next_state = workspace.state;
 }
 
-/// The steps applied; fixed poses are copied. State: BundleState; a template, so that it is compiled where it is
-/// called.
+/// The steps applied; fixed poses are the same in both. State: BundleState; a template, so that it is compiled where it
+/// is called.
 template <typename State>
 void move(const BundleIndex& index, const State& state, const BundleSchur& schur, State& next) noexcept {
-  std::copy(state.poses.begin(), state.poses.end(), next.poses.begin());
   for (std::size_t k = 0; k < index.free_poses; ++k) {
     const Eigen::Map<const Vector6<double>> xi(schur.pose_steps.data() + 6 * k);
     next.poses[k] = {state.poses[k].rotation * so3_exp(xi.tail<3>()), state.poses[k].center - xi.head<3>()};
@@ -95,13 +84,13 @@ void move(const BundleIndex& index, const State& state, const BundleSchur& schur
 }
 
 /// Bundle adjustment as minimize_least_squares wants it.
-template <typename Problem, typename MonoLoss, typename StereoLoss, typename Executor>
+template <typename Problem, typename Loss, typename Executor>
 struct BundleLeastSquares {
   // Below so many observations a phase is over before another thread has woken up.
   static constexpr std::size_t worth_sharing = 4000;
   const Problem& problem;
-  const MonoLoss& mono;
-  const StereoLoss& stereo;
+  const Loss& mono;
+  const Loss& stereo;
   BundleWorkspace& workspace;
   Executor& executor;
 
@@ -125,11 +114,10 @@ struct BundleLeastSquares {
   template <typename Task>
   void run(const Task& task) {
     const int parts = static_cast<int>(bundle_parts);
-    if (workspace.index.observations.size() >= worth_sharing) {
+    if (workspace.index.observations.size() >= worth_sharing)
       executor(parts, task);
-    } else {
-      for (int part = 0; part < parts; ++part) task(part);
-    }
+    else
+      SingleThread()(parts, task);
   }
 
   double linearize_at(const BundleState& state, BundleLinearization& linear) {
@@ -172,13 +160,11 @@ void write_back(const BundleProblem<Camera, Scalar>& problem, const BundleWorksp
 
 template <typename Camera, typename Scalar>
 void write_squared_errors(const BundleProblem<Camera, Scalar>& problem, span<double> squared_errors) noexcept {
-  const auto& observations = problem.observations;
-  CFP_ASSERT(squared_errors.size() == observations.pose.size());
+  CFP_ASSERT(squared_errors.size() == problem.observations.pose.size());
   for (std::size_t i = 0; i < squared_errors.size(); ++i) {
     BundleMeasurement m;
     double error = -1;
-    const bool judged = read_measurement(observations, i, problem.baseline_fx, m) && is_inside(problem, m) &&
-                        squared_error(problem, m, error);
+    const bool judged = read_measurement(problem, i, m) && squared_error(problem, m, error);
     squared_errors[i] = judged && is_finite(error) ? error : -1;
   }
 }

@@ -44,7 +44,7 @@ struct BundleKind {
     return Eigen::Map<const Vector>(systems(linear).data() + system * i + block);
   }
   static std::size_t slot(const BundleIndex& index, std::size_t s) noexcept {
-    return to_index(N == 6 ? index.slot_pose[s] : index.slot_point[s]);
+    return to_index(N == 6 ? index.slots[s].pose : index.slots[s].point);
   }
   /// lambda D
   static Vector damping(const BundleLinearization& linear, double lambda, std::size_t i) noexcept {

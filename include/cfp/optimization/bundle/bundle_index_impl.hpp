@@ -33,23 +33,23 @@ struct BundleIndex {
   std::vector<BundleMeasurement> observations;
   std::vector<std::size_t> range_begin;
   // One slot per observation, by what is eliminated, in it by what is kept.
+  std::vector<BundleMeasurement> slots;
   std::vector<std::size_t> slot_begin;  // per eliminated pose or point
-  std::vector<int> slot_pose, slot_point;
   std::array<std::size_t, bundle_parts + 1> pose_part{}, eliminated_part{};
 
   // Scratch while building.
   std::vector<BundleMeasurement> kept;
-  std::vector<int> pose_number, point_number, order, by_pose, by_point;
+  std::vector<int> pose_number, point_number, order;
   std::vector<char> is_rigid, is_met;
-  std::vector<std::size_t> pose_begin, point_begin;
 };
 
 inline namespace CFP_ISA {
 
-/// False when the observation is invalid, apart from its pose and point.
-template <typename Scalar>
-[[nodiscard]] bool read_measurement(const BundleObservations<Scalar>& observations, std::size_t i, double baseline_fx,
+/// False when the observation is invalid, apart from the values of its pose and point.
+template <typename Camera, typename Scalar>
+[[nodiscard]] bool read_measurement(const BundleProblem<Camera, Scalar>& problem, std::size_t i,
                                     BundleMeasurement& m) noexcept {
+  const BundleObservations<Scalar>& observations = problem.observations;
   m.pose = observations.pose[i], m.point = observations.point[i];
   m.u = static_cast<double>(observations.pixels(i, 0));
   m.v = static_cast<double>(observations.pixels(i, 1));
@@ -57,22 +57,16 @@ template <typename Scalar>
   const double sigma = observations.sigmas.empty() ? 1.0 : static_cast<double>(observations.sigmas[i]);
   m.information = 1 / (sigma * sigma);
   const double right = observations.u_right.empty() ? -1.0 : static_cast<double>(observations.u_right[i]);
-  m.stereo = right > 0 && is_finite(right) && baseline_fx > 0 && is_finite(baseline_fx);
+  m.stereo = right > 0 && is_finite(right) && problem.baseline_fx > 0 && is_finite(problem.baseline_fx);
   m.disparity = m.stereo ? m.u - right : 0.0;
-  return is_finite(m.u) && is_finite(m.v) && m.weight >= 0 && is_finite(m.weight) && sigma > 0 && m.information > 0 &&
-         is_finite(m.information);
+  return m.pose >= 0 && to_index(m.pose) < problem.poses.size() && m.point >= 0 &&
+         to_index(m.point) < problem.points.size() && is_finite(m.u) && is_finite(m.v) && m.weight >= 0 &&
+         is_finite(m.weight) && sigma > 0 && m.information > 0 && is_finite(m.information);
 }
 
 template <typename Camera>
 [[nodiscard]] const Camera& camera_of(span<const Camera> cameras, int pose) noexcept {
   return cameras.size() == 1 ? cameras[0] : cameras[to_index(pose)];
-}
-
-/// Whether pose and point are the caller's.
-template <typename Camera, typename Scalar>
-[[nodiscard]] bool is_inside(const BundleProblem<Camera, Scalar>& problem, const BundleMeasurement& m) noexcept {
-  return m.pose >= 0 && to_index(m.pose) < problem.poses.size() && m.point >= 0 &&
-         to_index(m.point) < problem.points.size();
 }
 
 /// |r|^2 / sigma^2 of one observation; false when the camera does not see the point.
@@ -92,15 +86,20 @@ template <typename Camera, typename Scalar>
 /// Keeps the observations that can be used, and marks the poses and points they touch.
 template <typename Camera, typename Scalar>
 void select_observations(const BundleProblem<Camera, Scalar>& problem, BundleIndex& index, BundleResult& result) {
+  const auto& o = problem.observations;
+  const std::size_t n = o.pose.size();
+  CFP_ASSERT(o.point.size() == n && o.pixels.size() == n && fits(n, o.u_right, o.sigmas, o.weights));
+  CFP_ASSERT(fits(problem.poses.size(), problem.fixed_poses));
+  CFP_ASSERT(n == 0 || problem.cameras.size() == 1 || problem.cameras.size() == problem.poses.size());
   index.kept.clear();
   index.pose_number.assign(problem.poses.size(), -1);
   index.point_number.assign(problem.points.size(), -1);
   index.is_rigid.resize(problem.poses.size());
   for (std::size_t k = 0; k < problem.poses.size(); ++k) index.is_rigid[k] = is_rigid_motion(problem.poses[k]) ? 1 : 0;
-  for (std::size_t i = 0; i < problem.observations.pose.size(); ++i) {
+  for (std::size_t i = 0; i < n; ++i) {
     BundleMeasurement m;
     double error = 0;
-    if (!read_measurement(problem.observations, i, problem.baseline_fx, m) || !is_inside(problem, m)) {
+    if (!read_measurement(problem, i, m)) {
       ++result.invalid;
     } else if (m.weight == 0) {
       ++result.zero_weight;

@@ -150,10 +150,9 @@ double linearize_range(span<const BundleMeasurement> range, const Camera& camera
 }
 
 /// All observations of pose k.
-template <typename Camera, typename MonoLoss, typename StereoLoss>
-void linearize_pose(const BundleIndex& index, std::size_t k, const Camera& camera, double baseline_fx,
-                    const MonoLoss& mono, const StereoLoss& stereo, const BundleState& state,
-                    BundleLinearization& out) noexcept {
+template <typename Camera, typename Loss>
+void linearize_pose(const BundleIndex& index, std::size_t k, const Camera& camera, double baseline_fx, const Loss& mono,
+                    const Loss& stereo, const BundleState& state, BundleLinearization& out) noexcept {
   BundlePoseSums sums = {};
   BundlePoseSums* const used = k < index.free_poses ? &sums : nullptr;
   const auto range = [&](std::size_t r) {
@@ -170,10 +169,10 @@ void linearize_pose(const BundleIndex& index, std::size_t k, const Camera& camer
 /// The points' own blocks, from their slots.
 inline void linearize_points(const BundleIndex& index, BundleLinearization& out) noexcept {
   std::fill(out.points.begin(), out.points.end(), 0.0);
-  for (std::size_t s = 0; s < index.slot_point.size();) {
-    const int j = index.slot_point[s];
+  for (std::size_t s = 0; s < index.slots.size();) {
+    const int j = index.slots[s].point;
     double sum[BundleLinearization::slot_doubles] = {};
-    for (; s < index.slot_point.size() && index.slot_point[s] == j; ++s) {
+    for (; s < index.slots.size() && index.slots[s].point == j; ++s) {
       for (std::size_t e = 0; e < BundleLinearization::slot_doubles; ++e)
         sum[e] += out.slots[BundleLinearization::slot_doubles * s + e];
     }

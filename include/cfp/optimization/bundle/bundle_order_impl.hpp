@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
 #include <vector>
 
 #include "cfp/optimization/bundle/bundle_index_impl.hpp"
@@ -16,32 +17,27 @@ inline constexpr std::size_t natural_order_limit = 64;
 
 inline namespace CFP_ISA {
 
-/// Sorts `order` stably by key(i) in [0, groups): group g is sorted[begin[g]], …, sorted[begin[g + 1] - 1].
+/// Sorts `from` stably by key(measurement) in [0, groups): group g is to[begin[g]], …, to[begin[g + 1] - 1].
 template <typename Key>
-void group_by(const std::vector<int>& order, std::size_t groups, const Key& key, std::vector<std::size_t>& begin,
-              std::vector<int>& sorted) {
+void group_by(const std::vector<BundleMeasurement>& from, std::size_t groups, const Key& key,
+              std::vector<std::size_t>& begin, std::vector<BundleMeasurement>& to) {
   begin.assign(groups + 2, 0);
-  for (const int i : order) ++begin[to_index(key(i)) + 2];
+  for (const BundleMeasurement& m : from) ++begin[to_index(key(m)) + 2];
   for (std::size_t g = 2; g < begin.size(); ++g) begin[g] += begin[g - 1];
-  sorted.resize(order.size());
-  for (const int i : order) sorted[begin[to_index(key(i)) + 1]++] = i;
+  to.resize(from.size());
+  for (const BundleMeasurement& m : from) to[begin[to_index(key(m)) + 1]++] = m;
 }
-
-inline void count_up(std::size_t n, std::vector<int>& order) {
-  order.resize(n);
-  for (std::size_t i = 0; i < n; ++i) order[i] = static_cast<int>(i);
-}
+[[nodiscard]] inline int pose_of(const BundleMeasurement& m) noexcept { return m.pose; }
+[[nodiscard]] inline int point_of(const BundleMeasurement& m) noexcept { return m.point; }
 
 /// Renumbers the free poses so that those with common points get near numbers: breadth first from a pose far from the
 /// others, the last one first (Cuthill, McKee 1969), which keeps the envelope of the reduced system small.
 inline void order_poses(BundleIndex& index) {
-  const auto pose_of = [&](int i) { return index.kept[to_index(i)].pose; };
-  const auto point_of = [&](int i) { return index.kept[to_index(i)].point; };
-  count_up(index.kept.size(), index.order);
-  group_by(index.order, index.caller_pose.size(), pose_of, index.pose_begin, index.by_pose);
-  group_by(index.order, index.points, point_of, index.point_begin, index.by_point);
+  group_by(index.kept, index.caller_pose.size(), pose_of, index.range_begin, index.observations);
+  group_by(index.kept, index.points, point_of, index.slot_begin, index.slots);
   std::vector<int>&queue = index.order, &seeds = index.pose_number;
-  count_up(index.free_poses, seeds);
+  seeds.resize(index.free_poses);
+  std::iota(seeds.begin(), seeds.end(), 0);
   for (int sweep = 0; sweep < 2; ++sweep, queue.swap(seeds)) {  // the first ends at a pose to begin from
     index.is_met.assign(index.free_poses + index.points, 0);
     queue.clear();
@@ -53,51 +49,41 @@ inline void order_poses(BundleIndex& index) {
       meet(to_index(seeds[seed]));
       for (; head < queue.size(); ++head) {
         const std::size_t k = to_index(queue[head]);
-        for (std::size_t o = index.pose_begin[k]; o < index.pose_begin[k + 1]; ++o) {
-          const std::size_t j = to_index(point_of(index.by_pose[o]));
+        for (std::size_t o = index.range_begin[k]; o < index.range_begin[k + 1]; ++o) {
+          const std::size_t j = to_index(index.observations[o].point);
           if (index.is_met[index.free_poses + j] != 0) continue;
           index.is_met[index.free_poses + j] = 1;
-          for (std::size_t i = index.point_begin[j]; i < index.point_begin[j + 1]; ++i)
-            meet(to_index(pose_of(index.by_point[i])));
+          for (std::size_t s = index.slot_begin[j]; s < index.slot_begin[j + 1]; ++s)
+            meet(to_index(index.slots[s].pose));
         }
       }
     }
   }
-  queue = index.caller_pose;  // the old numbers' poses
-  index.by_pose.resize(queue.size());
-  count_up(queue.size(), index.by_pose);  // the old numbers' new ones
+  std::reverse(seeds.begin(), seeds.end());
   for (std::size_t k = 0; k < index.free_poses; ++k) {
-    const std::size_t old = to_index(seeds[index.free_poses - 1 - k]);
-    index.caller_pose[k] = queue[old];
-    index.by_pose[old] = static_cast<int>(k);
+    queue[to_index(seeds[k])] = static_cast<int>(k);  // the new number of an old one
+    seeds[k] = index.caller_pose[to_index(seeds[k])];
   }
-  for (BundleMeasurement& m : index.kept) m.pose = index.by_pose[to_index(m.pose)];
+  std::copy(seeds.begin(), seeds.end(), index.caller_pose.begin());
+  for (BundleMeasurement& m : index.kept) {
+    if (to_index(m.pose) < index.free_poses) m.pose = queue[to_index(m.pose)];
+  }
 }
 
 /// Slots by what is eliminated and what is kept; then the observations by pose and kind, in each range by point, so
 /// that neighbours in memory stay neighbours.
 inline void sort_observations(BundleIndex& index) {
-  const std::size_t n = index.kept.size(), poses = index.caller_pose.size();
-  const auto pose_of = [&](int i) { return index.kept[to_index(i)].pose; };
-  const auto point_of = [&](int i) { return index.kept[to_index(i)].point; };
-  count_up(n, index.order);
+  const std::size_t poses = index.caller_pose.size();
   if (index.eliminate_poses) {
-    group_by(index.order, index.points, point_of, index.slot_begin, index.by_point);
-    group_by(index.by_point, poses, pose_of, index.slot_begin, index.order);
+    group_by(index.kept, index.points, point_of, index.slot_begin, index.observations);
+    group_by(index.observations, poses, pose_of, index.slot_begin, index.slots);
   } else {
-    group_by(index.order, poses, pose_of, index.slot_begin, index.by_pose);
-    group_by(index.by_pose, index.points, point_of, index.slot_begin, index.order);
+    group_by(index.kept, poses, pose_of, index.slot_begin, index.observations);
+    group_by(index.observations, index.points, point_of, index.slot_begin, index.slots);
   }
-  index.slot_pose.resize(n), index.slot_point.resize(n);
-  for (std::size_t s = 0; s < n; ++s) {
-    BundleMeasurement& m = index.kept[to_index(index.order[s])];
-    m.slot = s;
-    index.slot_pose[s] = m.pose, index.slot_point[s] = m.point;
-  }
-  const auto range_of = [&](int i) { return 2 * pose_of(i) + (index.kept[to_index(i)].stereo ? 1 : 0); };
-  group_by(index.order, 2 * poses, range_of, index.range_begin, index.by_pose);
-  index.observations.resize(n);
-  for (std::size_t o = 0; o < n; ++o) index.observations[o] = index.kept[to_index(index.by_pose[o])];
+  for (std::size_t s = 0; s < index.slots.size(); ++s) index.slots[s].slot = s;
+  const auto range_of = [](const BundleMeasurement& m) { return 2 * m.pose + (m.stereo ? 1 : 0); };
+  group_by(index.slots, 2 * poses, range_of, index.range_begin, index.observations);
 }
 
 /// Cuts `count` groups, of which number i begins at begin[stride i], into parts of about equal size.

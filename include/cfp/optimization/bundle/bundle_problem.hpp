@@ -58,6 +58,16 @@ struct BundleResult : LeastSquaresResult {
 
 inline namespace CFP_ISA {
 
+/// An executor that does everything on the calling thread. Any type with `executor(count, task)`, which calls task(0),
+/// …, task(count - 1) in any order and on any thread and returns when all are done, is an executor; two_threads.hpp has
+/// one.
+struct SingleThread {
+  template <typename Task>
+  void operator()(int count, const Task& task) const {
+    for (int i = 0; i < count; ++i) task(i);
+  }
+};
+
 /// The first field outside its range, or nothing.
 [[nodiscard]] inline OptionPath invalid_field(const BundleOptions& options) noexcept {
   if (const OptionPath field = nested("levenberg_marquardt", invalid_field(options.levenberg_marquardt))) return field;

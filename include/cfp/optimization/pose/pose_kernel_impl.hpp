@@ -33,23 +33,11 @@ struct PoseSystem {
 
 inline namespace CFP_ISA {
 
-/// A point that goes behind the camera keeps the error it last had in front: otherwise a step that hides points would
-/// pay.
-template <typename P, typename Mask>
-P visible_error(const Mask& front, const P& error, const P& last) noexcept {
-  using std::abs;
-  return simd::select(front, error, abs(last));
-}
-template <typename P, typename Mask>
-P stored_error(const Mask& front, const P& error) noexcept {
-  return simd::select(front, error,
-                      P(simd::scalar_of<P>(0)) - (error + P((std::numeric_limits<simd::scalar_of<P>>::min)())));
-}
-
 /// Pinhole pass over the packets [begin, end); sums in lanes, handed to double every 64 packets.
 template <bool stereo, typename Scalar, typename Loss, typename C>
-void add_pinhole(const PoseColumns<Scalar>& columns, std::size_t begin, std::size_t end, const PinholeCamera<C>& camera,
-                 double baseline_fx, const SE3<double>& T, const Loss& given_loss, PoseSystem& system) noexcept {
+void add_observations(const PoseColumns<Scalar>& columns, std::size_t begin, std::size_t end,
+                      const PinholeCamera<C>& camera, const SE3<double>& T, const Loss& given_loss,
+                      PoseSystem& system) noexcept {
   using P = simd::Packet<Scalar>;
   // clang-format off
   enum {
@@ -65,12 +53,11 @@ void add_pinhole(const PoseColumns<Scalar>& columns, std::size_t begin, std::siz
   const P r20 = constant(T.rotation(2, 0)), r21 = constant(T.rotation(2, 1)), r22 = constant(T.rotation(2, 2)),
           t2 = constant(T.translation.z());
   const double aspect = static_cast<double>(camera.fy) / static_cast<double>(camera.fx), aspect_sq = aspect * aspect;
-  const P kappa = constant(aspect_sq), base = constant(baseline_fx / static_cast<double>(camera.fx));
+  const P kappa = constant(aspect_sq), base = constant(columns.baseline_fx / static_cast<double>(camera.fx));
   const P near = constant(static_cast<double>(Tolerance<Scalar>::min_depth)), wide = constant(100), one = constant(1),
-          zero = constant(0);
+          zero = constant(0), tiny = (std::numeric_limits<Scalar>::min)();
   const P n = constant(stereo ? 2 : 1);
   const Loss loss = given_loss;  // a copy, which the stores below cannot change
-  using std::abs;
 
   while (begin < end) {
     const std::size_t block_end = (std::min)(end, begin + 64 * P::lanes);
@@ -96,8 +83,10 @@ void add_pinhole(const PoseColumns<Scalar>& columns, std::size_t begin, std::siz
       }
       const P kv = kappa * rv;
       const P information = P::load(columns.information + begin), active = P::load(columns.active + begin);
-      const P s = visible_error<P>(front, information * multiply_add(kv, rv, uu), P::load(columns.error + begin));
-      stored_error<P>(front, s).store(columns.error + begin);
+      // A point that goes behind the camera keeps the error it last had in front: otherwise a step that hides points
+      // would pay. It is stored below zero even where it is 0.
+      const P s = select(front, information * multiply_add(kv, rv, uu), abs(P::load(columns.error + begin)));
+      select(front, s, zero - (s + tiny)).store(columns.error + begin);
       sum[cost] = multiply_add(active, loss.value(s), sum[cost]);
       const P pull = select(front, active * loss.first(s), zero), W = information * pull;
       sum[influence] += pull;
@@ -151,8 +140,8 @@ void add_pinhole(const PoseColumns<Scalar>& columns, std::size_t begin, std::siz
 
 /// Any camera of geometry/camera.hpp, point by point in double.
 template <bool stereo, typename Scalar, typename Loss, typename Camera>
-void add_camera(const PoseColumns<Scalar>& columns, std::size_t begin, std::size_t end, const Camera& camera,
-                double baseline_fx, const SE3<double>& T, const Loss& loss, PoseSystem& system) noexcept {
+void add_observations(const PoseColumns<Scalar>& columns, std::size_t begin, std::size_t end, const Camera& camera,
+                      const SE3<double>& T, const Loss& loss, PoseSystem& system) noexcept {
   using C = typename Camera::ScalarType;
   constexpr int rows = stereo ? 3 : 2;
   for (std::size_t i = begin; i < end; ++i) {
@@ -164,9 +153,9 @@ void add_camera(const PoseColumns<Scalar>& columns, std::size_t begin, std::size
     const double active = static_cast<double>(columns.active[i]),
                  information = static_cast<double>(columns.information[i]);
     if (!front) {
-      const double s = static_cast<double>(std::abs(columns.error[i]));
-      columns.error[i] = stored_error<Scalar>(false, static_cast<Scalar>(s));
-      system.cost += active * loss.value(s);
+      const Scalar s = std::abs(columns.error[i]);
+      columns.error[i] = -(s + (std::numeric_limits<Scalar>::min)());
+      system.cost += active * loss.value(static_cast<double>(s));
       continue;
     }
     Eigen::Matrix<double, rows, 1> r;
@@ -175,12 +164,12 @@ void add_camera(const PoseColumns<Scalar>& columns, std::size_t begin, std::size
     r[1] = static_cast<double>(pixel.y()) - static_cast<double>(columns.v[i]);
     D.template topRows<2>() = pixel_by_point.template cast<double>();
     if constexpr (stereo) {
-      r[2] = static_cast<double>(pixel.x()) - baseline_fx / p.z() - static_cast<double>(columns.u_right[i]);
+      r[2] = static_cast<double>(pixel.x()) - columns.baseline_fx / p.z() - static_cast<double>(columns.u_right[i]);
       D.row(2) = D.row(0);
-      D(2, 2) += baseline_fx / (p.z() * p.z());
+      D(2, 2) += columns.baseline_fx / (p.z() * p.z());
     }
     const double s = information * r.squaredNorm();
-    columns.error[i] = stored_error<Scalar>(true, static_cast<Scalar>(s));
+    columns.error[i] = static_cast<Scalar>(s);
     Eigen::Matrix<double, rows, 6> J;
     J.template leftCols<3>() = D;
     J.template rightCols<3>() = -D.lazyProduct(hat(p));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include "cfp/geometry/camera.hpp"
 #include "cfp/optimization/least_squares.hpp"
@@ -28,6 +29,7 @@ template <typename Camera>
 /// What the loop minimises: the pose relative to the start position, so that float serves wherever the origin is.
 template <typename Scalar, typename Camera>
 struct PoseModel {
+  using Number = std::conditional_t<is_pinhole<Camera>, simd::Packet<Scalar>, double>;
   const Camera& camera;
   const PoseOptions& options;
   PoseColumns<Scalar> columns;  // errors are those at last_pose
@@ -40,15 +42,9 @@ struct PoseModel {
     PoseSystem system;
     for_each_kind(columns, options, [&](std::size_t begin, std::size_t end, double chi2, auto stereo) {
       const double delta = round.scale * std::sqrt(chi2);
-      if constexpr (is_pinhole<Camera>) {
-        with_loss<simd::Packet<Scalar>>(round.loss, static_cast<Scalar>(delta), [&](const auto& loss) {
-          add_pinhole<decltype(stereo)::value>(columns, begin, end, camera, columns.baseline_fx, T, loss, system);
-        });
-      } else {
-        with_loss<double>(round.loss, delta, [&](const auto& loss) {
-          add_camera<decltype(stereo)::value>(columns, begin, end, camera, columns.baseline_fx, T, loss, system);
-        });
-      }
+      with_loss<Number>(round.loss, static_cast<simd::scalar_of<Number>>(delta), [&](const auto& loss) {
+        add_observations<decltype(stereo)::value>(columns, begin, end, camera, T, loss, system);
+      });
     });
     equations = system.equations;
     influence = system.influence;
