@@ -24,9 +24,25 @@ struct Conic {
 
 inline namespace CFP_ISA {
 
-// One number for each of two points or lines.
+// One number for each of two points or lines. Each operation is evaluated by itself: Eigen's expressions of several
+// would each be compiled in every host's unit.
 template <typename Real>
-using Pair = Eigen::Array<Real, 2, 1>;
+struct Pair {
+  Eigen::Array<Real, 2, 1> both;
+
+  Pair() noexcept = default;
+  Pair(const Eigen::Array<Real, 2, 1>& values) noexcept : both(values) {}
+  Pair(Real first, Real second) noexcept : both(first, second) {}
+  Real operator[](int i) const noexcept { return both[i]; }
+  friend Pair operator+(const Pair& x, const Pair& y) noexcept { return {x.both + y.both}; }
+  friend Pair operator-(const Pair& x, const Pair& y) noexcept { return {x.both - y.both}; }
+  friend Pair operator*(const Pair& x, const Pair& y) noexcept { return {x.both * y.both}; }
+  friend Pair operator/(const Pair& x, const Pair& y) noexcept { return {x.both / y.both}; }
+  friend Pair operator*(Real f, const Pair& x) noexcept { return Pair(f, f) * x; }
+  friend Pair operator/(Real f, const Pair& x) noexcept { return Pair(f, f) / x; }
+  friend Pair operator-(const Pair& x, Real f) noexcept { return x - Pair(f, f); }
+  friend Pair sqrt(const Pair& x) noexcept { return {x.both.sqrt()}; }
+};
 
 template <typename T>
 [[nodiscard]] CFP_INLINE T squared_norm(const Triple<T>& x) noexcept {
