@@ -8,10 +8,12 @@
 // covariance out; "a host's motion" is the true one with errors of 3 mm and 1 mrad, and these as its sigmas. Then with
 // 5, 15 and 30 % of the depths wrong by anything before furniture and walls, with
 // CameraMotionOptions::shared_depth_ratio and without. Then with 10 to 14 points on the person, by
-// ObjectProbabilityOptions::min_pairs. Then how soon somebody who sways counts as moving, and how often
-// somebody at rest does whom a rolling shutter, a lens or a focal length that nobody told displaces, by shift_pairs.
-// Then with one camera, no depths at all, in five kinds of scene
-// and at three frame rates: with the fundamental matrix alone, and with the motion up to scale where there is none.
+// ObjectProbabilityOptions::min_pairs. Then how soon somebody who sways counts as moving, and how often somebody at
+// rest does whom a rolling shutter, a lens or a focal length that nobody told displaces, by shift_pairs. Then what the
+// motion of the frame before adds, by FlowModelOptions::camera_acceleration_m_s2, where the camera's velocity changes
+// (a hand: 0.6 m/s^2 in the truth of TUM's fr3_walking_xyz at 30 Hz). Then with one camera, no depths at all, in five
+// kinds of scene and at three frame rates: with the fundamental matrix alone, and with the motion up to scale where
+// there is none.
 //   cfp_object_motion_study [N per cell, default 20] [seed, default 1] | --smoke
 //
 // The simulator: 640 x 480 at 30 Hz, f = 535 px. Camera: still; sideways or forward 0.3 m/s; rotating 20 deg/s; both;
@@ -75,14 +77,19 @@ struct Scene {
 };
 
 /// Camera velocity (m/s) and turn rate (rad/s).
-void draw_camera(std::size_t kind, cfp::Random& random, V3& velocity, V3& turn) {
+struct Velocity {
+  V3 velocity = V3::Zero(), turn = V3::Zero();
+};
+
+Velocity draw_camera(std::size_t kind, cfp::Random& random) {
+  Velocity drawn;
+  auto& [velocity, turn] = drawn;
   const V3 any(random.normal(), random.normal(), random.normal());
-  velocity.setZero();
-  turn.setZero();
   if (kind == 1 || kind == 4) velocity = 0.3 * V3(any.x(), 0.3 * any.y(), 0).normalized();
   if (kind == 2) velocity = 0.3 * V3(0.1 * any.x(), 0.05 * any.y(), 1).normalized();
   if (kind == 3 || kind == 4) turn = 0.35 * V3(random.normal(), random.normal(), 0.5 * random.normal()).normalized();
   if (kind == 5) velocity = 0.05 * any.normalized();
+  return drawn;
 }
 
 double bare_depth(const V2& p) {
@@ -126,12 +133,11 @@ constexpr std::array<Room, 3> rooms_of_wrong_depths = {{{"a furnished room", 350
                                                         {"a slanted wall", 200, wall_depth, 1.5, 2.4, true},
                                                         {"a far wall", 60, far_wall_depth, 1.5, 4, true}}};
 
-/// One frame. `who` draws the camera's motion and the person, `random` the points and the noise.
-Scene simulate(const Cell& cell, const Room& room, double frame_s, double wrong_depths, cfp::Random& who,
-               cfp::Random& random, const Fault& fault = faults[0]) {
+/// One frame of a camera that moves as it is told. `who` draws the person, `random` the points and the noise.
+Scene simulate(const Cell& cell, const Room& room, double frame_s, double wrong_depths, const Velocity& moving,
+               cfp::Random& who, cfp::Random& random, const Fault& fault = faults[0]) {
   Scene scene;
-  V3 velocity, turn;
-  draw_camera(cell.camera, who, velocity, turn);
+  const auto& [velocity, turn] = moving;
   const double side = who.uniform() < 0.5 ? -1 : 1;
   V3 walk = V3::Zero();
   if (cell.person == 1) walk = cell.speed * side * V3::UnitX();
@@ -301,7 +307,7 @@ void judge(const char* name, const Way& way, const std::vector<Cell>& cells, con
   std::vector<Outcome> outcomes;
   for (const Cell& cell : cells) {
     for (int i = 0; i < repetitions * (cell.at_rest() ? 4 : 1); ++i) {
-      Scene scene = simulate(cell, room, frame_s, wrong_depths, random, random);
+      Scene scene = simulate(cell, room, frame_s, wrong_depths, draw_camera(cell.camera, random), random, random);
       for (std::size_t k = 0; k < scene.depths.size(); ++k) {
         if (way.depth_of_every > 0 && k % way.depth_of_every != 0) scene.depths[k] = -1;
       }
@@ -316,6 +322,38 @@ void judge(const char* name, const Way& way, const std::vector<Cell>& cells, con
     }
   }
   report(name, outcomes, way.options.object_threshold);
+}
+
+/// The same of the last of six frames, between which the camera's velocity changes by the accelerations given, standard
+/// deviations of each coordinate in m/s^2 and rad/s^2.
+void judge_accelerated(const char* name, const cfp::FrameOptions& options, const std::vector<Cell>& cells,
+                       const Room& room, double wrong_depths, const Velocity& acceleration, int repetitions,
+                       std::uint64_t seed) {
+  constexpr double frame_s = 1 / 30.0;
+  cfp::Random random(seed, "accelerated"), held(seed, "hand");
+  std::vector<Outcome> outcomes;
+  for (const Cell& cell : cells) {
+    for (int i = 0; i < repetitions * (cell.at_rest() ? 4 : 1); ++i) {
+      cfp::FrameState<double> state;
+      Velocity moving = draw_camera(cell.camera, held);
+      for (int k = 0; k < 6; ++k) {
+        const Scene scene = simulate(cell, room, frame_s, wrong_depths, moving, random, random);
+        cfp::Frame<double> frame;
+        frame.timestamp_s = k * frame_s;
+        frame.flow = {scene.previous, scene.current, scene.depths};
+        begin_frame(frame, state);
+        state.boxes.resize(1);
+        state.boxes[0].box = scene.box;
+        estimate_objects(frame, camera, options, state);
+        for (int axis = 0; axis < 3; ++axis) {
+          moving.velocity[axis] += frame_s * acceleration.velocity[axis] * held.normal();
+          moving.turn[axis] += frame_s * acceleration.turn[axis] * held.normal();
+        }
+      }
+      outcomes.push_back({&cell, state.objects[0].static_probability, state.objects[0].status == cfp::Status::ok});
+    }
+  }
+  report(name, outcomes, options.object_threshold);
 }
 
 void print_head(const char* title) {
@@ -339,7 +377,7 @@ void follow(const char* name, const cfp::FrameOptions& options, const Room& room
           const bool walks = k < 30 || k >= 75;
           cfp::Random who(sequence, "person");
           const Cell cell{c, walks ? 1U : 0U, n, walks ? speed : 0};
-          const Scene scene = simulate(cell, room, 1 / 30.0, 0.1, who, random);
+          const Scene scene = simulate(cell, room, 1 / 30.0, 0.1, draw_camera(c, who), who, random);
           cfp::Frame<double> frame;
           frame.timestamp_s = k / 30.0;
           frame.flow = {scene.previous, scene.current, scene.depths};
@@ -377,7 +415,8 @@ double called_moving(double speed, const Fault& fault, double shift_pairs, int r
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     for (std::size_t n = 0; n < noises.size(); ++n) {
       for (int i = 0; i < 4 * repetitions; ++i, ++all) {
-        const Scene scene = simulate({c, 1, n, speed}, rooms[0], 1 / 30.0, 0.05, random, random, fault);
+        const Scene scene =
+            simulate({c, 1, n, speed}, rooms[0], 1 / 30.0, 0.05, draw_camera(c, random), random, random, fault);
         cfp::Frame<double> frame;
         frame.flow = {scene.previous, scene.current, scene.depths};
         state.boxes.resize(1);
@@ -388,6 +427,27 @@ double called_moving(double speed, const Fault& fault, double shift_pairs, int r
     }
   }
   return 100.0 * moving / all;
+}
+
+void print_accelerated(const std::vector<Cell>& cells, int repetitions, std::uint64_t seed) {
+  for (const double wrong_depths : {0.0, 0.15}) {
+    for (const Room& room : {rooms[0], rooms[1], rooms_of_wrong_depths[2]}) {
+      for (const double moves : {0.5, 2.0, 4.0}) {
+        char title[128];
+        std::snprintf(title, sizeof title, "%s, %.0f %% wrong depths, a camera of %.1f m/s^2, by camera_acceleration",
+                      room.name, 100 * wrong_depths, moves);
+        print_head(title);
+        for (const double believed : {0.0, 1.0, 2.0, 3.0, 5.0}) {
+          cfp::FrameOptions options;
+          options.coarse.flow.camera_acceleration_m_s2 = believed;
+          char name[32];
+          std::snprintf(name, sizeof name, "%.0f m/s^2", believed);
+          judge_accelerated(name, options, cells, room, wrong_depths, {V3::Constant(moves), V3::Constant(5)},
+                            repetitions, seed);
+        }
+      }
+    }
+  }
 }
 
 void print_shared(int repetitions, std::uint64_t seed) {
@@ -461,6 +521,7 @@ int main(int argc, char** argv) {
     judge(std::to_string(min_pairs).c_str(), way, cells, few_pairs, 1 / 30.0, 0.15, repetitions, seed);
   }
   print_shared(repetitions, seed);
+  print_accelerated(cells, (repetitions + 4) / 5, seed);
 
   print_head("one camera, no depths; then F alone; a host's motion");
   Way one_camera;

@@ -34,6 +34,7 @@ TEST_CASE("The defaults of the flow and of objects", "[core]") {
   CHECK((o.unreported.radius_px == 30 && o.unreported.min_pairs == 6 && o.unreported.max_share == 0.4));
   const cfp::FlowModelOptions& flow = o.flow;
   CHECK((flow.min_outside_pairs == 30 && flow.margin == 0.1 && flow.use_motion_up_to_scale && flow.use_depth));
+  CHECK(flow.camera_acceleration_m_s2 == 3);
   CHECK((flow.nearer_than_room.inverse_mean == 2.5 && flow.nearer_than_room.inverse_sigma == 1));
   CHECK((flow.motion.min_pairs == 12 && flow.motion.min_inlier_share == 0.5));
   CHECK((flow.motion.min_sigma_px == 0.05 && flow.motion.max_sigma_px == 1));

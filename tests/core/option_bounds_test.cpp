@@ -151,6 +151,7 @@ TEST_CASE("The ends of the ranges of a frame's options", "[core]") {
       CFP_FIELD(O, min_inlier_weight, below_one),
       CFP_FIELD(O, health.min_effective_points, not_negative),
       CFP_FIELD(O, coarse.flow.margin, not_negative),
+      CFP_FIELD(O, coarse.flow.camera_acceleration_m_s2, not_negative),
   });
   check_least<O>({
       CFP_COUNT(O, tracker.confirm_hits, 1),

@@ -62,6 +62,7 @@ TEST_CASE("Every option of a frame is refused by its full, unique name", "[core]
       {"object_threshold", [&](auto& o) { o.object_threshold = nan; }},
       {"coarse.flow.min_outside_pairs", [](auto& o) { o.coarse.flow.min_outside_pairs = 7; }},
       {"coarse.flow.margin", [](auto& o) { o.coarse.flow.margin = -0.1; }},
+      {"coarse.flow.camera_acceleration_m_s2", [&](auto& o) { o.coarse.flow.camera_acceleration_m_s2 = nan; }},
       {"coarse.flow.nearer_than_room.inverse_mean", [](auto& o) { o.coarse.flow.nearer_than_room.inverse_mean = 0; }},
       {"coarse.flow.motion.min_pairs", [](auto& o) { o.coarse.flow.motion.min_pairs = 2; }},
       {"coarse.flow.motion.min_inlier_share", [&](auto& o) { o.coarse.flow.motion.min_inlier_share = nan; }},

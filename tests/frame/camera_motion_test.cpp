@@ -192,10 +192,30 @@ TEST_CASE("Two estimates of a motion join: the surer leads, an exact one stays, 
     CHECK(std::abs(error(equal, T) - error(equal, measured.T_cur_prev)) < 1e-5);
     CHECK(equal.covariance.isApprox(measured.covariance / 2, 1e-9));
     CHECK(error(cfp::joined({T, 1, 1}, measured), measured.T_cur_prev) < 1e-6);
+    CHECK(error(cfp::joined({T, 0.001, 0.001}, measured, 1e6), equal.T_cur_prev) < 1e-12);
+    CHECK(error(cfp::joined({T, 0.001, 0.001}, measured, 1e-6), measured.T_cur_prev) < 1e-12);
     CHECK(cfp::joined({T, nan, 1}, measured).T_cur_prev.translation == measured.T_cur_prev.translation);
     cfp::SE3<double> bad = T;
     bad.translation[run % 3] = nan;
     CHECK(cfp::joined({bad, 1, 1}, measured).T_cur_prev.translation == measured.T_cur_prev.translation);
+  }
+}
+
+TEST_CASE("A camera that keeps its velocity moves on by what it moved, however long a frame takes", "[frame]") {
+  cfp::Random random(12, "predicted");
+  for (int run = 0; run < 100; ++run) {
+    cfp::Vector6<double> velocity;
+    for (int k = 0; k < 6; ++k) velocity[k] = random.normal();
+    const double last_s = random.uniform(0.01, 0.2), time_s = random.uniform(0.01, 0.2);
+    const cfp::SE3<double> moved = cfp::se3_exp(cfp::Vector6<double>(last_s * velocity));
+    const cfp::TimedMotion last{{moved, 0.001, 0.002}, last_s};
+    const cfp::UncertainMotion<double> next = cfp::predicted_motion(last, time_s, 3);
+    const cfp::SE3<double> expected = cfp::se3_exp(cfp::Vector6<double>(time_s * velocity));
+    CHECK(cfp::se3_log(next.T_cur_prev * expected.inverse()).norm() < 1e-12);
+    const double acceleration_m = 3 * time_s * (time_s + last_s) / 2, known_m = 0.001 * time_s / last_s;
+    CHECK_THAT(next.covariance(0, 0), WithinAbs(acceleration_m * acceleration_m + known_m * known_m, 1e-12));
+    CHECK(next.covariance(4, 4) >= 1);  // how it turns is not said
+    CHECK(cfp::predicted_motion(last, time_s, 1).covariance(2, 2) < next.covariance(2, 2));
   }
 }
 

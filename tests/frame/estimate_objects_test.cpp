@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "cfp/geometry/radial_tangential_camera.hpp"
@@ -373,6 +374,69 @@ TEST_CASE("The motion that a far, bare wall gives does not make a near person at
   };
   CHECK(called(0) <= 20);
   CHECK(called(0.03) == 100);
+}
+
+namespace {
+
+// The state after so many frames before a far, bare wall, of the same noise whatever the options; in the last one the
+// camera is pushed aside.
+cfp::FrameState<double> follow_wall(int frames, const cfp::FrameOptions& options, double push_m, std::uint64_t seed,
+                                    const std::optional<cfp::UncertainMotion<double>>& given = {}) {
+  cfp::FrameState<double> state;
+  cfp::Random random(seed, "followed wall");
+  for (int k = 0; k < frames; ++k) {
+    DynamicScene<double> scene;
+    const double pushed_m = k + 1 == frames ? push_m : 0;
+    scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.005 + pushed_m, 0.002, 0.004, 0.001, -0.002, 0.001));
+    for (int i = 0; i < 60; ++i) {
+      const double x = random.uniform(20, 620), y = random.uniform(20, 460);
+      add_pair(scene, {x, y}, 4.2, 0, 0.2, random);
+    }
+    cfp::Frame<double> frame;
+    frame.timestamp_s = 0.03 * k;
+    frame.keypoints = scene.keypoints;
+    frame.flow = {scene.previous_keypoints, scene.keypoints, scene.depths};
+    if (k + 1 == frames) frame.T_cur_prev = given;
+    begin_frame(frame, state);
+    estimate_objects(frame, scene.camera, options, state);
+    CHECK(state.report.flow_model == cfp::FlowModelKind::motion);
+  }
+  return state;
+}
+
+}  // namespace
+
+TEST_CASE("The motion of the frame before tells of this one, where the host does not and nothing pushed the camera",
+          "[frame]") {
+  const cfp::FrameOptions options;
+  cfp::FrameOptions alone;
+  alone.coarse.flow.camera_acceleration_m_s2 = 0;
+  const cfp::SE3<double> truth = cfp::se3_exp(cfp::Vector6<double>(0.005, 0.002, 0.004, 0.001, -0.002, 0.001));
+  double error_sq = 0, error_alone_sq = 0, nees = 0;
+  constexpr int runs = 50;
+  for (std::uint64_t seed = 1; seed <= runs; ++seed) {
+    const auto motion = [&](int frames, const cfp::FrameOptions& used, double push_m,
+                            const std::optional<cfp::UncertainMotion<double>>& given = {}) {
+      const cfp::TimedMotion found = follow_wall(frames, used, push_m, seed, given).current.motion;
+      CHECK(std::abs(found.time_s - (frames > 1 ? 0.03 : 0)) < 1e-12);
+      return found.motion;
+    };
+    const auto followed = motion(5, options, 0), measured = motion(5, alone, 0);
+    const cfp::Vector6<double> error = cfp::se3_log(truth * followed.T_cur_prev.inverse());
+    cfp::Matrix6<double> information;
+    REQUIRE(cfp::invert_normal_equations<6>(followed.covariance, 1e-12, information));
+    nees += error.dot(information * error) / runs;
+    error_sq += error.head<3>().squaredNorm();
+    error_alone_sq += cfp::se3_log(truth * measured.T_cur_prev.inverse()).head<3>().squaredNorm();
+    CHECK(followed.covariance.trace() < measured.covariance.trace());
+    // The first frame has none before it; the next after a push, or with a host's motion, believes these alone.
+    CHECK(motion(1, options, 0).T_cur_prev.translation == motion(1, alone, 0).T_cur_prev.translation);
+    CHECK(motion(5, options, 0.2).T_cur_prev.translation == motion(5, alone, 0.2).T_cur_prev.translation);
+    const cfp::UncertainMotion<double> host(truth, 0.003, 0.001);
+    CHECK(motion(5, options, 0, host).T_cur_prev.translation == motion(5, alone, 0, host).T_cur_prev.translation);
+  }
+  CHECK(error_sq < 0.6 * error_alone_sq);
+  CHECK(nees < 10);
 }
 
 TEST_CASE("One camera before a wall tells who walks, and does not take the parallax of who is nearer for motion",

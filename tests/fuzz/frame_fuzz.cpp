@@ -57,6 +57,7 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
                        &options.coarse.flow_radius_px,
                        &options.coarse.unreported.radius_px,
                        &options.coarse.unreported.max_share,
+                       &flow.camera_acceleration_m_s2,
                        &flow.motion.search_above_px,
                        &flow.motion.shared_depth_ratio,
                        &options.coarse.memory.time_constant_s,

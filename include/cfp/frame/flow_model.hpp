@@ -33,6 +33,9 @@ struct FlowModelOptions {
   /// true: where enough pairs have a depth, they are judged by the camera's motion and their depths. false: as the
   /// paper.
   bool use_depth = true;
+  /// Then the motion of the frame before tells of this one, where the host does not: the standard deviation of each
+  /// coordinate of the camera's acceleration, m/s^2, >= 0; 0: it tells nothing. Not in the paper.
+  double camera_acceleration_m_s2 = 3;
   CameraMotionOptions motion;
   FundamentalRansacOptions ransac;
 };
@@ -147,6 +150,7 @@ inline namespace CFP_ISA {
 [[nodiscard]] inline OptionPath invalid_field(const FlowModelOptions& o) noexcept {
   if (o.min_outside_pairs < 8) return "min_outside_pairs";
   if (!detail::non_negative(o.margin)) return "margin";
+  if (!detail::non_negative(o.camera_acceleration_m_s2)) return "camera_acceleration_m_s2";
   if (const OptionPath field = nested("nearer_than_room", invalid_field(o.nearer_than_room))) return field;
   if (const OptionPath field = nested("motion", invalid_field(o.motion))) return field;
   return nested("ransac", invalid_field(o.ransac));

@@ -73,6 +73,7 @@ struct FrameMemory {
   std::vector<ObjectDepth<Scalar>> object_depths;  ///< of the boxes that the depths could separate
   std::vector<std::uint8_t> descriptors;           ///< one after the other; empty: none
   std::size_t descriptor_bytes = 0;                ///< of each
+  TimedMotion motion;                              ///< of the camera until then, by the flow's depths
 
   [[nodiscard]] DescriptorSpan descriptor_view() const noexcept {
     return {descriptors.data(), descriptors.empty() ? 0 : keypoints.size(), descriptor_bytes, descriptor_bytes};
@@ -152,6 +153,7 @@ void begin_frame(const Frame<Scalar>& frame, FrameState<Scalar>& state) {
   const bool stamped = is_finite(frame.timestamp_s) || !state.previous.known;  // else the clock stays where it was
   current.timestamp_s = stamped ? frame.timestamp_s : state.previous.timestamp_s;
   current.object_depths.clear();
+  current.motion = {};
   current.depths.assign(frame.depths.begin(), frame.depths.end());
   const std::size_t bytes = current.descriptor_bytes = frame.descriptors.bytes;
   current.descriptors.resize(frame.descriptors.size * bytes);

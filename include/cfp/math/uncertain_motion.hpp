@@ -1,6 +1,8 @@
 /// @file uncertain_motion.hpp
-/// A rigid motion with its covariance, and two of them as one.
+/// A rigid motion with its covariance, two of them as one, and what one says of the next.
 #pragma once
+
+#include <limits>
 
 #include "cfp/core/types.hpp"
 #include "cfp/math/normal_equations.hpp"
@@ -34,20 +36,40 @@ struct UncertainMotion {
   }
 };
 
+/// What a camera moved in a time; time_s 0: unknown.
+struct TimedMotion {
+  UncertainMotion<double> motion;
+  double time_s = 0;
+};
+
 inline namespace CFP_ISA {
 
+/// The motion in the next time_s of a camera that keeps its velocity but for an acceleration, the standard deviation of
+/// each coordinate of which is given; how it turns may change at will. Both times above 0.
+[[nodiscard]] inline UncertainMotion<double> predicted_motion(const TimedMotion& last, double time_s,
+                                                              double acceleration_m_s2) noexcept {
+  const double ratio = time_s / last.time_s, between_s = (time_s + last.time_s) / 2;
+  UncertainMotion<double> motion(se3_exp(Vector6<double>(ratio * se3_log(last.motion.T_cur_prev))),
+                                 acceleration_m_s2 * between_s * time_s, 1);
+  motion.covariance += ratio * ratio * last.motion.covariance;
+  return motion;
+}
+
 /// Two independent estimates of one motion as one, to first order in what they differ by; the given one if it is exact.
-/// The measured one where the covariances have no common inverse, or anything is not finite.
+/// The measured one where the covariances have no common inverse, the squared Mahalanobis distance between the two is
+/// above the most, or anything is not finite.
 template <typename Scalar>
-[[nodiscard]] UncertainMotion<Scalar> joined(const UncertainMotion<double>& given,
-                                             const UncertainMotion<Scalar>& measured) noexcept {
+[[nodiscard]] UncertainMotion<Scalar> joined(
+    const UncertainMotion<double>& given, const UncertainMotion<Scalar>& measured,
+    double most_distance_sq = (std::numeric_limits<double>::infinity)()) noexcept {
   const UncertainMotion<double> other = measured.template cast<double>();
   Matrix6<double> inverse;
   if (!invert_normal_equations<6>(Matrix6<double>(given.covariance + other.covariance), 1e-12, inverse))
     return measured;
+  const Vector6<double> apart = se3_log(other.T_cur_prev * given.T_cur_prev.inverse());
+  if (!(apart.dot(inverse.lazyProduct(apart)) <= most_distance_sq)) return measured;
   const Matrix6<double> gain = given.covariance.lazyProduct(inverse);
-  const Vector6<double> correction = gain.lazyProduct(se3_log(other.T_cur_prev * given.T_cur_prev.inverse()));
-  if (!correction.allFinite()) return measured;
+  const Vector6<double> correction = gain.lazyProduct(apart);
   UncertainMotion<double> result(se3_exp(correction) * given.T_cur_prev);
   result.covariance = gain.lazyProduct(other.covariance);
   return result.template cast<Scalar>();
