@@ -1,4 +1,4 @@
-#include "cfp/geometry/camera.hpp"
+#include "cfp/geometry/homography.hpp"
 
 #include "cfp/core/random.hpp"
 #include "cfp/math/se3.hpp"

@@ -1,4 +1,4 @@
-#include "cfp/probability/distance_sigmoid.hpp"
+#include "cfp/math/logistic.hpp"
 
 #include <cfenv>
 #include <cmath>

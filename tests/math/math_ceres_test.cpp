@@ -2,8 +2,8 @@
 #include <ceres/jet.h>
 
 #include "cfp/math/chi_squared.hpp"
+#include "cfp/math/logistic.hpp"
 #include "cfp/math/se3.hpp"
-#include "cfp/probability/distance_sigmoid.hpp"
 #include "support/catch.hpp"
 
 using Jet = ceres::Jet<double, 1>;

@@ -1,12 +1,13 @@
 #include "support/generators.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
 #include "cfp/math/chi_squared.hpp"
+#include "cfp/math/logistic.hpp"
 #include "cfp/math/order_statistic.hpp"
-#include "cfp/probability/distance_sigmoid.hpp"
 
 using cfp_test::any_number;
 using cfp_test::real;
@@ -67,6 +68,11 @@ TEST_CASE("properties of order statistics", "[properties]") {
     RC_ASSERT(cfp::order_statistic(cfp::span<double>(scratch), rank) == sorted[rank]);
     scratch.assign(values.rbegin(), values.rend());
     RC_ASSERT(cfp::order_statistic(cfp::span<double>(scratch), rank) == sorted[rank]);
+    const std::array<double, 3> quantiles = {0.1, 0.2, 0.3};
+    scratch = values;
+    const std::array<double, 3> selected = cfp::select_quantiles(cfp::span<double>(scratch), quantiles);
+    for (std::size_t i = 0; i < 3; ++i)
+      RC_ASSERT(selected[i] == sorted[cfp::quantile_rank(quantiles[i], values.size()) - 1]);
   });
   rc::prop("quantile_rank grows with q and with n", [] {
     const std::size_t n = static_cast<std::size_t>(*rc::gen::inRange(1, 100000));

@@ -1,8 +1,7 @@
 /// @file camera.hpp
 /// The camera interface: any type with the two members of PinholeCamera below (and the alias `ScalarType`) is a camera
 /// for cfp. Camera frame: x right, y down, z forward, metres; pixels with the origin of the caller's calibration.
-/// And the undistorted image of any such camera: epipolar geometry holds only there; and what a camera that turns makes
-/// of it.
+/// And the undistorted image of any such camera: epipolar geometry holds only there.
 #pragma once
 
 #include <array>
@@ -12,7 +11,6 @@
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/types.hpp"
-#include "cfp/math/matrix3.hpp"
 
 namespace cfp {
 
@@ -108,14 +106,6 @@ template <typename Camera>
     }
     return PointSpan<Scalar, 2>(storage);
   }
-}
-
-/// The motion of the whole image when the camera turns by R (of T_cur_prev): K R K^-1 with the camera matrix K, pixels
-/// of the undistorted image. For the box tracker, which knows nothing of the camera.
-template <typename Scalar>
-[[nodiscard]] Matrix3<Scalar> rotation_homography(const PinholeCamera<Scalar>& camera,
-                                                  const Matrix3<non_deduced<Scalar>>& R) noexcept {
-  return camera.matrix() * R * inverse(camera.matrix());
 }
 
 }  // namespace CFP_ISA

@@ -5,12 +5,12 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/status.hpp"
 #include "cfp/geometry/distance.hpp"
+#include "cfp/math/logistic.hpp"
 #include "cfp/math/order_statistic.hpp"
 
 namespace cfp {
@@ -40,18 +40,6 @@ inline namespace CFP_ISA {
   if (!detail::positive(o.steepness)) return "steepness";
   if (o.min_samples < 1) return "min_samples";
   return {};
-}
-
-/// 1 / (1 + exp(-x)), in [0, 1], non-decreasing, logistic(x) + logistic(-x) = 1 up to rounding. Only ever takes the
-/// exponential of a number <= 0, so nothing overflows: exactly 0 at -inf and 1 at +inf. NaN gives 0, the safe side of a
-/// static probability. For float, double and dual numbers.
-template <typename Scalar>
-[[nodiscard]] Scalar logistic(const Scalar& x) noexcept {
-  using std::exp;
-  if (x >= Scalar(0)) return Scalar(1) / (Scalar(1) + exp(-x));
-  if (!(x < Scalar(0))) return Scalar(0);
-  const Scalar e = exp(x);
-  return e / (Scalar(1) + e);
 }
 
 /// C_c = 1 - sum(d) / (n D_Th) over the n distances with 0 <= d < D_Th (paper eq. C_C). In [0, 1]; no such distance: 0.
