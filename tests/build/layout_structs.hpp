@@ -89,6 +89,7 @@
   CFP_LAYOUT(cfp::SE3<double>, translation)                              \
   CFP_LAYOUT(cfp::UncertainMotion<float>, covariance)                    \
   CFP_LAYOUT(cfp::UncertainMotion<double>, covariance)                   \
+  CFP_LAYOUT(cfp::TimedMotion, time_s)                                   \
   CFP_LAYOUT(cfp::Trivial<float>, delta)                                 \
   CFP_LAYOUT(cfp::Trivial<double>, delta)                                \
   CFP_LAYOUT(cfp::Huber<float>, delta)                                   \
@@ -179,8 +180,8 @@
   CFP_LAYOUT(cfp::PoseStep<float>, dt_s) \
   CFP_LAYOUT(cfp::PoseStep<double>, dt_s) \
   CFP_LAYOUT_OPAQUE(cfp::FrameInterval) \
-  CFP_LAYOUT(cfp::FrameMemory<float>, descriptor_bytes) \
-  CFP_LAYOUT(cfp::FrameMemory<double>, descriptor_bytes) \
+  CFP_LAYOUT(cfp::FrameMemory<float>, motion) \
+  CFP_LAYOUT(cfp::FrameMemory<double>, motion) \
   CFP_LAYOUT(cfp::FrameScratch<float>, mask) \
   CFP_LAYOUT(cfp::FrameScratch<double>, mask) \
   CFP_LAYOUT(cfp::FrameState<float>, scratch) \
