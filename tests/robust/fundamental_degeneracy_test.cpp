@@ -79,7 +79,7 @@ TEST_CASE("Fewer than four pairs have no homography", "[robust]") {
     turned.check.find_homography(200);
     CHECK(turned.check.H == before);
     CHECK_FALSE(turned.check.dominant);
-    CHECK(turned.check.find_homography_beside({0, 0, 5, 16}));
+    CHECK(turned.check.find_homography_beside({0, 0, 0, 5, 16}));
     CHECK(turned.check.H == before);
   }
 }
