@@ -1,7 +1,6 @@
 #include "support/generators.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <vector>
 

@@ -9,6 +9,7 @@ import re
 import sys
 from pathlib import Path
 
+HERE = Path(__file__).resolve().parent
 GUARD = "if(mpStaticWeights) "
 NEW_FRAME = (r"if(mpStaticWeights)\n    {\n        mpStaticWeights->NewFrame(mCurrentFrame,mDetections,mFlow.Next("
              r"mImGray,%s,mCurrentFrame.mvKeys,mpStaticWeights->Probability().state()));\n"
@@ -16,10 +17,19 @@ NEW_FRAME = (r"if(mpStaticWeights)\n    {\n        mpStaticWeights->NewFrame(mCu
 
 # Step, file, function ("" for the whole file), a regular expression, what takes its place, how many times it is found.
 STEPS = [
+    # 0: how it is built
+    (0, "CMakeLists.txt", "", r"find_package\(OpenCV 3\.0 QUIET\)", "find_package(OpenCV QUIET)", 1),
+    (0, "CMakeLists.txt", "", r"# Check C\+\+11[\s\S]*?\nendif\(\)\n",
+     "set(CMAKE_CXX_STANDARD 17)\nadd_definitions(-DCOMPILEDWITHC11)\n", 1),
+    (0, "CMakeLists.txt", "", r"(\ninclude_directories\(\n)",
+     lambda found: f"{found[1]}{HERE.parents[2]}/include\n{HERE.parents[1]}\n{HERE}\n", 1),
+    (0, "CMakeLists.txt", "", r"(src/System\.cc\n)", lambda found: f"{found[1]}{HERE}/engines.cc\n", 1),
+    (0, "Thirdparty/DBoW2/CMakeLists.txt", "", r"find_package\(OpenCV 3\.0 QUIET\)", "find_package(OpenCV QUIET)", 1),
     # 0: what C++17, OpenCV 4 and a newer C library want of the code of 2017, nothing where a fork has done it
     (0, "include/ORBextractor.h", "", r"#include\s*<(?:opencv/cv\.h|opencv2/opencv\.hpp)>",
      "#include <unistd.h>\n#include <opencv2/core/core_c.h>\n#include <opencv2/imgproc/types_c.h>\n"
-     "#include <opencv2/opencv.hpp>", 1),
+     "#include <opencv2/opencv.hpp>\n#if __has_include(<opencv2/imgcodecs/legacy/constants_c.h>)\n"
+     "#include <opencv2/imgcodecs/legacy/constants_c.h>\n#endif", 1),
     (0, "include/LoopClosing.h", "", r"std::pair<(?:const KeyFrame\*|KeyFrame\* ?const), ?g2o::Sim3>",
      "std::pair<KeyFrame* const, g2o::Sim3>", 1),
     (0, "include/LoopClosing.h", "", r"(?:bool|int) mnFullBAIdx;", "int mnFullBAIdx;", 1),
@@ -170,7 +180,7 @@ def main():
             if not path.is_file():
                 sys.exit(f"{path} is not there: {root} is no checkout of ORB-SLAM2")
             texts[path] = path.read_text(encoding="utf-8", errors="surrogateescape").replace("\r\n", "\n")
-            if "mpStaticWeights" in texts[path] or "mStaticProbability" in texts[path]:
+            if any(mark in texts[path] for mark in ("engines.cc", "mpStaticWeights", "mStaticProbability")):
                 sys.exit(f"{path} has been changed already: take a fresh checkout")
         where = scope(texts[path], function)
         begin, end = where or (0, 0)

@@ -31,7 +31,7 @@ template <int N>
   constexpr std::size_t n = static_cast<std::size_t>(N);
   double V[n][n], inverse[n];  // inverse: of D
   for (int i = 0; i < N; ++i) {
-    double l[n], rest = A(i, i);
+    double l[n] = {}, rest = A(i, i);
     for (int j = 0; j < i; ++j) {
       double w = 0;
       for (int k = 0; k <= j; ++k) w += V[j][k] * A(i, k);
