@@ -39,7 +39,7 @@ TEST_CASE("The defaults of the flow and of objects", "[core]") {
   CHECK((flow.motion.min_pairs == 12 && flow.motion.min_inlier_share == 0.5));
   CHECK((flow.motion.min_sigma_px == 0.05 && flow.motion.max_sigma_px == 1));
   CHECK(flow.motion.search_above_px == 0.25);
-  CHECK(flow.motion.shared_depth_ratio == 0.12);
+  CHECK((flow.motion.shared_depth_ratio == 0.12 && flow.motion.nearest_share == 0.2));
   CHECK((o.object.score == cfp::ObjectScore::survival && o.object.degrees_of_freedom == 2));
   CHECK((o.object.sigma_px == 1 && o.object.noise_factor == 5.8 && o.object.min_pairs == 8));
   CHECK(o.object.shift_pairs == 15);

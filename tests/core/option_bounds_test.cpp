@@ -108,6 +108,7 @@ TEST_CASE("The ends of the ranges of a frame's options", "[core]") {
       CFP_FIELD(O, coarse.flow.nearer_than_room.inverse_mean, positive),
       CFP_FIELD(O, coarse.flow.nearer_than_room.inverse_sigma, not_negative),
       CFP_FIELD(O, coarse.flow.motion.min_inlier_share, share),
+      CFP_FIELD(O, coarse.flow.motion.nearest_share, share),
       CFP_FIELD(O, coarse.flow.motion.distance.depth_noise.constant_m, not_negative),
       CFP_FIELD(O, coarse.flow.motion.distance.depth_noise.quadratic, not_negative),
       CFP_FIELD(O, coarse.flow.motion.distance.unknown_depth.inverse_mean, positive),

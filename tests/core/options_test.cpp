@@ -65,6 +65,7 @@ TEST_CASE("Every option of a frame is refused by its full, unique name", "[core]
       {"coarse.flow.camera_acceleration_m_s2", [&](auto& o) { o.coarse.flow.camera_acceleration_m_s2 = nan; }},
       {"coarse.flow.nearer_than_room.inverse_mean", [](auto& o) { o.coarse.flow.nearer_than_room.inverse_mean = 0; }},
       {"coarse.flow.motion.min_pairs", [](auto& o) { o.coarse.flow.motion.min_pairs = 2; }},
+      {"coarse.flow.motion.nearest_share", [&](auto& o) { o.coarse.flow.motion.nearest_share = nan; }},
       {"coarse.flow.motion.min_inlier_share", [&](auto& o) { o.coarse.flow.motion.min_inlier_share = nan; }},
       {"coarse.flow.motion.min_sigma_px", [&](auto& o) { o.coarse.flow.motion.min_sigma_px = nan; }},
       {"coarse.flow.motion.max_sigma_px", [&](auto& o) { o.coarse.flow.motion.max_sigma_px = nan; }},

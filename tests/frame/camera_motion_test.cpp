@@ -279,7 +279,7 @@ TEST_CASE("A wrong depth among neighbours that agree bends no motion", "[frame][
   cfp::CameraMotionWorkspace<double> workspace;
   std::vector<double> errors_m, normalized, all_errors_m;
   cfp::CameraMotionOptions all;
-  all.shared_depth_ratio = 0;
+  all.shared_depth_ratio = all.nearest_share = 0;
   for (int run = 0; run < 60; ++run) {
     const cfp::SE3<double> T{cfp::Matrix3<double>::Identity(), {0.013, 0, 0}};
     Flow f;
@@ -313,6 +313,46 @@ TEST_CASE("A wrong depth among neighbours that agree bends no motion", "[frame][
   CHECK(errors_m[30] < 0.005);
   CHECK(all_errors_m[30] > 0.01);
   CHECK(normalized[30] < 15);  // 5.3 is the median of chi-squared
+}
+
+TEST_CASE("A few near depths that are wrong do not tell the translation before a far wall", "[frame][camera_motion]") {
+  cfp::Random random(33, "lever");
+  cfp::CameraMotionWorkspace<double> workspace;
+  cfp::CameraMotionOptions bounded, free;
+  bounded.shared_depth_ratio = free.shared_depth_ratio = 0;  // two that are wrong may stand side by side
+  free.nearest_share = 0;
+  double bounded_nees = 0, free_nees = 0, without_wrong_nees = 0;
+  constexpr int runs = 60;
+  for (int run = 0; run < runs; ++run) {
+    const cfp::SE3<double> T{cfp::Matrix3<double>::Identity(), {0.004, 0, 0}};
+    Flow f;
+    while (f.depths.size() < 60) {
+      const cfp::Vector2<double> p{random.uniform(0, 640), random.uniform(0, 480)};
+      cfp::Vector3<double> ray;
+      cfp::Vector2<double> q;
+      REQUIRE(camera.unproject(p, ray));
+      REQUIRE(camera.project(T * cfp::Vector3<double>(6 * ray), q));
+      q += 0.2 * cfp::Vector2<double>{random.normal(), random.normal()};
+      f.previous.push_back({p.x(), p.y()});
+      f.current.push_back({q.x(), q.y()});
+      f.depths.push_back(6);
+      f.outside.push_back(1);
+    }
+    const auto nees = [&](const cfp::CameraMotionOptions& options) {
+      const cfp::CameraMotion<double> found =
+          cfp::estimate_camera_motion<double>(f.pairs(), f.outside, {}, camera, options, workspace);
+      REQUIRE(found.known);
+      const cfp::Vector6<double> error = cfp::se3_log(found.T_cur_prev * T.inverse());
+      return error.dot(found.covariance.llt().solve(error)) / 6;
+    };
+    without_wrong_nees += nees(bounded) / runs;
+    f.depths[0] = 0.8, f.depths[1] = 1, f.depths[2] = 1.5;
+    bounded_nees += nees(bounded) / runs;
+    free_nees += nees(free) / runs;
+  }
+  CHECK(without_wrong_nees < 1.3);
+  CHECK(bounded_nees < 2.5);
+  CHECK(free_nees > 2 * bounded_nees);
 }
 
 TEST_CASE("A room whose neighbours share no depth keeps its pairs", "[frame][camera_motion]") {

@@ -60,6 +60,7 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
                        &flow.camera_acceleration_m_s2,
                        &flow.motion.search_above_px,
                        &flow.motion.shared_depth_ratio,
+                       &flow.motion.nearest_share,
                        &options.coarse.memory.time_constant_s,
                        &options.coarse.memory.evidence_limit,
                        &flow.nearer_than_room.inverse_mean,

@@ -33,6 +33,9 @@ struct CameraMotionOptions {
   /// A depth that fewer than two of some seven neighbours in the image share to this ratio takes no part, unless that
   /// is over three eighths of them; a ratio without unit, >= 0. 0: all take part (cfp_object_motion_study).
   double shared_depth_ratio = 0.12;
+  /// A pair tells no more of the translation than if it were as far as this share of them, in [0, 1]: few near ones are
+  /// a lever that a wrong depth would move. 0: each tells what it can (cfp_object_motion_study).
+  double nearest_share = 0.2;
   MotionDistanceOptions distance;
   PoseOptions pose;
 };
@@ -64,6 +67,7 @@ inline namespace CFP_ISA {
   if (!(o.max_sigma_px >= o.min_sigma_px) || !is_finite(o.max_sigma_px)) return "max_sigma_px";
   if (!detail::positive(o.search_above_px)) return "search_above_px";
   if (!detail::non_negative(o.shared_depth_ratio)) return "shared_depth_ratio";
+  if (!(o.nearest_share >= 0 && o.nearest_share <= 1)) return "nearest_share";
   if (const OptionPath field = nested("distance", invalid_field(o.distance))) return field;
   return nested("pose", invalid_field(o.pose));
 }
@@ -134,6 +138,12 @@ template <typename Scalar>
                                     span<std::array<Scalar, 3>>(workspace.points), workspace.depths);
   if (taken < options.min_pairs) return motion;
 
+  workspace.distances.clear();
+  for (const auto& point : workspace.points) {
+    if (is_finite(point[0])) workspace.distances.push_back(point[2]);
+  }
+  const Scalar near_m =
+      order_statistic(span<Scalar>(workspace.distances), quantile_rank(options.nearest_share, taken) - 1);
   workspace.distances.resize(outside.size());
   if (workspace.search.observations.index.size() < outside.size())  // a later call may search and must not allocate
     workspace.search.observations.begin(outside.size());
@@ -158,7 +168,9 @@ template <typename Scalar>
       rounds.rounds[0] = rounds.rounds[rounds.round_count - 1];  // a wide loss would lose it again
       rounds.round_count = 1;
     }
-    workspace.sigmas.assign(outside.size(), motion.sigma_px);
+    workspace.sigmas.clear();
+    for (const auto& point : workspace.points)
+      workspace.sigmas.push_back(motion.sigma_px * (std::max)(Scalar(1), near_m / point[2]));
     PoseObservations<Scalar> observations;
     observations.points = workspace.points;
     observations.pixels = flow.current;
