@@ -7,7 +7,7 @@
 // Then the same in a bare room, whose motion says little of a person who is near; "motion taken as exact" leaves its
 // covariance out; "a host's motion" is the true one with errors of 3 mm and 1 mrad, and these as its sigmas. Then with
 // 5, 15 and 30 % of the depths wrong by anything before furniture and walls, with
-// CameraMotionOptions::shared_depth_ratio and without. Then with 10 to 14 points on the person, by
+// CameraMotionOptions::nearest_share and shared_depth_ratio and without. Then with 10 to 14 points on the person, by
 // ObjectProbabilityOptions::min_pairs. Then how soon somebody who sways counts as moving, and how often somebody at
 // rest does whom a rolling shutter, a lens or a focal length that nobody told displaces, by shift_pairs. Then what the
 // motion of the frame before adds, by FlowModelOptions::camera_acceleration_m_s2, where the camera's velocity changes
@@ -509,8 +509,10 @@ int main(int argc, char** argv) {
     for (const Room& room : rooms_of_wrong_depths) {
       Way way;
       judge(room.name, way, cells, room, 1 / 30.0, wrong_depths, repetitions, seed);
+      way.options.coarse.flow.motion.nearest_share = 0;
+      judge("  near ones tell what they can", way, cells, room, 1 / 30.0, wrong_depths, repetitions, seed);
       way.options.coarse.flow.motion.shared_depth_ratio = 0;
-      judge("  all depths take part", way, cells, room, 1 / 30.0, wrong_depths, repetitions, seed);
+      judge("  and all take part", way, cells, room, 1 / 30.0, wrong_depths, repetitions, seed);
     }
   }
 
