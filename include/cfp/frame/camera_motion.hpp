@@ -87,6 +87,31 @@ template <typename Scalar>
 namespace detail {
 inline namespace CFP_ISA {
 
+/// The pairs marked in `outside` whose depth is valid, as points of the previous camera; the others as NaN.
+template <typename Scalar>
+void place_points(const FlowPairs<Scalar>& flow, span<const char> outside, const PinholeCamera<Scalar>& camera,
+                  std::vector<std::array<Scalar, 3>>& points) {
+  const Scalar nowhere = std::numeric_limits<Scalar>::quiet_NaN();
+  points.assign(outside.size(), {nowhere, nowhere, nowhere});
+  for (std::size_t i = 0; i < flow.previous_depths.size(); ++i) {
+    const Scalar z = flow.previous_depths[i];
+    Vector3<Scalar> ray;
+    if (outside[i] == 0 || !is_valid_depth(z) || !camera.unproject(flow.previous[i], ray)) continue;
+    points[i] = {ray.x() * z, ray.y() * z, z};
+  }
+}
+
+/// The depth that the given share of the points do not exceed. At least one point must be finite.
+template <typename Scalar>
+[[nodiscard]] Scalar depth_at_share(const std::vector<std::array<Scalar, 3>>& points, double share,
+                                    std::vector<Scalar>& depths) {
+  depths.clear();
+  for (const auto& point : points) {
+    if (is_finite(point[0])) depths.push_back(point[2]);
+  }
+  return order_statistic(span<Scalar>(depths), quantile_rank(share, depths.size()) - 1);
+}
+
 /// The motion that most of the `taken` workspace.points agree to; false, and T untouched, without one. Its threshold is
 /// below sigma_px, their noise under a motion which what moves may have led astray: a wider one would hold both.
 template <typename Scalar>
@@ -125,25 +150,13 @@ template <typename Scalar>
                                                           CameraMotionWorkspace<Scalar>& workspace) {
   CFP_ASSERT(outside.size() == flow.current.size());
   CameraMotion<Scalar> motion;
-  const Scalar nowhere = std::numeric_limits<Scalar>::quiet_NaN();
-  workspace.points.assign(outside.size(), {nowhere, nowhere, nowhere});
-  for (std::size_t i = 0; i < flow.previous_depths.size(); ++i) {
-    const Scalar z = flow.previous_depths[i];
-    Vector3<Scalar> ray;
-    if (outside[i] == 0 || !is_valid_depth(z) || !camera.unproject(flow.previous[i], ray)) continue;
-    workspace.points[i] = {ray.x() * z, ray.y() * z, z};
-  }
+  detail::place_points(flow, outside, camera, workspace.points);
   const std::size_t taken =
       detail::leave_out_lone_depths(flow.previous, Scalar(options.shared_depth_ratio),
                                     span<std::array<Scalar, 3>>(workspace.points), workspace.depths);
   if (taken < options.min_pairs) return motion;
 
-  workspace.distances.clear();
-  for (const auto& point : workspace.points) {
-    if (is_finite(point[0])) workspace.distances.push_back(point[2]);
-  }
-  const Scalar near_m =
-      order_statistic(span<Scalar>(workspace.distances), quantile_rank(options.nearest_share, taken) - 1);
+  const Scalar near_m = detail::depth_at_share(workspace.points, options.nearest_share, workspace.distances);
   workspace.distances.resize(outside.size());
   if (workspace.search.observations.index.size() < outside.size())  // a later call may search and must not allocate
     workspace.search.observations.begin(outside.size());

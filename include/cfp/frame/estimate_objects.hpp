@@ -24,22 +24,17 @@ inline namespace CFP_ISA {
   return scaled_to_noise(options, report.flow_sigma_px, coordinates_of(report.flow_model));
 }
 
-/// The motion of the flow's depths joined with the host's or, without, with what the frame before lets expect, if the
-/// two agree: a camera that is pushed keeps no velocity. It is remembered for the next frame.
+/// The motion of the flow's depths joined with what else is known of it: the host's or, without, what the frame before
+/// lets expect if the two agree, for a camera that is pushed keeps no velocity.
 template <typename Scalar>
-[[nodiscard]] UncertainMotion<Scalar> expected_motion(const UncertainMotion<Scalar>& measured,
-                                                      const std::optional<UncertainMotion<double>>& given,
-                                                      double acceleration_m_s2, FrameState<Scalar>& state) noexcept {
+[[nodiscard]] UncertainMotion<Scalar> joined_with_known(const UncertainMotion<Scalar>& measured,
+                                                        const std::optional<UncertainMotion<double>>& given,
+                                                        const TimedMotion& last, double time_s,
+                                                        double acceleration_m_s2) noexcept {
   constexpr double most_distance_sq = 22.5;  // chi^2 of 6 degrees of freedom: one in a thousand
-  const TimedMotion& last = state.previous.motion;
-  const double time_s = elapsed_s(state);
-  UncertainMotion<Scalar> motion = measured;
-  if (given)
-    motion = joined(*given, measured);
-  else if (acceleration_m_s2 > 0 && last.time_s > 0 && time_s > 0)
-    motion = joined(predicted_motion(last, time_s, acceleration_m_s2), measured, most_distance_sq);
-  state.current.motion = {motion.template cast<double>(), time_s};
-  return motion;
+  if (given) return joined(*given, measured);
+  if (!(acceleration_m_s2 > 0 && last.time_s > 0 && time_s > 0)) return measured;
+  return joined(predicted_motion(last, time_s, acceleration_m_s2), measured, most_distance_sq);
 }
 
 /// What the flow pairs are judged by: the host's motion if it is exact, or its F; else the model of the pairs outside
@@ -54,8 +49,12 @@ template <typename Scalar>
   FlowModel<Scalar> model;
   if (!exact && !frame.fundamental) {
     model = estimate_flow_model(undistorted_flow, outside, camera, options, state.scratch.flow);
-    if (model.kind == FlowModelKind::motion)
-      model.motion = expected_motion(model.motion, given, options.camera_acceleration_m_s2, state);
+    if (model.kind == FlowModelKind::motion) {
+      const double time_s = elapsed_s(state);
+      model.motion =
+          joined_with_known(model.motion, given, state.previous.motion, time_s, options.camera_acceleration_m_s2);
+      state.current.motion = {model.motion.template cast<double>(), time_s};
+    }
     if (!given || model.kind != FlowModelKind::none) return model;
   }
   model.support = FlowSupport::caller;
