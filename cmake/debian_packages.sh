@@ -1,7 +1,16 @@
-# Sourced by tests/run and examples/run: installs the Debian packages of the arrays `required` and `optional` that are missing,
-# when it may, and names them otherwise.
+# Sourced by tests/run and examples/run: what they show, and install_missing, which installs the Debian packages of the
+# arrays `required` and `optional` that are missing, when it may, and names them otherwise.
 
 say() { printf '\n==== %s\n' "$*"; }
+
+# What a build has done of what it has to do, [n/m] or [ p%], on one line of a terminal; elsewhere nothing.
+show_progress() {
+  if [[ -t 1 ]]; then
+    awk '/^\[/ { sub(/\].*/, "]"); printf "\r%s  ", $0; fflush() } END { printf "\r" }'
+  else
+    cat >/dev/null
+  fi
+}
 
 # Names on standard output, one per line: those of the arguments that dpkg does not know as installed.
 missing_packages() {
