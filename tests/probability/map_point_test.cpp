@@ -155,6 +155,15 @@ TEST_CASE("A map point that was never in doubt keeps M = 1 under every policy", 
   }
 }
 
+TEMPLATE_TEST_CASE("A keypoint that is surely static never lowers M", "[probability]", float, double) {
+  const cfp::MapPointOptions options = with(cfp::MapPointPolicy::log_odds);
+  for (int i = 0; i <= 1000; ++i) {
+    const TestType m = TestType(i) / 1000;
+    CHECK(cfp::updated_map_point(TestType(1), m, options) >= m);
+    CHECK(cfp::updated_map_point(TestType(0.985), m, options) >= m);
+  }
+}
+
 TEMPLATE_TEST_CASE("M falls under doubt at the smallest evidence limit, and smaller ones are refused", "[probability]",
                    float, double) {
   cfp::MapPointOptions options;

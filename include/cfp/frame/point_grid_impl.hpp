@@ -33,7 +33,8 @@ inline namespace CFP_ISA {
 /// Which of so many columns or rows a place lies in; the outermost ones hold all beyond.
 template <typename Scalar>
 [[nodiscard]] std::size_t cell_at(Scalar offset, Scalar per_side, std::size_t count) noexcept {
-  return static_cast<std::size_t>((std::min)((std::max)(Scalar(0), offset * per_side), static_cast<Scalar>(count - 1)));
+  return static_cast<std::uint32_t>(
+      (std::min)((std::max)(Scalar(0), offset * per_side), static_cast<Scalar>(count - 1)));
 }
 
 /// Puts those of the points for which `keep(index)` holds, all finite, into cells. Later `reach` is how near is near.

@@ -79,11 +79,10 @@ template <typename Scalar>
   const Scalar rate = Scalar(options.rate), limit = Scalar(options.evidence_limit);
   if (options.policy == MapPointPolicy::copy) return k;
   if (options.policy == MapPointPolicy::exponential_mean) return clamp_probability(m + rate * (k - m));
+  // A point that was never in doubt keeps the weight 1 that it has without this library.
+  if (m > Scalar(1) - limit && k > Scalar(1) - limit) return m;
   const Scalar odds = detail::odds_against(m, limit) * pow(detail::odds_against(k, limit), rate);
-  const Scalar updated = Scalar(1) / (Scalar(1) + odds);
-  // A K beyond the bound never lowers M: a point that was never in doubt keeps the weight 1 that it has without this
-  // library.
-  return k > Scalar(1) - limit && updated < m ? m : (std::min)((std::max)(updated, limit), Scalar(1) - limit);
+  return (std::min)((std::max)(Scalar(1) / (Scalar(1) + odds), limit), Scalar(1) - limit);
 }
 
 /// Bayes' rule with M of before as the prior of a keypoint: odds = odds(M) odds(E) odds(K)^constraint_power, where E is
