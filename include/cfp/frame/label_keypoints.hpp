@@ -66,16 +66,19 @@ void score_flow_outside(const Frame<Scalar>& frame, const FrameOptions& options,
   }
   // Too many: what moves may as well be the camera.
   if (static_cast<double>(moving) > unreported.max_share * static_cast<double>(scratch.points.size())) return;
-  const auto is_near = [&](std::size_t p, const std::array<Scalar, 2>& keypoint) {
-    const Scalar dx = scratch.points[p][0] - keypoint[0], dy = scratch.points[p][1] - keypoint[1];
-    return dx * dx + dy * dy < radius_sq;
-  };
+  const auto first = scratch.points.begin();
   for (std::size_t i = 0; i < state.size(); ++i) {
     if (state.label[i] != KeypointLabel::outside) continue;
+    const auto is_near = [&, x = state.current.keypoints[i][0],
+                          y = state.current.keypoints[i][1]](const std::array<Scalar, 2>& point) {
+      const Scalar dx = point[0] - x, dy = point[1] - y;
+      return dx * dx + dy * dy < radius_sq;
+    };
+    const auto near_and_moving = std::count_if(first, first + static_cast<std::ptrdiff_t>(moving), is_near);
+    if (2 * static_cast<std::size_t>(near_and_moving) < unreported.min_pairs) continue;
     scratch.scratch.clear();  // scores nearby
     for (std::size_t p = 0; p < scratch.points.size(); ++p) {
-      if (p == moving && 2 * scratch.scratch.size() < unreported.min_pairs) break;
-      if (is_near(p, state.current.keypoints[i])) scratch.scratch.push_back(scratch.samples[p]);
+      if (is_near(scratch.points[p])) scratch.scratch.push_back(scratch.samples[p]);
     }
     const std::size_t n = scratch.scratch.size();
     if (n < unreported.min_pairs) continue;

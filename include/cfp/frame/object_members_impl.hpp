@@ -18,7 +18,8 @@ template <typename Scalar>
 
 /// Whether a pixel belongs to an object: by its label if it has one, else by its box.
 template <typename Scalar>
-[[nodiscard]] bool lies_on(const TrackedBox<Scalar>& box, const LabelImage& labels, Scalar x, Scalar y) noexcept {
+[[nodiscard]] CFP_INLINE bool lies_on(const TrackedBox<Scalar>& box, const LabelImage& labels, Scalar x,
+                                      Scalar y) noexcept {
   return has_label(box, labels) ? label_at(labels, x, y) == box.detection + 1 : contains(box.box, x, y);
 }
 

@@ -96,8 +96,9 @@ template <typename Scalar>
   const auto against = [limit = Scalar(options.evidence_limit)](Scalar p) {
     return detail::odds_against(clamp_probability(p), limit);
   };
-  return Scalar(1) / (Scalar(1) + against(map_point_probability) * against(object_evidence) *
-                                      pow(against(keypoint_probability), Scalar(options.constraint_power)));
+  Scalar odds = against(map_point_probability) * against(object_evidence);
+  if (keypoint_probability != Scalar(0.5)) odds *= pow(against(keypoint_probability), Scalar(options.constraint_power));
+  return Scalar(1) / (Scalar(1) + odds);
 }
 
 /// M < 0.3: the host should delete the map point.
