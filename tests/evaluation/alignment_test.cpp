@@ -152,3 +152,36 @@ TEST_CASE("Alignment reads strided points and allocates nothing", "[evaluation]"
   CHECK(cfp_test::allocations_in(work) == 0);
   CHECK_THAT((result.S_to_from * cfp::Vector3<double>(1, 0, 0) - to[1]).norm(), WithinAbs(0, 1e-12));
 }
+
+TEST_CASE("Points that all coincide, anywhere, tell neither rotation nor scale", "[evaluation]") {
+  cfp::Random random(31, "coincide");
+  const auto any = [&] {
+    return cfp::Vector3<double>(random.uniform(-9, 9), random.uniform(-9, 9), random.uniform(-9, 9));
+  };
+  for (int round = 0; round < 300; ++round) {
+    const Points<double> still(2 + random.index(30), any());
+    Points<double> moving;
+    for (std::size_t i = 0; i < still.size(); ++i) moving.push_back(any());
+    for (const bool frozen_estimate : {true, false}) {
+      const auto result = frozen_estimate ? align(still, moving, true) : align(moving, still, true);
+      CHECK(result.status == cfp::Status::degenerate);
+      CHECK(result.S_to_from.scale == 1);
+    }
+  }
+}
+
+TEST_CASE("Mirror-symmetric points that are turned about one axis are aligned exactly", "[evaluation]") {
+  cfp::Random random(32, "symmetric");
+  for (int round = 0; round < 500; ++round) {
+    Points<double> from, to;
+    for (int i = 0; i < 4; ++i) {
+      const double x = random.uniform(-3, 3), y = random.uniform(0.2, 3), z = random.uniform(-3, 3);
+      for (const double side : {-1.0, 1.0}) from.emplace_back(x, side * y, z);
+    }
+    const auto R = cfp::so3_exp(cfp::Vector3<double>(0, random.uniform(-3, 3), 0));
+    for (const auto& p : from) to.push_back(R * p);
+    const auto result = align(from, to, false);
+    CHECK(result.status == cfp::Status::ok);
+    CHECK((result.S_to_from.rotation - R).norm() < 1e-12);
+  }
+}

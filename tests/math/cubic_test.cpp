@@ -1,6 +1,7 @@
 #include "cfp/math/cubic.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "cfp/core/random.hpp"
@@ -52,4 +53,18 @@ TEST_CASE("Repeated roots are found and bad coefficients give none", "[math]") {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   CHECK(real_cubic_roots(nan, 0.0, 1.0, roots) == 0);
   CHECK(real_cubic_roots(1e300, 0.0, 1.0, roots) == 0);
+}
+
+TEST_CASE("A double root is found however large the third root is beside it", "[math]") {
+  for (int twice = -50; twice <= 50; ++twice) {
+    for (int once = -200; once <= 200; ++once) {
+      const double d = twice, s = once;
+      double roots[3];
+      CAPTURE(twice, once);
+      REQUIRE(real_cubic_roots(-2 * d - s, d * d + 2 * d * s, -d * d * s, roots) == 3);  // (x - d)^2 (x - s)
+      std::sort(roots, roots + 3);
+      const double expected[3] = {std::min(d, s), d, std::max(d, s)};
+      for (int i = 0; i < 3; ++i) CHECK(std::abs(roots[i] - expected[i]) < 1e-4);
+    }
+  }
 }

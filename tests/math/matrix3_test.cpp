@@ -1,7 +1,9 @@
 #include "cfp/math/matrix3.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
+#include <limits>
 
 #include <Eigen/LU>
 #include <Eigen/SVD>
@@ -74,5 +76,30 @@ TEST_CASE("Orthogonalised columns of a symmetric matrix are its eigenvectors, la
     CHECK((A - V * values.asDiagonal()).norm() < 1e-12);
     CHECK((M * V - A).norm() < 1e-12);
     CHECK((V.transpose() * V - Matrix9::Identity()).norm() < 1e-13);
+  }
+}
+
+TEST_CASE("The decomposition holds for each of the matrices of -1, 0 and 1, most of which have orthogonal columns",
+          "[math]") {
+  double worst = 0;
+  for (int code = 0; code < 19683; ++code) {
+    Matrix3<double> M;
+    for (int i = 0, rest = code; i < 9; ++i, rest /= 3) M.data()[i] = rest % 3 - 1;
+    const cfp::SVD3<double> found = cfp::svd(M);
+    worst = std::max({worst, (found.U * found.sigma.asDiagonal() * found.V.transpose() - M).norm(),
+                      (found.U.transpose() * found.U - Matrix3<double>::Identity()).norm(),
+                      found.sigma[1] - found.sigma[0], std::abs(found.sigma[2]) - found.sigma[1]});
+  }
+  CHECK(worst < 1e-14);
+}
+
+TEMPLATE_TEST_CASE("U is a rotation however small the second singular value", "[math]", float, double) {
+  for (int exponent = 0; exponent > std::numeric_limits<TestType>::min_exponent - 20; --exponent) {
+    Matrix3<TestType> M = Matrix3<TestType>::Zero();
+    M(0, 0) = 1;
+    M(1, 1) = std::ldexp(TestType(1), exponent);
+    const Matrix3<TestType> U = cfp::svd(M).U;
+    CAPTURE(exponent);
+    CHECK((U.transpose() * U - Matrix3<TestType>::Identity()).norm() < 4 * std::numeric_limits<TestType>::epsilon());
   }
 }

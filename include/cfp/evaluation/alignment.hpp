@@ -58,17 +58,20 @@ inline namespace CFP_ISA {
 template <typename From, typename To>
 [[nodiscard]] AlignmentResult align_points(const From& from, const To& to, bool with_scale = false) noexcept {
   CFP_ASSERT(from.size() == to.size());
+  // From the first pair on, so that points that coincide do so exactly.
+  Vector3<double> from_origin = Vector3<double>::Zero(), to_origin = Vector3<double>::Zero();
   const auto for_each_finite = [&](double unit, const auto& visit) {
     for (std::size_t i = 0; i < from.size(); ++i) {
       if (!from[i].allFinite() || !to[i].allFinite()) continue;
       const Vector3<double> a = from[i].template cast<double>() / unit, b = to[i].template cast<double>() / unit;
-      visit(a, b);
+      visit(Vector3<double>(a - from_origin), Vector3<double>(b - to_origin));
     }
   };
   AlignmentResult result;
   double largest = 0;
+  Vector3<double> first[2];
   for_each_finite(1, [&](const Vector3<double>& a, const Vector3<double>& b) {
-    ++result.used;
+    if (result.used++ == 0) first[0] = a, first[1] = b;
     largest = (std::max)({largest, a.cwiseAbs().maxCoeff(), b.cwiseAbs().maxCoeff()});
   });
   result.skipped = from.size() - result.used;
@@ -76,6 +79,7 @@ template <typename From, typename To>
 
   // A common unit keeps a rigid motion rigid; the product with 1/unit would overflow for a subnormal unit, so divide.
   const double unit = (std::max)(largest, (std::numeric_limits<double>::min)());
+  from_origin = first[0] / unit, to_origin = first[1] / unit;
   const double n = static_cast<double>(result.used);
   Vector3<double> from_mean = Vector3<double>::Zero(), to_mean = Vector3<double>::Zero();
   for_each_finite(unit, [&](const Vector3<double>& a, const Vector3<double>& b) {
@@ -96,7 +100,7 @@ template <typename From, typename To>
     const double scale = d.sum() / from_spread;
     if (scale > 0 && is_finite(scale)) S.scale = scale;
   }
-  const Vector3<double> shift = to_mean - S.scale * (S.rotation * from_mean);
+  const Vector3<double> shift = to_origin + to_mean - S.scale * (S.rotation * (from_origin + from_mean));
   for (int c = 0; c < 3; ++c) {
     const double t = shift[c] * unit;
     S.translation[c] = is_finite(t) ? t : 0;

@@ -41,27 +41,30 @@ template <typename Scalar>
 }
 
 /// Real roots of x^3 + a x^2 + b x + c in roots[0 .. count), the isolated one first; returns the count, 1 or 3 (a
-/// double root counts twice), or 0 when a coefficient is not finite or the roots overflow. The other two come from the
-/// quadratic that is left, then a Newton step on the cubic itself; a root at distance d from the next is exact to
-/// rounding / d. Allocates nothing.
+/// double root counts twice), or 0 when a coefficient is not finite or the roots over- or underflow. The other two come
+/// from the quadratic that is left, then a Newton step on the cubic itself; a root at distance d from the next is exact
+/// to rounding / d. Allocates nothing.
 template <typename Scalar>
 [[nodiscard]] int real_cubic_roots(Scalar a, Scalar b, Scalar c, Scalar (&roots)[3]) noexcept {
   const Scalar first = isolated_cubic_root(a, b, c), size = std::abs(a) + std::abs(b) + std::abs(c);
   if (!is_finite(size * size * size) || !is_finite(first)) return 0;
   roots[0] = first;
   // x^2 + (a + first) x + (a + first) first + b, and the discriminant by what the roots are: (a + first) / -2 +- root.
-  const Scalar middle = Scalar(-0.5) * (a + first), product = b - Scalar(2) * middle * first;
+  Scalar middle = Scalar(-0.5) * (a + first), product = b - Scalar(2) * middle * first;
+  // Where the first root is the largest its rounding error would be most of the others.
+  if (std::abs(first) > std::abs(middle)) product = -c / first, middle = Scalar(0.5) * (b - product) / first;
   const Scalar square = middle * middle, discriminant = square - product;
   // The margin keeps a double root that rounding would otherwise turn into a pair of complex ones.
   const Scalar margin = Scalar(32) * std::numeric_limits<Scalar>::epsilon() * (square + std::abs(product));
   if (!(discriminant >= -margin)) return 1;
   const Scalar root = discriminant > Scalar(0) ? std::sqrt(discriminant) : Scalar(0);
   roots[1] = middle - root, roots[2] = middle + root;
-  for (Scalar& x : roots) {
-    const Scalar value = ((x + a) * x + b) * x + c, slope = (Scalar(3) * x + Scalar(2) * a) * x + b;
-    const Scalar next = x - value / slope;
-    // At a double root the slope vanishes with the value: keep a step only when it lowers the polynomial.
-    if (std::abs(((next + a) * next + b) * next + c) < std::abs(value)) x = next;
+  for (Scalar* const x : {&roots[1], &roots[2]}) {
+    const Scalar value = ((*x + a) * *x + b) * *x + c, slope = (Scalar(3) * *x + Scalar(2) * a) * *x + b;
+    const Scalar step = value / slope, next = *x - step;
+    // At a double root the slope vanishes with the value: keep a step only when it stays by its root and lowers the
+    // polynomial.
+    if (std::abs(step) < root && std::abs(((next + a) * next + b) * next + c) < std::abs(value)) *x = next;
   }
   return 3;
 }

@@ -33,7 +33,7 @@ void orthogonalize_columns(Eigen::Matrix<Scalar, N, N>& A, Eigen::Matrix<Scalar,
         const Scalar a = A.col(p).squaredNorm(), b = A.col(q).squaredNorm(), c = A.col(p).dot(A.col(q));
         const bool orthogonal = !(std::abs(c) > std::numeric_limits<Scalar>::epsilon() * std::sqrt(a) * std::sqrt(b));
         if (orthogonal && a >= b) continue;
-        rotated = rotated || !orthogonal;
+        rotated = true;  // a change of places brings pairs together that were not compared
         // Tangent of the angle that makes them orthogonal; columns in the wrong order change places.
         const Scalar zeta = orthogonal ? Scalar(0) : (b - a) / (2 * c);
         Scalar t = orthogonal ? Scalar(0) : 1 / (std::abs(zeta) + std::sqrt(1 + zeta * zeta));
@@ -76,7 +76,7 @@ template <typename Scalar>
   return C;
 }
 
-/// Not finite for a singular M.
+/// Of no meaning for an M that is singular to rounding.
 template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> inverse(const Matrix3<Scalar>& M) noexcept {
   const Matrix3<Scalar> C = cofactors(M);
@@ -94,7 +94,7 @@ template <typename Scalar>
   const Vector3<Scalar> u = A.col(0).norm() > Scalar(0) ? A.col(0).normalized() : Vector3<Scalar>::UnitX();
   // Across u even where the second singular value vanishes.
   Vector3<Scalar> v = A.col(1) - u.dot(A.col(1)) * u;
-  if (!(v.squaredNorm() > Scalar(0))) {
+  if (!(v.squaredNorm() > (std::numeric_limits<Scalar>::min)())) {
     Eigen::Index least = 0;
     u.cwiseAbs().minCoeff(&least);
     v = cross(u, Vector3<Scalar>::Unit(least));
