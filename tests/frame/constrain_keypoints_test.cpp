@@ -279,6 +279,22 @@ TEMPLATE_TEST_CASE("The second stage survives hostile frames and poses", "[frame
   }
 }
 
+TEST_CASE("A pose that is not finite in any place leaves K of the coarse stage", "[frame]") {
+  using Limits = std::numeric_limits<double>;
+  for (const double bad : {Limits::quiet_NaN(), Limits::infinity(), -Limits::infinity()}) {
+    for (int entry = 0; entry < 12; ++entry) {
+      FineRun<double> run(make_dynamic_scene<double>({}, 21));
+      const std::vector<double> coarse = run.state.static_probability;
+      cfp::SE3<double>& T = run.pose.T_cur_prev;
+      (entry < 9 ? T.rotation.data()[entry] : T.translation[entry - 9]) = bad;
+      run.fine({});
+      CAPTURE(bad, entry);
+      CHECK(run.state.report.constrained == 0);
+      CHECK(run.state.static_probability == coarse);
+    }
+  }
+}
+
 TEMPLATE_TEST_CASE("After a first call the second stage allocates nothing and repeats its bits", "[frame]", float,
                    double) {
   FineRun<TestType> run(make_dynamic_scene<TestType>({}, 19));

@@ -90,3 +90,10 @@ TEST_CASE("Boxes of classes that cannot move, and all boxes when they are off, a
   CHECK(Camera(off).see(0, person).boxes.empty());
   CHECK(Camera().see(0, person).boxes.size() == 1);
 }
+
+TEST_CASE("A first time stamp that is no number is reported, and so is the frame after it", "[frame]") {
+  Camera camera;
+  CHECK(camera.see(std::numeric_limits<double>::quiet_NaN(), person).report.time == cfp::Status::invalid_input);
+  CHECK(camera.see(10, person).report.time == cfp::Status::invalid_input);
+  CHECK(camera.see(10.03, person).report.time == cfp::Status::ok);
+}

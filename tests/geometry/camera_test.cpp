@@ -105,6 +105,9 @@ TEMPLATE_TEST_CASE("project agrees with finite differences and rejects what is b
                  WithinAbs(0, Limit<Scalar>::jacobian / 50));
   }
   CHECK(valid >= 40);
+  Vector2<Scalar> untouched(7, 8);
+  CHECK(!camera.project({0, 0, std::numeric_limits<Scalar>::infinity()}, untouched));
+  CHECK(untouched == Vector2<Scalar>(7, 8));
 }
 
 TEMPLATE_TEST_CASE("unproject inverts project", "[geometry]", PinholeCamera<float>, PinholeCamera<double>,

@@ -87,7 +87,8 @@ template <typename Scalar>
     const double gap = depth(i + stride) - depth(i);
     if (!(gap > widest)) continue;
     widest = gap;
-    end_at_gap = i + (stride + 1) / 2;
+    // Of equal depths all or none, whatever their order.
+    end_at_gap = (std::min)(up_to(depth(i + (stride - 1) / 2)), nearer_than(depth(i + stride)));
   }
   if (end_at_gap > 0) return {first, end_at_gap};
   return {first, (std::max)(first, (std::min)(end, up_to(front + o.behind_m)))};

@@ -4,6 +4,7 @@
 /// that agree, how they are spread over the image, and the step that it means since the last pose.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
@@ -46,7 +47,7 @@ struct PoseAssessment {
   PoseHealth status = PoseHealth::not_solved;  ///< the first of its list that holds
   double inliers = 0;                          ///< sum of their weights
   double inlier_share = 0;                     ///< of the weight of all observations, in [0, 1]
-  double spread = 0;                           ///< share of the image's cells with an inlier, in [0, 1]
+  double spread = 0;                           ///< share of the image's cells with an inlier of weight > 0.1, in [0, 1]
   double position_sigma_m = std::numeric_limits<double>::infinity();    ///< of the camera's centre, all three axes
   double rotation_sigma_rad = std::numeric_limits<double>::infinity();  ///< the same of its rotation
 
@@ -133,7 +134,7 @@ template <typename Scalar>
                                       cell(x, options.image_width, columns))] = true;
   }
   if (all > 0) out.inlier_share = clamp_probability(out.inliers / all);
-  for (const bool cell : occupied) out.spread += cell ? 1.0 / (columns * rows) : 0.0;
+  out.spread = static_cast<double>(std::count(std::begin(occupied), std::end(occupied), true)) / (columns * rows);
   const bool determined = pose_sigmas(pose.information, out.position_sigma_m, out.rotation_sigma_rad);
 
   const bool certain = determined && out.position_sigma_m <= options.max_position_sigma_m &&
@@ -154,7 +155,8 @@ class FrameInterval {
  public:
   /// Once per frame, with its time. True: there is a gap before it, longer than thrice the usual interval, and than
   /// 0.2 s: over less, a velocity may be believed. A time that does not grow is no gap, and is not learnt. The usual
-  /// interval follows within some ten frames, so a recording that becomes slower has no gap after each of its frames.
+  /// interval follows, by a fifth a frame: within some ten frames of a change by a few times, so that a recording that
+  /// becomes slower has no gap after each of its frames.
   bool is_gap(double time_s) noexcept {
     const double dt = time_s - last_s_;
     const bool known = is_finite(last_s_);

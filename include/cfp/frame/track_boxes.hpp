@@ -13,7 +13,8 @@ namespace cfp {
 inline namespace CFP_ISA {
 
 /// Sets state.boxes: what the tracker gives of the classes that can move. A frame whose detector did not run moves the
-/// tracks and misses nothing. A time stamp that did not grow, or is not finite, is reported, and the boxes stay.
+/// tracks and misses nothing. A time stamp that did not grow, that is not finite or that follows
+/// one that is not is reported, and the boxes stay.
 template <typename Scalar>
 void track_boxes(const Frame<Scalar>& frame, const FrameOptions& options, BoxTracker<Scalar>& tracker,
                  FrameState<Scalar>& state) {
@@ -21,7 +22,7 @@ void track_boxes(const Frame<Scalar>& frame, const FrameOptions& options, BoxTra
   if (!options.use_boxes) return;
   FrameReport& report = state.report;
   double dt = detail::elapsed_s(state);
-  if (state.previous.known && !(dt > 0 && is_finite(dt))) {
+  if (!is_finite(frame.timestamp_s) || (state.previous.known && !(dt > 0 && is_finite(dt)))) {
     report.time = Status::invalid_input;
     dt = 0;
   }

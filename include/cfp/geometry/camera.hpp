@@ -23,11 +23,12 @@ struct PinholeCamera {
   Scalar cx = Scalar(0);  ///< principal point in pixels
   Scalar cy = Scalar(0);
 
-  /// Projects a point of the camera frame. Returns whether the projection is valid: z > Tolerance::min_depth and a
-  /// finite pixel; otherwise pixel and jacobian are left as they were. jacobian, when asked for: d pixel / d point.
+  /// Projects a point of the camera frame. Returns whether the projection is valid: a finite z >
+  /// Tolerance::min_depth and a finite pixel; otherwise pixel and jacobian are left as they were. jacobian, when asked
+  /// for: d pixel / d point.
   [[nodiscard]] CFP_INLINE bool project(const Vector3<Scalar>& point, Vector2<Scalar>& pixel,
                                         Matrix23<Scalar>* jacobian = nullptr) const noexcept {
-    if (!(point.z() > Scalar(Tolerance<Scalar>::min_depth))) return false;
+    if (!(point.z() > Scalar(Tolerance<Scalar>::min_depth)) || !is_finite(point.z())) return false;
     const Scalar inv_z = Scalar(1) / point.z();
     const Scalar x = point.x() * inv_z;
     const Scalar y = point.y() * inv_z;

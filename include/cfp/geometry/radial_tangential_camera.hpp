@@ -123,11 +123,12 @@ struct RadialTangentialCamera {
   /// them.
   [[nodiscard]] CFP_INLINE PinholeCamera<Scalar> pinhole() const noexcept { return {fx, fy, cx, cy}; }
 
-  /// Projects a point of the camera frame. Returns whether the projection is valid: z > Tolerance::min_depth, before
-  /// the fold, a finite pixel; otherwise pixel and jacobian are left as they were. jacobian: d pixel / d point.
+  /// Projects a point of the camera frame. Returns whether the projection is valid: a finite z >
+  /// Tolerance::min_depth, before the fold, a finite pixel; otherwise pixel and jacobian are left as they were.
+  /// jacobian: d pixel / d point.
   [[nodiscard]] CFP_INLINE bool project(const Vector3<Scalar>& point, Vector2<Scalar>& pixel,
                                         Matrix23<Scalar>* jacobian = nullptr) const noexcept {
-    if (!(point.z() > Scalar(Tolerance<Scalar>::min_depth))) return false;
+    if (!(point.z() > Scalar(Tolerance<Scalar>::min_depth)) || !is_finite(point.z())) return false;
     const Scalar inv_z = Scalar(1) / point.z();
     const Scalar x = point.x() * inv_z;
     const Scalar y = point.y() * inv_z;
