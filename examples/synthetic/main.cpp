@@ -57,7 +57,7 @@ int main(int argc, char* argv[]) {
   app.add_option("--people", options.people, "of the two; 0: an empty room")
       ->check(CLI::Range(0, 2))
       ->capture_default_str();
-  auto* close_up = app.add_flag("--close-up", options.close_up, "people fill the view: 40 % of it, up to 70 %");
+  auto* close_up = app.add_flag("--close-up", options.close_up, "people fill the view: 40 % of it, up to 78 %");
   auto* furniture = app.add_flag("--furniture", options.furniture, "a table and a plant stand before the people");
   app.add_option("--width", width, "of the images, 4:3")->check(CLI::Range(64, 4096))->capture_default_str();
   app.add_option("--blur", options.blur_samples, "sub-exposures of the motion blur; 1 = none")

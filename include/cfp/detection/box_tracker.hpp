@@ -49,8 +49,8 @@ class BoxTracker {
   }
 
   /// A frame on which the detector did not run: nothing was missed, so tracks of one detection live on, but confirmed
-  /// tracks are output as compensated and age towards max_coast (or max_idle) all the same. For a detector that runs on
-  /// every n-th frame only.
+  /// tracks are output as compensated, and all age towards max_coast (or max_idle) all the same. For a detector that
+  /// runs on every n-th frame only.
   BoxTrackerResult<Scalar> coast(Scalar dt_s, const Matrix3<Scalar>* image_motion = nullptr) {
     BoxTrackerResult<Scalar> result = advance(dt_s, image_motion);
     output(result, false);

@@ -48,7 +48,7 @@ struct CameraMotion : UncertainMotion<Scalar> {
   CFP_INLINE CameraMotion() noexcept {}  // NOLINT(modernize-use-equals-default): inline
 };
 
-/// Scratch memory, reused: after a call, calls of at most the same sizes allocate nothing.
+/// Scratch memory, reused: after a call with depths and one without, calls of at most the same sizes allocate nothing.
 template <typename Scalar>
 struct CameraMotionWorkspace {
   std::vector<std::array<Scalar, 3>> points;  // of the pairs, in the previous camera; NaN: takes no part

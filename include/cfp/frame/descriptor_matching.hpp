@@ -121,8 +121,9 @@ inline namespace CFP_ISA {
 /// the previous keypoint, for every i of `queries` that finds one. `predicted` is where each previous keypoint is
 /// expected in the current image; one that is not finite, or that `match` names already, takes no part. A match lies
 /// within the radius, passes the distance and the ratio test, and each previous keypoint goes to the query whose
-/// descriptor is nearest (ties: the lower index). Returns how many were matched; 0 for descriptors of different sizes.
-/// O(queries x keypoints within the radius); allocates only when the workspace grows.
+/// descriptor is nearest (ties: the one named first; of previous keypoints alike any, the same each time). Returns how
+/// many were matched; 0 for descriptors of different sizes. O(queries x keypoints within the radius); allocates only
+/// when the workspace grows.
 template <typename Scalar>
 std::size_t match_descriptors(const PointSpan<Scalar, 2>& predicted, const DescriptorSpan& previous,
                               const PointSpan<Scalar, 2>& keypoints, const DescriptorSpan& current,

@@ -67,7 +67,7 @@ struct FlowModel {
   CFP_INLINE FlowModel() noexcept {}  // NOLINT(modernize-use-equals-default): inline
 };
 
-/// Scratch memory, reused: after a call, calls of at most the same sizes allocate nothing.
+/// Scratch memory, reused: after a call with depths and one without, calls of at most the same sizes allocate nothing.
 template <typename Scalar>
 struct FlowModelWorkspace {
   std::vector<Scalar> weights, distances;

@@ -8,8 +8,8 @@
 ///   pose = optimise(fine.weight);
 ///   probability.update_map_points(m);                            // M of all that the frame saw
 ///
-/// Who wants another order calls the steps themselves: begin_frame, track_boxes, estimate_objects, label_keypoints,
-/// match_in_boxes, constrain_keypoints, weigh_keypoints, update_map_points.
+/// Who wants another order calls the steps themselves: begin_frame, track_boxes, estimate_objects, remember_objects,
+/// label_keypoints, match_in_boxes, constrain_keypoints, weigh_keypoints, update_map_points.
 ///
 /// A unit that calls `coarse` compiles all engines. A host whose units are compiled often keeps them in one file:
 /// `extern template class cfp::StaticProbability<Camera>;` in its own header, `template class` without extern there.
@@ -41,8 +41,8 @@ struct StageResult {
 inline namespace CFP_ISA {
 
 /// One per camera: tracks of boxes, the frame before, scratch memory. Not thread-safe; objects share nothing. After the
-/// largest frame has been seen, a call allocates nothing. Same frames and options, same bits. The camera is any type
-/// with the interface of PinholeCamera.
+/// largest frame of a kind (flow with depths, without) has been seen, a call allocates nothing. Same frames and
+/// options, same bits. The camera is any type with the interface of PinholeCamera.
 template <typename Camera>
 class StaticProbability {
  public:

@@ -19,8 +19,8 @@ struct DepthNoise {
   }
 };
 
-/// A depth that was not measured: its inverse is mean +- sigma. The default covers everything beyond 0.7 m; sigma
-/// without bound leaves only the distance from the epipolar line.
+/// A depth that was not measured: its inverse is mean +- sigma. The default covers everything beyond 0.7 m; a sigma
+/// of 1e6 leaves only the distance from the epipolar line.
 struct UnknownDepth {
   double inverse_mean = 0.5;   ///< 1/m, > 0
   double inverse_sigma = 0.5;  ///< 1/m, >= 0
