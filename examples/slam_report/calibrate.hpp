@@ -27,6 +27,7 @@ struct CalibrationSample {
   cfp::SecondStageKeypoint<float> known;
   float map_point = 1;     // M
   float flow = -1;         // what stands for O in the weight: the flow at its place; negative: nothing does
+  bool placed = false;     // on its object by depth: O counts beside the flow
   double step_m = 0;       // |t| since the frame before
   float weight = 0;        // as the run had it
   bool is_static = false;  // the label
@@ -62,7 +63,8 @@ inline float weight_with(const CalibrationSample& sample, const CalibratedOption
   if (known.foreground && !known.box_associated) return 0;
   cfp::MapPointOptions options = run.probability.map_point;
   options.constraint_power = chosen.constraint_power;
-  const float e = cfp::first_stage_evidence(sample.flow, known.object_probability, known.foreground, threshold);
+  const float e =
+      cfp::first_stage_evidence(sample.flow, known.object_probability, known.foreground, threshold, sample.placed);
   const float k = cfp::keypoint_evidence(cfp::second_stage_evidence(known, threshold), e, known.foreground);
   return cfp::posterior_probability(k, std::min(e, 0.5F), sample.map_point, options);
 }
@@ -119,6 +121,7 @@ inline void add_run(const std::filesystem::path& folder, const RunRecord& run, C
                e.associated};
     s.map_point = float(e.map_point_probability);
     s.flow = float(e.flow_probability);
+    s.placed = e.placed;
     s.step_m = step_m;
     s.weight = float(e.weight);
     s.is_static = is_static;

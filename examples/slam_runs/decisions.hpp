@@ -57,6 +57,7 @@ void for_each_column(D& d, const Visit& visit) {
   visit("flow_model", e.flow_model);
   visit("flow_sigma_px", e.flow_sigma_px);
   visit("flow_probability", e.flow_probability);
+  visit("placed", e.placed);
   visit("K_coarse", e.coarse_probability);
   visit("match", e.match);
   visit("rule", e.rule);

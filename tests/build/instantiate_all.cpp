@@ -146,7 +146,7 @@ static void instantiate_probability() noexcept {
   use(&cfp::is_high_dynamic<Scalar>);
   use(&cfp::background_factor<Scalar>);
   use(&cfp::first_stage_probability<Scalar>);
-  use<Scalar (*)(Scalar, Scalar, bool, Scalar) noexcept>(&cfp::first_stage_evidence<Scalar>);
+  use<Scalar (*)(Scalar, Scalar, bool, Scalar, bool) noexcept>(&cfp::first_stage_evidence<Scalar>);
   use<Scalar (*)(Scalar, Scalar, const cfp::MapPointOptions&) noexcept>(&cfp::updated_map_point<Scalar>);
   use(&cfp::is_deletable<Scalar>);
   use(&cfp::is_mismatch<Scalar>);

@@ -208,6 +208,32 @@ TEST_CASE("The flow at a keypoint's place tells the part of a person that moves 
   CHECK(run.state.flow_probability == std::vector<double>(run.m.size(), -1.0));
 }
 
+TEST_CASE("What its depth puts on a person who moves is not at rest where the flow at its place happens to be",
+          "[frame]") {
+  FrameRun<double> run(make_dynamic_scene<double>({}, 80));
+  cfp::Frame<double> frame = run.frame();
+  frame.flow.previous_depths = run.scene.previous_depths;
+  cfp::FrameOptions options;
+  run.coarse(options, frame, run.scene.camera);
+  std::size_t seen = 0;
+  for (std::size_t i = 0; i < run.m.size(); ++i) {
+    if (!cfp::is_placed(i, run.state)) continue;
+    auto& object = run.state.objects[static_cast<std::size_t>(run.state.box[i])];
+    REQUIRE(object.static_probability < 0.5);
+    CHECK(cfp::explain(i, 0.98, options, run.state).placed);
+    run.state.flow_probability[i] = 0.95;
+    CHECK(cfp::model_weight(i, 0.98, options, run.state) < 0.95);
+    const auto known = std::exchange(object.status, cfp::Status::not_enough_data);
+    CHECK_THAT(cfp::model_weight(i, 0.98, options, run.state), WithinAbs(0.98, 1e-9));
+    object.status = known;
+    const double depth = std::exchange(run.state.current.depths[i], 0.0);
+    CHECK_THAT(cfp::model_weight(i, 0.98, options, run.state), WithinAbs(0.98, 1e-9));
+    run.state.current.depths[i] = depth;
+    ++seen;
+  }
+  CHECK(seen > 100);
+}
+
 TEST_CASE("What begins to move more slowly than a match can see loses its weight by its flow, and its map point's",
           "[frame]") {
   const cfp::FrameOptions options;

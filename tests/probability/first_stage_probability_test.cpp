@@ -77,3 +77,27 @@ TEMPLATE_TEST_CASE("Flow at a keypoint's own place speaks in the place of its ob
       CHECK_THAT(static_cast<double>(evidence(none)), WithinAbs(foreground ? 1.0 / 37.0 : 0.5, 1e-6));  // 1 / 4
   }
 }
+
+TEMPLATE_TEST_CASE("On an object that moves, O counts against what looks at rest at its own place", "[probability]",
+                   float, double) {
+  using S = TestType;
+  const S threshold = S(0.9);
+  const auto evidence = [&](double flow, double object, bool placed = true) {
+    return static_cast<double>(cfp::first_stage_evidence(S(flow), S(object), true, threshold, placed));
+  };
+  CHECK_THAT(evidence(0.9, 0.5), WithinAbs(1.0 / 10.0, 1e-6));     // the place says nothing, O has odds 1 against 9
+  CHECK_THAT(evidence(0.95, 0.5), WithinAbs(19.0 / 100.0, 1e-6));  // odds 19 / 9 and 1 / 9
+  for (double flow = 0; flow <= 1; flow += 0.05) {
+    CHECK(evidence(flow, 0.95) == evidence(flow, 0.95, false));  // an object at rest leaves the word to the place
+    CHECK_THAT(evidence(flow, 0.9), WithinAbs(evidence(flow, 0.95, false), 1e-5));  // and there is no step
+    CHECK(evidence(flow, -1) == evidence(flow, std::numeric_limits<double>::quiet_NaN()));
+    for (double object = 0; object < 1; object += 0.05) {
+      const double e = evidence(flow, object);
+      CHECK((e >= 0 && e <= 1));
+      CHECK(e <= evidence(flow, object, false) + 1e-6);
+      CHECK(evidence(flow, object + 0.05) >= e - 1e-6);
+    }
+  }
+  CHECK(evidence(1, 0) == 0.5);
+  CHECK(evidence(-1, 0.2) == evidence(-1, 0.2, false));  // without flow there O is heard already
+}

@@ -43,6 +43,7 @@ struct KeypointExplanation {
   FlowModelKind flow_model = FlowModelKind::none;  ///< what those pairs were judged by
   double flow_sigma_px = 0;                        ///< their noise; 0: not measured
   double flow_probability = -1;                    ///< what stands for O in its weight: score of the flow at its place
+  bool placed = false;                             ///< O counts beside it: by depth the keypoint is on the object
   double coarse_probability = 1;                   ///< K of the first stage
   std::int32_t match = no_match;
   ConstraintExplanation projection, epipolar;
@@ -93,6 +94,7 @@ template <typename Scalar>
   e.match = state.match[i];
   e.coarse_probability = e.label == KeypointLabel::invalid ? 0 : 1;
   e.flow_probability = static_cast<double>(state.flow_probability[i]);
+  e.placed = is_placed(i, state);
   if (e.box != no_box) {
     const auto b = static_cast<std::size_t>(e.box);
     const bool foreground = e.label == KeypointLabel::foreground;

@@ -33,15 +33,24 @@ template <typename Scalar>
   return state.label[i] == KeypointLabel::foreground || is_unreported(i, state);
 }
 
-/// E of keypoint i: first_stage_evidence of the flow at its place or, without, of its object; 1/2 on none.
+/// Whether its depth puts keypoint i on an object of known O. Without depths the wall in a box counts as foreground,
+/// too.
+template <typename Scalar>
+[[nodiscard]] bool is_placed(std::size_t i, const FrameState<Scalar>& state) noexcept {
+  return state.label[i] == KeypointLabel::foreground && i < state.current.depths.size() &&
+         is_valid_depth(state.current.depths[i]) &&
+         state.objects[static_cast<std::size_t>(state.box[i])].status == Status::ok;
+}
+
+/// E of keypoint i: first_stage_evidence of the flow at its place and of its object; 1/2 on none.
 template <typename Scalar>
 [[nodiscard]] Scalar first_stage_evidence(std::size_t i, const FrameOptions& options,
                                           const FrameState<Scalar>& state) noexcept {
   const double o =
       state.box[i] != no_box ? state.objects[static_cast<std::size_t>(state.box[i])].static_probability : 1;
   return static_cast<Scalar>(first_stage_evidence(static_cast<double>(state.flow_probability[i]), o,
-                                                  state.label[i] == KeypointLabel::foreground,
-                                                  options.object_threshold));
+                                                  state.label[i] == KeypointLabel::foreground, options.object_threshold,
+                                                  is_placed(i, state)));
 }
 
 /// M of a map point of which nothing is known when keypoint i observes it: 1 outside all boxes where nothing moves and

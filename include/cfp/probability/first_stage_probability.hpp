@@ -41,16 +41,23 @@ template <typename Scalar>
 
 /// E, what the first stage says of a keypoint whose map point's M is the prior: on the object, O's odds against those
 /// of O_Th, so that an object at O_Th says nothing (1/2); behind it 1/2. Where the flow at the keypoint's own place was
-/// scored, that score stands for O, on the object and behind it (negative or NaN: it was not). In [0, 1], continuous
-/// and increasing in O. NaN counts as O = 0. Not in the paper.
+/// scored, that score stands for O, on the object and behind it (negative or NaN: it was not). If beside that its depth
+/// puts it on an object whose O is known (`placed`), what O says against it counts as well: near the centre of its
+/// expansion, what comes or goes looks at rest. In [0, 1], continuous and non-decreasing in O and in the score; 1/2
+/// where both are sure and disagree. NaN counts as O = 0. Not in the paper.
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar first_stage_evidence(Scalar flow_probability, Scalar object_probability, bool foreground,
-                                                    Scalar object_threshold) noexcept {
+                                                    Scalar object_threshold, bool placed = false) noexcept {
   const bool scored = flow_probability >= Scalar(0);
   if (!scored && !foreground) return Scalar(0.5);
-  const Scalar o = clamp_probability(scored ? flow_probability : object_probability);
-  const Scalar is_static = o * (Scalar(1) - object_threshold), moves = (Scalar(1) - o) * object_threshold;
-  return is_static / (is_static + moves);
+  const Scalar object = clamp_probability(object_probability),
+               own = scored ? clamp_probability(flow_probability) : object;
+  const Scalar rest = Scalar(1) - object_threshold;
+  Scalar is_static = own * rest, moves = (Scalar(1) - own) * object_threshold;
+  if (scored && placed && object < object_threshold)
+    is_static *= object * rest, moves *= (Scalar(1) - object) * object_threshold;
+  const Scalar sum = is_static + moves;
+  return sum > Scalar(0) ? is_static / sum : Scalar(0.5);
 }
 
 }  // namespace CFP_ISA
