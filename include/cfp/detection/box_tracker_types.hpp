@@ -49,8 +49,8 @@ struct BoxTrackerOptions {
   int confirm_hits = 2;  ///< detections before a track may be compensated, >= 1
   int max_coast = 6;     ///< missed frames in a row that are compensated, >= 0 (the paper's figure shows six)
   int max_idle = 0;      ///< the same while the detector does not run; counts where it is more than max_coast, >= 0
-  double coast_per_hit =
-      1.0;  ///< ... and, where it runs, at most this many per detection so far, > 0 (1: no longer than seen)
+  /// where the detector runs, at most this many missed frames per detection so far, > 0 (1: no longer than it was seen)
+  double coast_per_hit = 1.0;
   double min_visible = 0.25;  ///< a compensated box with a smaller share of its area in the image is dropped, in [0, 1]
   double max_gap_s = 2.0;     ///< after a longer dt the frames are not adjacent: all tracks are dropped, s, > 0
   double image_width = 0;     ///< px; 0: unknown, nothing is clipped
