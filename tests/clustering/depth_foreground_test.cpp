@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "cfp/core/random.hpp"
@@ -348,18 +349,19 @@ TEMPLATE_TEST_CASE("Depth foreground allocates nothing after warm-up", "[cluster
 
 TEST_CASE("Permuting the points permutes the mask, equal depths included", "[clustering]") {
   cfp::Random random(41, "permuted");
-  std::vector<double> depths;
-  for (int i = 0; i < 320; ++i)
-    depths.push_back(0.01 * std::round(100 * (i < 200 ? 1.5 + 0.05 * random.normal() : random.uniform(1.5, 3))));
-  std::vector<std::size_t> order(depths.size());
-  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-  const std::vector<char> mask = run(depths).mask;
-  for (int round = 0; round < 200; ++round) {
+  for (int scene = 0; scene < 300; ++scene) {
+    std::vector<double> depths;
+    for (int i = 0; i < 300; ++i) {
+      const double z = random.uniform() < 0.5 ? 1.5 + 0.12 * random.normal() : random.uniform(2, 2.6);
+      depths.push_back(0.01 * std::round(100 * z));
+    }
+    std::vector<std::size_t> order(depths.size());
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
     for (std::size_t i = order.size() - 1; i > 0; --i)
       std::swap(order[i], order[random.index(static_cast<std::uint32_t>(i + 1))]);
     std::vector<double> permuted;
     for (const std::size_t i : order) permuted.push_back(depths[i]);
-    const std::vector<char> found = run(permuted).mask;
+    const std::vector<char> mask = run(depths).mask, found = run(permuted).mask;
     std::size_t differ = 0;
     for (std::size_t i = 0; i < order.size(); ++i) differ += found[i] != mask[order[i]] ? 1U : 0U;
     CHECK(differ == 0);
