@@ -66,7 +66,7 @@ void score_flow_outside(const Frame<Scalar>& frame, const FrameOptions& options,
   }
   // Too many: what moves may as well be the camera.
   if (static_cast<double>(moving) > unreported.max_share * static_cast<double>(scratch.points.size())) return;
-  const auto first = scratch.points.begin();
+  const auto moving_end = scratch.points.begin() + static_cast<std::ptrdiff_t>(moving);
   for (std::size_t i = 0; i < state.size(); ++i) {
     if (state.label[i] != KeypointLabel::outside) continue;
     const auto is_near = [&, x = state.current.keypoints[i][0],
@@ -74,8 +74,8 @@ void score_flow_outside(const Frame<Scalar>& frame, const FrameOptions& options,
       const Scalar dx = point[0] - x, dy = point[1] - y;
       return dx * dx + dy * dy < radius_sq;
     };
-    const auto near_and_moving = std::count_if(first, first + static_cast<std::ptrdiff_t>(moving), is_near);
-    if (2 * static_cast<std::size_t>(near_and_moving) < unreported.min_pairs) continue;
+    const auto moving_near = static_cast<std::size_t>(std::count_if(scratch.points.begin(), moving_end, is_near));
+    if (2 * moving_near < unreported.min_pairs) continue;
     scratch.scratch.clear();  // scores nearby
     for (std::size_t p = 0; p < scratch.points.size(); ++p) {
       if (is_near(scratch.points[p])) scratch.scratch.push_back(scratch.samples[p]);

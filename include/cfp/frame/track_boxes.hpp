@@ -13,8 +13,8 @@ namespace cfp {
 inline namespace CFP_ISA {
 
 /// Sets state.boxes: what the tracker gives of the classes that can move. A frame whose detector did not run moves the
-/// tracks and misses nothing. A time stamp that did not grow, that is not finite or that follows
-/// one that is not is reported, and the boxes stay.
+/// tracks and misses nothing. A time stamp that did not grow, that is not finite
+/// or that follows one that is not is reported, and the boxes stay.
 template <typename Scalar>
 void track_boxes(const Frame<Scalar>& frame, const FrameOptions& options, BoxTracker<Scalar>& tracker,
                  FrameState<Scalar>& state) {

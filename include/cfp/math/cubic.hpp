@@ -58,14 +58,14 @@ template <typename Scalar>
   const Scalar margin = Scalar(32) * std::numeric_limits<Scalar>::epsilon() * (square + std::abs(product));
   if (!(discriminant >= -margin)) return 1;
   const Scalar root = discriminant > Scalar(0) ? std::sqrt(discriminant) : Scalar(0);
-  roots[1] = middle - root, roots[2] = middle + root;
-  for (Scalar* const x : {&roots[1], &roots[2]}) {
-    const Scalar value = ((*x + a) * *x + b) * *x + c, slope = (Scalar(3) * *x + Scalar(2) * a) * *x + b;
-    const Scalar step = value / slope, next = *x - step;
-    // At a double root the slope vanishes with the value: keep a step only when it stays by its root and lowers the
-    // polynomial.
-    if (std::abs(step) < root && std::abs(((next + a) * next + b) * next + c) < std::abs(value)) *x = next;
-  }
+  // At a double root the slope vanishes with the value: keep a step only when it stays by its root and lowers the
+  // polynomial.
+  const auto polished = [&](Scalar x) {
+    const Scalar value = ((x + a) * x + b) * x + c, slope = (Scalar(3) * x + Scalar(2) * a) * x + b;
+    const Scalar step = value / slope, next = x - step;
+    return std::abs(step) < root && std::abs(((next + a) * next + b) * next + c) < std::abs(value) ? next : x;
+  };
+  roots[1] = polished(middle - root), roots[2] = polished(middle + root);
   return 3;
 }
 

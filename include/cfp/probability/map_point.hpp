@@ -76,13 +76,13 @@ template <typename Scalar>
                                        const MapPointOptions& options) noexcept {
   using std::pow;
   const Scalar m = clamp_probability(map_point_probability), k = clamp_probability(keypoint_probability);
-  const Scalar rate = Scalar(options.rate), limit = Scalar(options.evidence_limit);
+  const Scalar rate = Scalar(options.rate), limit = Scalar(options.evidence_limit), most = Scalar(1) - limit;
   if (options.policy == MapPointPolicy::copy) return k;
   if (options.policy == MapPointPolicy::exponential_mean) return clamp_probability(m + rate * (k - m));
   // A point that was never in doubt keeps the weight 1 that it has without this library.
-  if (m > Scalar(1) - limit && k > Scalar(1) - limit) return m;
+  if (m > most && k > most) return m;
   const Scalar odds = detail::odds_against(m, limit) * pow(detail::odds_against(k, limit), rate);
-  return (std::min)((std::max)(Scalar(1) / (Scalar(1) + odds), limit), Scalar(1) - limit);
+  return (std::min)((std::max)(Scalar(1) / (Scalar(1) + odds), limit), most);
 }
 
 /// Bayes' rule with M of before as the prior of a keypoint: odds = odds(M) odds(E) odds(K)^constraint_power, where E is
