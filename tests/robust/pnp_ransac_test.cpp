@@ -402,6 +402,22 @@ TEST_CASE("A camera whose pixels are beyond all numbers has no observations", "[
   CHECK(result.used == 0);
 }
 
+TEST_CASE("A broken point far away hides no pose", "[robust]") {
+  for (const double far_m : {1e4, 3e6, 9e7}) {
+    for (const std::size_t broken : {1U, 5U}) {
+      cfp::Random random(60, "broken");
+      auto scene = make_absolute_pose_scene<double>(random, camera<double>, scene_options(100, 0));
+      for (std::size_t k = 0; k < broken; ++k) scene.world[7 * k] = {far_m, 0.3 * double(k) * far_m, -0.1 * far_m};
+      PnpRansacWorkspace workspace;
+      const auto found = pnp_ransac(scene.world, scene.pixels, {}, camera<double>, PnpRansacOptions{}, workspace);
+      INFO(broken << " of them " << far_m << " m away: " << to_string(found.status));
+      CHECK(found.status == RansacStatus::ok);
+      CHECK(found.inliers >= 80);
+      CHECK((found.T_cam_world.translation - scene.T_cam_world.translation).norm() < 0.02);
+    }
+  }
+}
+
 TEST_CASE("RANSAC options outside their range are named; a second call allocates nothing", "[robust]") {
   PnpRansacOptions options;
   CHECK(!invalid_field(options));
@@ -421,6 +437,17 @@ TEST_CASE("RANSAC options outside their range are named; a second call allocates
     (void)pnp_ransac(scene.world, scene.pixels, scene.weights, camera<double>, options, workspace, mask);
     CHECK(cfp_test::allocations_in([&] {
             (void)pnp_ransac(scene.world, scene.pixels, scene.weights, camera<double>, options, workspace, mask);
+          }) == 0);
+  }
+  // Nor after a call that did not get as far.
+  std::vector<double> half(300, 1.0);
+  for (std::size_t i = 0; i < 300; i += 2) half[i] = 0;
+  const std::vector<double> none(300, 0.0);
+  for (const std::vector<double>& first : {std::vector<double>(), half, none}) {
+    PnpRansacWorkspace other;
+    (void)pnp_ransac(scene.world, scene.pixels, first, camera<double>, {}, other, mask);
+    CHECK(cfp_test::allocations_in([&] {
+            (void)pnp_ransac(scene.world, scene.pixels, scene.weights, camera<double>, {}, other, mask);
           }) == 0);
   }
 }

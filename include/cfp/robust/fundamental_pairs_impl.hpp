@@ -69,12 +69,17 @@ template <typename T>
   return {pairs.row(2)[i], pairs.row(3)[i], T(1)};
 }
 
+// Empties the cells and makes room for so many pairs.
+inline void begin_cells(std::size_t most, CellCounts& cells) {
+  std::size_t size = 64;
+  while (size < 2 * most) size *= 2;
+  cells.keys.assign(size, 0), cells.counts.assign(size, 0), cells.slots.resize(most);
+}
+
 // Enters every pair's point of one image, the first row of which is given; cells of 1 / inverse_size. A centred point
 // over no size at all is not a number: the order of the arguments sends it to the lower end.
-inline void count_cells(const PairArrays& pairs, std::size_t row, double inverse_size, CellCounts& cells) {
-  std::size_t size = 64;
-  while (size < 2 * pairs.size) size *= 2;
-  cells.keys.assign(size, 0), cells.counts.assign(size, 0), cells.slots.resize(pairs.size);
+inline void count_cells(const PairArrays& pairs, std::size_t row, double inverse_size, CellCounts& cells) noexcept {
+  const std::size_t size = cells.keys.size();
   const auto index = [&](double x) {
     return static_cast<std::uint64_t>((std::min)((std::max)(-1e9, x * inverse_size), 1e9) + 2e9);
   };
@@ -89,7 +94,7 @@ inline void count_cells(const PairArrays& pairs, std::size_t row, double inverse
 }
 
 // Shares the weights among the pairs that begin in one cell, or end in one.
-inline void share_weights(PairArrays& pairs, double cell_size) {
+inline void share_weights(PairArrays& pairs, double cell_size) noexcept {
   const CellCounts& previous = pairs.cells[0];
   const CellCounts& current = pairs.cells[1];
   for (std::size_t image = 0; image < 2; ++image) count_cells(pairs, 2 * image, 1 / cell_size, pairs.cells[image]);
@@ -109,6 +114,7 @@ void load_pairs(const PointPairs<Scalar>& input, double cell_px, PairArrays& pai
   pairs.scaling = scale_pairs(input);
   pairs.factor = 0;
   pairs.begin(input.previous.size());
+  for (CellCounts& cells : pairs.cells) begin_cells(input.previous.size(), cells);
   pairs.size = pairs.scaling.used;
   pairs.thinned.resize(5 * PairArrays::enough);
   if (!pairs.scaling.valid()) return;

@@ -50,13 +50,14 @@ template <typename Scalar>
   FundamentalResult<Scalar> result;
   PairArrays& pairs = workspace.pairs;
   load_pairs(input, 2 * options.threshold_px, pairs);
+  workspace.sampling.reserve(pairs.capacity);
+  workspace.list.reserve(pairs.capacity);
+  workspace.distances_sq.resize(pairs.capacity);
+  workspace.scratch.resize(4 * pairs.capacity);
   result.used = pairs.size;
   if (pairs.size < options.min_inliers || pairs.size < 8) return result;
   result.status = RansacStatus::degenerate;
   if (!(pairs.factor > 0)) return result;
-  workspace.list.reserve(pairs.size);
-  workspace.distances_sq.resize(pairs.capacity);
-  workspace.scratch.resize(4 * pairs.capacity);
   const double threshold = options.threshold_px * pairs.factor;
   FundamentalSearch<double> search{pairs, threshold * threshold, workspace.list, workspace.distances_sq,
                                    Random(options.seed, "fundamental_ransac")};

@@ -6,11 +6,13 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/types.hpp"
 #include "cfp/math/matrix3.hpp"
+#include "cfp/math/order_statistic.hpp"
 #include "cfp/math/se3.hpp"
 #include "cfp/robust/ransac_data_impl.hpp"
 #include "cfp/simd/packet.hpp"
@@ -23,16 +25,22 @@ namespace cfp::detail {
 enum ObservationRow : std::size_t { X, Y, Z, ray_x, ray_y, s11, s12, s22, observation_weight_row, observation_rows };
 
 struct ObservationArrays : RansacColumns<observation_rows> {
-  std::array<double, 3> origin = {0, 0, 0};
+  std::array<double, 3> origin = {0, 0, 0};  // coordinate by coordinate the median: few broken points leave it in place
+  std::vector<double> scratch;
 };
 
 inline namespace CFP_ISA {
+
+[[nodiscard]] inline double median_of(const double* values, std::size_t count, std::vector<double>& scratch) {
+  scratch.assign(values, values + count);
+  return order_statistic(span<double>(scratch), count / 2);
+}
 
 template <typename Camera, typename Scalar>
 void load_observations(const PointSpan<Scalar, 3>& world, const PointSpan<Scalar, 2>& pixels,
                        const span<const Scalar>& weights, const Camera& camera, ObservationArrays& out) {
   out.begin(world.size());
-  out.origin = {0, 0, 0};
+  out.scratch.reserve(world.size());
   constexpr double max_coordinate = 1e8;  // beyond it a point is taken for a broken one
   for (std::size_t i = 0; i < world.size(); ++i) {
     const double w = weights.empty() ? 1.0 : static_cast<double>(weights[i]);
@@ -52,19 +60,27 @@ void load_observations(const PointSpan<Scalar, 3>& world, const PointSpan<Scalar
     out.push(i, {p.x(), p.y(), p.z(), static_cast<double>(ray.x()), static_cast<double>(ray.y()), a, b, c, w});
   }
   for (std::size_t r = X; r <= Z; ++r) {
-    for (std::size_t i = 0; i < out.size; ++i) out.origin[r] += out.row(r)[i] / static_cast<double>(out.size);
+    // Of an odd number of them: the origin of points on a line then lies there, too.
+    out.origin[r] = median_of(out.row(r), out.size - (out.size % 2 == 0 && out.size > 0 ? 1 : 0), out.scratch);
     for (std::size_t i = 0; i < out.size; ++i) out.row(r)[i] -= out.origin[r];
   }
   finish(out);
 }
 
-// Whether the points lie on a line or in one place, to the rounding of float coordinates.
-[[nodiscard]] inline bool on_a_line(const ObservationArrays& in) noexcept {
+// Whether the points lie on a line or in one place, to the rounding of float coordinates: relative to the size of the
+// half that is nearest to the origin, as one point may be broken and far away.
+[[nodiscard]] inline bool on_a_line(ObservationArrays& in) {
   const auto point = [&](std::size_t i) { return Vector3<double>(in.row(X)[i], in.row(Y)[i], in.row(Z)[i]); };
   Vector3<double> far = Vector3<double>::Zero();
-  for (std::size_t i = 0; i < in.size; ++i) far = point(i).squaredNorm() > far.squaredNorm() ? point(i) : far;
+  in.scratch.clear();
   for (std::size_t i = 0; i < in.size; ++i) {
-    if (cross(far, point(i)).norm() > 1e-6 * far.squaredNorm()) return false;
+    in.scratch.push_back(point(i).norm());
+    if (in.scratch.back() > far.norm()) far = point(i);
+  }
+  double size = order_statistic(span<double>(in.scratch), in.size / 2);
+  size = size > 0 ? size : far.norm();  // most in one place
+  for (std::size_t i = 0; i < in.size; ++i) {
+    if (cross(far, point(i)).norm() > 1e-6 * far.norm() * (std::max)(size, point(i).norm())) return false;
   }
   return true;
 }

@@ -69,6 +69,7 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
   PnpRansacResult<Scalar> result;
   detail::ObservationArrays& observations = workspace.observations;
   detail::load_observations(world, pixels, weights, camera, observations);
+  workspace.sampling.reserve(world.size());
   result.used = observations.size;
   if (observations.size < options.min_inliers || observations.size < 4) return result;
   if (detail::on_a_line(observations)) {
