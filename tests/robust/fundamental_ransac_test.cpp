@@ -201,6 +201,38 @@ TEST_CASE("Pairs that a homography explains give a reason and no F", "[robust]")
   }
 }
 
+TEST_CASE("A floor or a wall that the camera comes near to gives no F", "[robust]") {
+  // Its homography stretches the noise of the previous image, mostly away from the epipole: no parallax.
+  constexpr cfp::PinholeCamera<double> camera{500, 500, 320, 240};
+  const auto seen = [](const cfp::Vector2<double>& u) { return u.x() > 0 && u.x() < 640 && u.y() > 0 && u.y() < 480; };
+  cfp::Random random(99, "ahead");
+  FundamentalRansacWorkspace workspace;
+  for (const bool floor : {true, false}) {
+    for (const double step_m : {0.3, 1.0, -1.0}) {
+      int wrong = 0, named = 0;
+      for (int trial = 0; trial < 50; ++trial) {
+        std::vector<std::array<double, 2>> previous, current;
+        while (previous.size() < 200) {
+          const double a = random.uniform(-1, 1), b = random.uniform(-1, 1);
+          const cfp::Vector3<double> point =
+              floor ? cfp::Vector3<double>(3 * a, 1.2, 5 + 2.5 * b) : cfp::Vector3<double>(3 * a, 2 * b, 5 + a);
+          cfp::Vector2<double> u(0, 0), v(0, 0);
+          if (!camera.project(point, u) || !seen(u)) continue;
+          if (!camera.project(point + step_m * cfp::Vector3<double>(0.05, 0.03, -1), v) || !seen(v)) continue;
+          previous.push_back({u.x() + 0.5 * random.normal(), u.y() + 0.5 * random.normal()});
+          current.push_back({v.x() + 0.5 * random.normal(), v.y() + 0.5 * random.normal()});
+        }
+        const auto result = fundamental_ransac(PointPairs{previous, current}, camera, {}, workspace);
+        wrong += result.found() ? 1 : 0;
+        named += result.status == RansacStatus::planar ? 1 : 0;
+      }
+      INFO((floor ? "floor" : "wall") << ", " << step_m << " m ahead: F in " << wrong << ", planar in " << named);
+      CHECK(wrong <= 1);
+      CHECK(named >= 49);
+    }
+  }
+}
+
 TEST_CASE("A dominant plane with parallax beside it gives F", "[robust]") {
   cfp::Random random(34, "dominant plane");
   FundamentalRansacWorkspace workspace;
@@ -387,6 +419,18 @@ TEST_CASE("A second call allocates nothing", "[robust]") {
             (void)fundamental_ransac(PointPairs{scene.prev, scene.cur, weights}, options, workspace, mask);
             (void)fundamental_ransac(PointPairs{rotation.prev, rotation.cur, weights}, rotation.camera, options,
                                      workspace, mask);
+          }) == 0);
+  }
+  // Nor after a call that did not get as far.
+  std::vector<double> half(500, 1.0);
+  for (std::size_t i = 0; i < 500; i += 2) half[i] = 0;
+  for (double& w : weights) w = random.uniform(0.1, 1);
+  const std::vector<double> none(500, 0.0);
+  for (const std::vector<double>& first : {std::vector<double>(), half, none}) {
+    FundamentalRansacWorkspace other;
+    (void)fundamental_ransac(PointPairs{scene.prev, scene.cur, first}, {}, other, mask);
+    CHECK(cfp_test::allocations_in([&] {
+            (void)fundamental_ransac(PointPairs{scene.prev, scene.cur, weights}, {}, other, mask);
           }) == 0);
   }
 }

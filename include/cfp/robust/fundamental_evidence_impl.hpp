@@ -14,13 +14,14 @@
 namespace cfp::detail {
 inline namespace CFP_ISA {
 
-// Without parallax the distances of the pairs from H have no preferred direction, be they noise or mismatches; F says
-// that they point along its lines. With the distance d from H, a from the line and a scale s the density of the
-// direction is (1 + d^2/s^2)^(3/2) / (1 + d^2/2s^2) / (1 + a^2/s^2)^2 of the uniform one. Whatever s, a pair that does
-// not know F expects the ratio 1, and so 1 + share (ratio - 1), where only a share of the pairs obeys F. The product
-// over all pairs then exceeds e^t with a probability of at most e^-t, and so does the mean of such products for several
-// shares: its logarithm is the evidence. Mismatches lie far from H, parallax mostly near it: the share is another one
-// in every range of d. T is double.
+// Without parallax the distances of the pairs from H have no preferred direction, be they noise or mismatches, once
+// measured in units of the noise (H of a plane ahead stretches that along the lines); F says that they point along its
+// lines. With the distance d from H, a from the line and a scale s the density of the direction is (1 + d^2/s^2)^(3/2)
+// / (1 + d^2/2s^2) / (1 + a^2/s^2)^2 of the uniform one. Whatever s, a pair that does not know F expects the ratio 1,
+// and so 1 + share (ratio - 1), where only a share of the pairs obeys F. The product over all pairs then exceeds e^t
+// with a probability of at most e^-t, and so does the mean of such products for several shares: its logarithm is the
+// evidence. Mismatches lie far from H, parallax mostly near it: the share is another one in every range of d. T is
+// double.
 template <typename T>
 struct FundamentalEvidence {
   static constexpr std::size_t cells = 16;              // over the extent of the pairs, either way
@@ -117,7 +118,8 @@ struct FundamentalEvidence {
     T distinct = 0;
     count = 0;
     for (std::size_t i = 0; i < pairs.size; i += stride, ++count) {
-      const T d2 = (std::min)(transfer_sq(pairs, H, i), T(100)) * per_s2, a2 = 1 + 2 * search.distances_sq[i] * per_s2;
+      const T d2 = (std::min)(whitened_transfer_sq(pairs, H, i), T(100)) * per_s2;
+      const T a2 = 1 + 2 * search.distances_sq[i] * per_s2;
       const T ratio = (1 + d2) * std::sqrt(1 + d2) / ((1 + d2 / 2) * a2 * a2);
       x[count] = pairs.row(0)[i], y[count] = pairs.row(1)[i];
       gain[count] = pairs.row(5)[i] * (ratio >= 0 ? ratio - 1 : T(-1));

@@ -21,6 +21,20 @@ template <typename T>
   return d2 >= 0 ? d2 : std::numeric_limits<T>::infinity();
 }
 
+// The same under the noise of both images: J, the derivative of H, carries that of the previous one over. r is the
+// difference of the points, 2 r^T (I + J J^T)^-1 r the value: that of transfer_sq where J is a rotation.
+template <typename T>
+[[nodiscard]] T whitened_transfer_sq(const PairArrays& pairs, const Matrix3<T>& H, std::size_t i) noexcept {
+  const Vector3<T> mapped = H * previous_point<T>(pairs, i);
+  const T inverse_z = 1 / mapped.z(), u = mapped.x() * inverse_z, v = mapped.y() * inverse_z;
+  const T dx = u - pairs.row(2)[i], dy = v - pairs.row(3)[i];
+  const T ux = (H(0, 0) - u * H(2, 0)) * inverse_z, uy = (H(0, 1) - u * H(2, 1)) * inverse_z;
+  const T vx = (H(1, 0) - v * H(2, 0)) * inverse_z, vy = (H(1, 1) - v * H(2, 1)) * inverse_z;
+  const T uu = 1 + ux * ux + uy * uy, uv = ux * vx + uy * vy, vv = 1 + vx * vx + vy * vy;
+  const T d2 = 2 * (vv * dx * dx - 2 * uv * dx * dy + uu * dy * dy) / (uu * vv - uv * uv);
+  return d2 >= 0 ? d2 : std::numeric_limits<T>::infinity();
+}
+
 // Sum of w min(d^2 / limit, 1), d the transfer distance.
 template <typename T>
 [[nodiscard]] double transfer_cost(const PairColumns<T>& in, const Matrix3<double>& H, double limit) noexcept {
