@@ -130,6 +130,32 @@ TEMPLATE_TEST_CASE("Pose refinement: collinear and coincident points are degener
   }
 }
 
+TEMPLATE_TEST_CASE("Pose refinement: a small board that faces the camera has a pose", "[optimization]", float, double) {
+  // 40 px wide for f = 500, 600 px for f = 3000: rotation and translation show in the perspective alone.
+  cfp::Random random(2, "board");
+  for (const double f : {500.0, 3000.0}) {
+    const double half_m = f > 1000 ? 0.5 : 0.2;
+    int solved = 0;
+    for (int trial = 0; trial < 100; ++trial) {
+      PoseScene<TestType> scene;
+      scene.camera = {TestType(f), TestType(f), TestType(320), TestType(240)};
+      const cfp::Vector3<double> centre(random.uniform(-1500, 1500) / f, random.uniform(-1000, 1000) / f, 5);
+      for (int i = 0; i < 20; ++i) {
+        const cfp::Vector3<double> point =
+            centre + half_m * cfp::Vector3<double>(random.uniform(-1, 1), random.uniform(-1, 1), 0);
+        const cfp::Vector2<double> pixel = f / 5 * point.head<2>() + cfp::Vector2<double>(320, 240);
+        scene.points.push_back({TestType(point.x()), TestType(point.y()), TestType(point.z())});
+        scene.pixels.push_back(
+            {TestType(pixel.x() + 0.3 * random.normal()), TestType(pixel.y() + 0.3 * random.normal())});
+      }
+      scene.start.translation = 0.01 * cfp::Vector3<double>(random.normal(), random.normal(), random.normal());
+      solved += cfp::is_solved(refine_by_default(scene).status) ? 1 : 0;
+    }
+    INFO("f = " << f << ": solved " << solved);
+    CHECK(solved >= 97);
+  }
+}
+
 TEMPLATE_TEST_CASE("Pose refinement: everything behind the camera is degenerate; one point behind does not matter",
                    "[optimization]", float, double) {
   auto scene = make_pose_scene<TestType>(3);

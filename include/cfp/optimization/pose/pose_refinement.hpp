@@ -19,7 +19,8 @@ inline namespace CFP_ISA {
 
 /// Refines T_cam_world from the start pose. Arithmetic in Scalar (of the workspace), sums and pose in double: a
 /// PoseWorkspace<float> is the fast path, as accurate as double wherever the world's origin is, because points are
-/// taken relative to the start position. Points behind the camera (z below Tolerance::min_depth, or more than 89.4
+/// taken relative to the start position; a board that faces the camera from afar (20 px wide for f = 500, 200 px for
+/// 3000) may be degenerate there and have a pose in double. Points behind the camera (z below Tolerance::min_depth, or more than 89.4
 /// degrees off the axis of a pinhole camera) count for nothing and are no inliers. `inliers` (empty, or length n): 1
 /// for an inlier, else 0; all 0 when the pose is untouched. Same input, same bits. Allocates only when the workspace
 /// grows. O(n) per evaluation; a pinhole camera is evaluated in vector instructions, any other point by point.

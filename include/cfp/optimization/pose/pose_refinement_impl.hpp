@@ -113,6 +113,8 @@ SolverStatus run_rounds(PoseModel<Scalar, Camera>& model, const SE3<double>& sta
                         SE3<double>& pose, NormalEquations<6>& equations) noexcept {
   using Problem = DenseLeastSquares<6, SE3<double>, PoseModel<Scalar, Camera>>;
   const PoseOptions& options = model.options;
+  constexpr double min_pivot =
+      (std::max)(static_cast<double>(std::numeric_limits<Scalar>::epsilon()), Tolerance<double>::degenerate);
   SolverStatus status = SolverStatus::not_enough_data;
   pose = start;
   for (std::size_t r = 0; r < options.round_count; ++r) {
@@ -122,7 +124,7 @@ SolverStatus run_rounds(PoseModel<Scalar, Camera>& model, const SE3<double>& sta
     if (r > 0 && options.from_start && !changed && options.rounds[r] == model.round) continue;
     model.round = options.rounds[r];
     const bool hands_over = !options.from_start && r + 1 < options.round_count;
-    Problem problem(model, options.from_start ? start : pose, static_cast<double>(Tolerance<Scalar>::degenerate));
+    Problem problem(model, options.from_start ? start : pose, min_pivot);
     const LeastSquaresResult solved =
         minimize_least_squares(problem, round_options<Scalar>(options, hands_over, result.used));
     ++result.rounds;
