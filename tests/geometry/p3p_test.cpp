@@ -80,6 +80,36 @@ double worst_misfit(const cfp::P3PSolutions<Scalar>& solutions, const P3PProblem
 
 }  // namespace
 
+TEST_CASE("P3P: whole numbers and symmetry hide no pose", "[geometry]") {
+  // Camera above the corners of right and isosceles triangles: conics that are exactly pairs of lines, one at infinity.
+  int problems = 0, missed = 0, in_the_centre = 0;
+  for (const int left : {0, 1}) {
+    for (int w = 1; w <= 4; ++w) {
+      for (int h = 1; h <= 5; ++h) {
+        for (int k = 0; k < 11 * 11 * 3; ++k) {
+          Problem<double> problem;
+          problem.world = {Vector3<double>(-left * w, 0, 0), Vector3<double>(w, 0, 0), Vector3<double>(0, h, 0)};
+          problem.truth.translation = Vector3<double>(k % 11 - 5, k / 11 % 11 - 5, k / 121 + 1);
+          for (std::size_t i = 0; i < 3; ++i) {
+            const Vector3<double> point = problem.truth * problem.world[i];
+            problem.rays[i] = point / point.z();
+          }
+          const cfp::P3PSolutions<double> solutions = p3p(problem);
+          ++problems;
+          missed += best_error(solutions, problem.truth) < 1e-4 ? 0 : 1;  // 3e-5 on the danger cylinder
+          for (int s = 0; s < solutions.count; ++s) {
+            for (const Vector3<double>& x : problem.world)
+              in_the_centre += (solutions.T_cam_world[std::size_t(s)] * x).norm() < 1e-9 ? 1 : 0;
+          }
+        }
+      }
+    }
+  }
+  INFO(problems << " problems");
+  CHECK(missed == 0);
+  CHECK(in_the_centre == 0);
+}
+
 TEMPLATE_TEST_CASE("The true pose is among the solutions and each solution fits", "[geometry]", float, double) {
   cfp::Random random(41, "p3p");
   constexpr int problems = 20000;

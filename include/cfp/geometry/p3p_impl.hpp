@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cfp/core/numeric.hpp"
 #include "cfp/core/types.hpp"
 #include "cfp/math/cubic.hpp"
 
@@ -99,9 +100,10 @@ struct P3PEquations {
     const Real mixed = (Real(1) - half) * (Real(0.5) * e01 * e02 - k1 - k2) + quarter * (a + b - Real(1));
     const Real c0 = -a * D1, c1 = a * mixed + (Real(1) - b) * D1;
     const Real c3 = -b * D2, c2 = b * mixed + (Real(1) - a) * D2;
-    // A c3 that is nearly zero means a root near infinity, C2 itself.
+    // A c3 that is nearly or exactly zero means a root near infinity, C2 itself.
     const Real inverse = Real(1) / (c3 + std::copysign(Real(1e-18) * (std::abs(c1) + std::abs(c2)), c3));
-    return isolated_cubic_root(c2 * inverse, c1 * inverse, c0 * inverse);
+    const Real root = isolated_cubic_root(c2 * inverse, c1 * inverse, c0 * inverse);
+    return is_finite(root) ? root : Real(1e30);
   }
 
   // f C1 + g C2.
@@ -123,14 +125,21 @@ template <typename Real>
   if (a11 < square) v = {a01, a11, a12}, square = a11;
   if (!(square < Real(0))) return false;
   const Real scale = std::sqrt(-square);
-  const Real uu = scale * C.uu, vv = scale * C.vv, uw = scale * C.uw, vw = scale * C.vw;
-  const Real uv = scale * C.uv - v.w, vu = scale * C.uv + v.w;
-  // The column and the row of the largest elements; a line whose u and v vanish is at infinity and holds no solution.
+  // l m^T
+  const Real uu = scale * C.uu, uv = scale * C.uv - v.w, uw = scale * C.uw + v.v;
+  const Real vu = scale * C.uv + v.w, vv = scale * C.vv, vw = scale * C.vw - v.u;
+  const Real wu = scale * C.uw - v.v, wv = scale * C.vw + v.u, ww = scale * C.ww;
+  // Of the first two columns and rows those of the largest elements, as a line whose u and v vanish is at infinity and
+  // holds no solution. Where it leaves nearly nothing of them the other line stands in the last one.
+  const Real most =
+      Real(1e7) * (std::max)((std::max)(std::abs(uu), std::abs(vv)), (std::max)(std::abs(uv), std::abs(vu)));
+  const bool last_column = (std::max)(std::abs(uw), std::abs(vw)) > most;
+  const bool last_row = (std::max)(std::abs(wu), std::abs(wv)) > most;
   const Real diagonal = uu * uu - vv * vv, other = uv * uv - vu * vu;
   const bool column = diagonal > other, row = diagonal + other > Real(0);
-  lines.u = {column ? uu : uv, row ? uu : vu};
-  lines.v = {column ? vu : vv, row ? uv : vv};
-  lines.w = {column ? uw - v.v : vw + v.u, row ? uw + v.v : vw - v.u};
+  lines.u = {last_column ? uw : column ? uu : uv, last_row ? wu : row ? uu : vu};
+  lines.v = {last_column ? vw : column ? vu : vv, last_row ? wv : row ? uv : vv};
+  lines.w = {last_column ? ww : column ? wu : wv, last_row ? ww : row ? uw : vw};
   return true;
 }
 
@@ -174,7 +183,8 @@ template <typename Real>
       } else if (!q.polish(x)) {
         continue;
       }
-      if (!(x.w + (std::min)(x.u, x.v) > Real(0) && x.w > Real(0))) continue;
+      // A point in the camera's centre is on no ray.
+      if (!(x.w + (std::min)(x.u, x.v) > Real(1e-12) && x.w > Real(1e-12))) continue;
       ++count;
     }
   }
