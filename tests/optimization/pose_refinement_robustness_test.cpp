@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "cfp/geometry/radial_tangential_camera.hpp"
 #include "support/catch.hpp"
 #include "support/engines.hpp"
 #include "support/pose_scene.hpp"
@@ -270,6 +271,10 @@ TEST_CASE("Pose refinement: an unusable start pose or camera is refused", "[opti
   for (const double f : {0.0, -500.0, std::nan(""), 1e300}) {
     scene.camera.fx = f;
     CHECK(refine_by_default(scene).status == SolverStatus::invalid_input);
+    const cfp::RadialTangentialCamera<double> distorted{f, 500, 320, 240};
+    cfp::PoseWorkspace<double> workspace;
+    CHECK(cfp::refine_pose(scene.observations(), distorted, good, cfp::PoseOptions(), workspace).status ==
+          SolverStatus::invalid_input);
   }
 }
 

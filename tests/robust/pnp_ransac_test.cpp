@@ -402,6 +402,16 @@ TEST_CASE("A camera whose pixels are beyond all numbers has no observations", "[
   CHECK(result.used == 0);
 }
 
+TEST_CASE("Three places have no pose, however many observations they have", "[robust]") {
+  cfp::Random random(61, "copies");
+  PnpRansacWorkspace workspace;
+  for (int trial = 0; trial < 50; ++trial) {
+    auto scene = make_absolute_pose_scene<double>(random, camera<double>, scene_options(100, 0));
+    for (std::size_t i = 3; i < 100; ++i) scene.world[i] = scene.world[i % 3], scene.pixels[i] = scene.pixels[i % 3];
+    CHECK_FALSE(pnp_ransac(scene.world, scene.pixels, {}, camera<double>, {}, workspace).found());
+  }
+}
+
 TEST_CASE("A broken point far away hides no pose", "[robust]") {
   for (const double far_m : {1e4, 3e6, 9e7}) {
     for (const std::size_t broken : {1U, 5U}) {

@@ -93,5 +93,7 @@ TEST_CASE("The search ends with the confidence asked for, within its limits, and
     CAPTURE(share, needed);
     CHECK(found.iterations == (std::max)(needed, std::size_t(5)));
     CHECK(found.confident == (needed < 100));
+    if (needed < 100) CHECK(search(costs, draws(1, needed)).confident);  // with the last sample allowed
+    if (needed > 1) CHECK_FALSE(search(costs, draws(1, needed - 1)).confident);
   }
 }

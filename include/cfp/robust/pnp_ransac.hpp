@@ -56,7 +56,7 @@ inline namespace CFP_ISA {
 ///
 /// A pose is found only where more observations lie near their projections than chance would put there: with nothing
 /// but mismatches on an object of 40 to 160 px, eight inliers or more come up by chance. Points on a line, or in one
-/// place, are degenerate.
+/// place, are degenerate; inliers in three places are no consensus, however many they are.
 template <typename Camera, typename Scalar = typename Camera::ScalarType>
 [[nodiscard]] PnpRansacResult<Scalar> pnp_ransac(PointSpan<non_deduced<Scalar>, 3> world,
                                                  PointSpan<non_deduced<Scalar>, 2> pixels,
@@ -95,6 +95,7 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
            (pixel - pixels[k]).squaredNorm() <= static_cast<Scalar>(problem.limit);
   };
   detail::report_inliers(observations, is_inlier, options.min_inliers, inlier_mask, result);
+  if (result.found() && !detail::four_places(observations, is_inlier)) detail::refuse(inlier_mask, result);
   const bool few = 5 * result.inliers < 2 * result.used;  // chance makes no more, save where all pixels are one
   if (few && result.found() && !problem.stands_out(search.best.model, search.iterations))
     detail::refuse(inlier_mask, result);

@@ -173,7 +173,7 @@ template <typename Problem>
       inliers += is_inlier(i) ? one : 0.0;
       all += one;
     }
-    return ransac_iterations(inliers / all, sample_size, options.confidence, options.max_iterations);
+    return ransac_iterations(inliers / all, sample_size, options.confidence, (std::numeric_limits<std::size_t>::max)());
   };
   const auto judge = [&](const Model& model) {
     const double cost = problem.cost(model, best_sample_cost);
@@ -183,14 +183,15 @@ template <typename Problem>
     problem.optimize(candidate);
     if (!(candidate.cost < search.best.cost)) return;
     search.best = candidate;
-    needed = count_needed();
+    const std::size_t asked = count_needed();
+    search.confident = asked <= options.max_iterations;
+    needed = (std::min)(asked, options.max_iterations);
   };
   typename MinimalSampler<sample_size>::Sample sample;
   while (search.iterations < (std::max)(needed, options.min_iterations) && sampler.draw(random, sample)) {
     ++search.iterations;
     problem.solve(sample, judge);
   }
-  search.confident = needed < options.max_iterations;
   return search;
 }
 

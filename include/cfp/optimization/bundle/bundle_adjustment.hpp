@@ -32,8 +32,8 @@ inline namespace CFP_ISA {
 ///   readmit.
 /// - Gauge: nothing is added to the cost. With no pose (mono: or only one) fixed, the damping alone holds the free
 ///   directions, and the solution stays near the start along them.
-/// - A fixed pose, a free pose or a point without a used observation keeps its bits. When no step was accepted,
-///   everything does.
+/// - A fixed pose, a free pose or a point without a used observation keeps its bits. When no step was accepted, or
+///   there is no solution (is_solved), everything does.
 /// - The same input gives the same bits with any executor. Parts of less than 4000 observations stay on this thread.
 /// - What the executor or an allocation throws passes through; poses and points are then as they were.
 /// - Allocates only in the workspace, before the first iteration; not at all when it has seen a problem of this size.
@@ -57,9 +57,14 @@ template <typename Camera, typename Scalar, typename Executor,
           least_squares{problem, mono, stereo, workspace, executor};
       static_cast<LeastSquaresResult&>(result) = minimize_least_squares(least_squares, options.levenberg_marquardt);
     });
+    if (!is_solved(result.status)) result.accepted = 0, result.final_cost = result.initial_cost;
     if (result.accepted > 0) detail::write_back(problem, workspace);
+  } else if (result.behind > 0) {
+    result.status = SolverStatus::degenerate;
+  } else if (result.zero_weight > 0 && result.invalid == 0) {
+    result.status = SolverStatus::no_weight;
   }
-  if (!squared_errors.empty()) detail::write_squared_errors(problem, squared_errors);
+  if (!squared_errors.empty()) detail::write_squared_errors(problem, workspace.index, squared_errors);
   return result;
 }
 

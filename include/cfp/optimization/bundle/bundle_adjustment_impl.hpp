@@ -159,13 +159,15 @@ void write_back(const BundleProblem<Camera, Scalar>& problem, const BundleWorksp
 }
 
 template <typename Camera, typename Scalar>
-void write_squared_errors(const BundleProblem<Camera, Scalar>& problem, span<double> squared_errors) noexcept {
+void write_squared_errors(const BundleProblem<Camera, Scalar>& problem, const BundleIndex& index,
+                          span<double> squared_errors) noexcept {
   CFP_ASSERT(squared_errors.size() == problem.observations.pose.size());
   for (std::size_t i = 0; i < squared_errors.size(); ++i) {
     BundleMeasurement m;
     double error = -1;
-    const bool judged = read_measurement(problem, i, m) && squared_error(problem, m, error);
-    squared_errors[i] = judged && is_finite(error) ? error : -1;
+    const bool judged = read_measurement(problem, i, m) && index.is_rigid[to_index(m.pose)] != 0 &&
+                        squared_error(problem, m, error) && is_finite(error) && is_finite(error * m.weight);
+    squared_errors[i] = judged ? error : -1;
   }
 }
 

@@ -17,9 +17,13 @@ namespace cfp::detail {
 /// Work is always cut into this many parts, whatever the executor, so that one thread and two give the same bits.
 inline constexpr std::size_t bundle_parts = 2;
 
-/// One observation as numbers, of a pose and a point of the caller's until they are numbered.
-struct BundleMeasurement {
+/// Of a pose and a point of the caller's until they are numbered.
+struct BundleLink {
   int pose = 0, point = 0;
+};
+
+/// One observation as numbers.
+struct BundleMeasurement : BundleLink {
   std::size_t slot = 0;
   double u = 0, v = 0, disparity = 0, weight = 1, information = 1;  // information: 1 / sigma^2
   bool stereo = false;
@@ -33,7 +37,7 @@ struct BundleIndex {
   std::vector<BundleMeasurement> observations;
   std::vector<std::size_t> range_begin;
   // One slot per observation, by what is eliminated, in it by what is kept.
-  std::vector<BundleMeasurement> slots;
+  std::vector<BundleLink> slots;
   std::vector<std::size_t> slot_begin;  // per eliminated pose or point
   std::array<std::size_t, bundle_parts + 1> pose_part{}, eliminated_part{};
 

@@ -18,9 +18,9 @@ inline constexpr std::size_t natural_order_limit = 64;
 inline namespace CFP_ISA {
 
 /// Sorts `from` stably by key(measurement) in [0, groups): group g is to[begin[g]], …, to[begin[g + 1] - 1].
-template <typename Key>
+template <typename Key, typename Link>
 void group_by(const std::vector<BundleMeasurement>& from, std::size_t groups, const Key& key,
-              std::vector<std::size_t>& begin, std::vector<BundleMeasurement>& to) {
+              std::vector<std::size_t>& begin, std::vector<Link>& to) {
   begin.assign(groups + 2, 0);
   for (const BundleMeasurement& m : from) ++begin[to_index(key(m)) + 2];
   for (std::size_t g = 2; g < begin.size(); ++g) begin[g] += begin[g - 1];
@@ -76,14 +76,15 @@ inline void sort_observations(BundleIndex& index) {
   const std::size_t poses = index.caller_pose.size();
   if (index.eliminate_poses) {
     group_by(index.kept, index.points, point_of, index.slot_begin, index.observations);
-    group_by(index.observations, poses, pose_of, index.slot_begin, index.slots);
+    group_by(index.observations, poses, pose_of, index.slot_begin, index.kept);
   } else {
     group_by(index.kept, poses, pose_of, index.slot_begin, index.observations);
-    group_by(index.observations, index.points, point_of, index.slot_begin, index.slots);
+    group_by(index.observations, index.points, point_of, index.slot_begin, index.kept);
   }
-  for (std::size_t s = 0; s < index.slots.size(); ++s) index.slots[s].slot = s;
+  index.slots.resize(index.kept.size());
+  for (std::size_t s = 0; s < index.slots.size(); ++s) index.kept[s].slot = s, index.slots[s] = index.kept[s];
   const auto range_of = [](const BundleMeasurement& m) { return 2 * m.pose + (m.stereo ? 1 : 0); };
-  group_by(index.slots, 2 * poses, range_of, index.range_begin, index.observations);
+  group_by(index.kept, 2 * poses, range_of, index.range_begin, index.observations);
 }
 
 /// Cuts `count` groups, of which number i begins at begin[stride i], into parts of about equal size.

@@ -20,14 +20,15 @@ inline namespace CFP_ISA {
 /// Refines T_cam_world from the start pose. Arithmetic in Scalar (of the workspace), sums and pose in double: a
 /// PoseWorkspace<float> is the fast path, as accurate as double wherever the world's origin is, because points are
 /// taken relative to the start position; a board that faces the camera from afar (20 px wide for f = 500, 200 px for
-/// 3000) may be degenerate there and have a pose in double. Points behind the camera (z below Tolerance::min_depth, or more than 89.4
-/// degrees off the axis of a pinhole camera) count for nothing and are no inliers. `inliers` (empty, or length n): 1
-/// for an inlier, else 0; all 0 when the pose is untouched. Same input, same bits. Allocates only when the workspace
-/// grows. O(n) per evaluation; a pinhole camera is evaluated in vector instructions, any other point by point.
+/// 3000) may be degenerate there and have a pose in double. Points behind the camera (z below Tolerance::min_depth, or
+/// more than 89.4 degrees off the axis of a pinhole camera) count for nothing and are no inliers. `inliers` (empty, or
+/// length n): 1 for an inlier, else 0; all 0 when the pose is untouched. Same input, same bits. Allocates only when the
+/// workspace grows. O(n) per evaluation; a pinhole camera is evaluated in vector instructions, any other point by
+/// point.
 ///
-/// A start that is no rigid motion (a non-finite one is returned as identity), an unusable camera, or two arrays for
-/// one quantity (PoseObservations): invalid_input. `options` must be valid (invalid_field), spans of matching length:
-/// asserted.
+/// A start that is no rigid motion (a non-finite one is returned as identity), an unusable camera (a focal length on
+/// the axis outside [1e-3, 1e6] px, say), or two arrays for one quantity (PoseObservations): invalid_input. `options`
+/// must be valid (invalid_field), spans of matching length: asserted.
 template <typename Scalar, typename Input, typename Camera>
 [[nodiscard]] PoseResult refine_pose(const PoseObservations<Input>& observations, const Camera& camera,
                                      const SE3<double>& T_cam_world, const PoseOptions& options,

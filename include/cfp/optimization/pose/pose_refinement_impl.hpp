@@ -18,12 +18,8 @@ inline namespace CFP_ISA {
 
 template <typename Camera>
 [[nodiscard]] bool is_usable_camera(const Camera& camera) noexcept {
-  if constexpr (is_pinhole<Camera>) {
-    const PinholeCamera<double> c = camera.template cast<double>();
-    return c.fx >= 1e-3 && c.fx <= 1e6 && c.fy >= 1e-3 && c.fy <= 1e6 && std::abs(c.cx) <= 1e7 && std::abs(c.cy) <= 1e7;
-  } else {
-    return true;
-  }
+  const PinholeCamera<double> c = undistorted_camera(camera).template cast<double>();
+  return c.fx >= 1e-3 && c.fx <= 1e6 && c.fy >= 1e-3 && c.fy <= 1e6 && std::abs(c.cx) <= 1e7 && std::abs(c.cy) <= 1e7;
 }
 
 /// What the loop minimises: the pose relative to the start position, so that float serves wherever the origin is.
