@@ -14,13 +14,13 @@
 
 namespace cfp_slam {
 
-// Boxes: yellow where detected, orange where compensated, with O. Keypoints inside them: from red (K = 0) to green
-// (K = 1), filled on the foreground, a ring on the background.
+// Boxes: yellow where detected, orange where compensated, with O. Keypoints inside them: from red (weight 0) to green
+// (1), filled on the foreground, a ring on the background.
 inline cv::Mat annotate(const cv::Mat& bgr, const RunFrame& frame) {
   cv::Mat picture = bgr.clone();
   for (const BoxKeypoint& p : frame.box_keypoints) {
-    const double k = std::clamp(static_cast<double>(p.static_probability()), 0.0, 1.0);
-    cv::circle(picture, cv::Point2f(p.x, p.y), 3, {0, 255 * std::min(1.0, 2 * k), 255 * std::min(1.0, 2 - 2 * k)},
+    const double w = std::clamp(static_cast<double>(p.weight >= 0 ? p.weight : p.static_probability()), 0.0, 1.0);
+    cv::circle(picture, cv::Point2f(p.x, p.y), 3, {0, 255 * std::min(1.0, 2 * w), 255 * std::min(1.0, 2 - 2 * w)},
                p.foreground ? static_cast<int>(cv::FILLED) : 1, cv::LINE_AA);
   }
   for (const BoxRecord& box : frame.boxes) {

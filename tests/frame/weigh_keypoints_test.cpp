@@ -221,6 +221,7 @@ TEST_CASE("What its depth puts on a person who moves is not at rest where the fl
     auto& object = run.state.objects[static_cast<std::size_t>(run.state.box[i])];
     REQUIRE(object.static_probability < 0.5);
     CHECK(cfp::explain(i, 0.98, options, run.state).placed);
+    CHECK(to_text(cfp::explain(i, 0.98, options, run.state)).find("so that O counts, too") != std::string::npos);
     run.state.flow_probability[i] = 0.95;
     CHECK(cfp::model_weight(i, 0.98, options, run.state) < 0.95);
     const auto known = std::exchange(object.status, cfp::Status::not_enough_data);

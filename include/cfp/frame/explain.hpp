@@ -151,7 +151,11 @@ template <typename Scalar>
                 ? "unknown, " + std::to_string(e.object.pairs) + " flow pairs\n"
                 : std::to_string(e.object.pairs) + " flow pairs judged by " + models[static_cast<int>(e.flow_model)] +
                       ", noise " + number(e.flow_sigma_px) + " px, and the frames before\n";
-    if (e.flow_probability >= 0) text += "  flow    " + number(e.flow_probability) + " at its place\n";
+    if (e.flow_probability >= 0) {
+      const bool joined = e.placed && e.high_dynamic;
+      text += "  flow    " + number(e.flow_probability) + " at its place" +
+              (joined ? "; by its depth it is on the object, so that O counts, too\n" : "\n");
+    }
     text += "  coarse  K " + number(e.coarse_probability) + "\n";
     if (e.stage == Stage::fine) {
       text += detail::constraint_text("  K^T     ", "projection", e.projection) +
