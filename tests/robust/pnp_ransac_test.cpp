@@ -344,12 +344,13 @@ TEST_CASE("Too few, collinear or unrelated matches leave the identity and say wh
 
 TEST_CASE("The loss of the refinement grows with the distance, up to the weight", "[robust]") {
   cfp::detail::ObservationArrays in;
+  std::vector<double> scratch;
   const std::vector<std::array<double, 3>> world{{0, 0, 1}};
   double last = -1;
   for (double distance_px = 0; distance_px < 40; distance_px += 0.25) {
     const std::vector<std::array<double, 2>> pixels{{camera<double>.cx + distance_px, camera<double>.cy}};
     const std::vector<double> weights{0.5};
-    cfp::detail::load_observations<PinholeCamera<double>, double>(world, pixels, weights, camera<double>, in);
+    cfp::detail::load_observations<PinholeCamera<double>, double>(world, pixels, weights, camera<double>, in, scratch);
     cfp::detail::NormalEquations<6> ignored;
     cfp::SE3<double> pose;
     pose.translation = {in.origin[0], in.origin[1], in.origin[2]};
@@ -366,6 +367,7 @@ TEST_CASE("The loss of the refinement grows with the distance, up to the weight"
 TEST_CASE("The gradient of the refinement is that of central differences, and far mismatches have none", "[robust]") {
   cfp::Random random(61, "pnp");
   cfp::detail::ObservationArrays in;
+  std::vector<double> scratch;
   int near = 0, far = 0;
   for (int trial = 0; trial < 400; ++trial) {
     const double x = random.uniform(-1, 1), y = random.uniform(-1, 1), z = random.uniform(1, 4);
@@ -375,7 +377,7 @@ TEST_CASE("The gradient of the refinement is that of central differences, and fa
     const std::vector<std::array<double, 3>> world{{x, y, trial % 8 == 0 ? -z : z}};  // some behind the camera
     const std::vector<std::array<double, 2>> pixels{
         {pixel.x() + error_px * std::cos(angle), pixel.y() + error_px * std::sin(angle)}};
-    cfp::detail::load_observations<PinholeCamera<double>, double>(world, pixels, {}, camera<double>, in);
+    cfp::detail::load_observations<PinholeCamera<double>, double>(world, pixels, {}, camera<double>, in, scratch);
     const cfp::detail::ReprojectionModel<double> model{in, 4};
     cfp::SE3<double> pose;
     pose.translation = {in.origin[0], in.origin[1], in.origin[2]};

@@ -160,6 +160,7 @@ template <typename Scalar>
   workspace.distances.resize(outside.size());
   if (workspace.search.observations.index.size() < outside.size())  // a later call may search and must not allocate
     workspace.search.observations.begin(outside.size());
+  workspace.search.sampling.reserve(outside.size());
   const auto believe = [&](const SE3<double>& T_cur_prev) {
     motion.T_cur_prev = T_cur_prev.template cast<Scalar>();
     motion_distances(flow.previous, flow.previous_depths, flow.current, UncertainMotion<Scalar>(motion.T_cur_prev),

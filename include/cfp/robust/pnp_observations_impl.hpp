@@ -26,7 +26,6 @@ enum ObservationRow : std::size_t { X, Y, Z, ray_x, ray_y, s11, s12, s22, observ
 
 struct ObservationArrays : RansacColumns<observation_rows> {
   std::array<double, 3> origin = {0, 0, 0};  // coordinate by coordinate the median: few broken points leave it in place
-  std::vector<double> scratch;
 };
 
 inline namespace CFP_ISA {
@@ -38,9 +37,10 @@ inline namespace CFP_ISA {
 
 template <typename Camera, typename Scalar>
 void load_observations(const PointSpan<Scalar, 3>& world, const PointSpan<Scalar, 2>& pixels,
-                       const span<const Scalar>& weights, const Camera& camera, ObservationArrays& out) {
+                       const span<const Scalar>& weights, const Camera& camera, ObservationArrays& out,
+                       std::vector<double>& scratch) {
   out.begin(world.size());
-  out.scratch.reserve(world.size());
+  scratch.reserve(world.size());
   constexpr double max_coordinate = 1e8;  // beyond it a point is taken for a broken one
   for (std::size_t i = 0; i < world.size(); ++i) {
     const double w = weights.empty() ? 1.0 : static_cast<double>(weights[i]);
@@ -61,7 +61,7 @@ void load_observations(const PointSpan<Scalar, 3>& world, const PointSpan<Scalar
   }
   for (std::size_t r = X; r <= Z; ++r) {
     // Of an odd number of them: the origin of points on a line then lies there, too.
-    out.origin[r] = median_of(out.row(r), out.size - (out.size % 2 == 0 && out.size > 0 ? 1 : 0), out.scratch);
+    out.origin[r] = median_of(out.row(r), out.size - (out.size % 2 == 0 && out.size > 0 ? 1 : 0), scratch);
     for (std::size_t i = 0; i < out.size; ++i) out.row(r)[i] -= out.origin[r];
   }
   finish(out);
@@ -69,15 +69,15 @@ void load_observations(const PointSpan<Scalar, 3>& world, const PointSpan<Scalar
 
 // Whether the points lie on a line or in one place, to the rounding of float coordinates: relative to the size of the
 // half that is nearest to the origin, as one point may be broken and far away.
-[[nodiscard]] inline bool on_a_line(ObservationArrays& in) {
+[[nodiscard]] inline bool on_a_line(const ObservationArrays& in, std::vector<double>& scratch) {
   const auto point = [&](std::size_t i) { return Vector3<double>(in.row(X)[i], in.row(Y)[i], in.row(Z)[i]); };
   Vector3<double> far = Vector3<double>::Zero();
-  in.scratch.clear();
+  scratch.clear();
   for (std::size_t i = 0; i < in.size; ++i) {
-    in.scratch.push_back(point(i).norm());
-    if (in.scratch.back() > far.norm()) far = point(i);
+    scratch.push_back(point(i).norm());
+    if (scratch.back() > far.norm()) far = point(i);
   }
-  double size = order_statistic(span<double>(in.scratch), in.size / 2);
+  double size = order_statistic(span<double>(scratch), in.size / 2);
   size = size > 0 ? size : far.norm();  // most in one place
   for (std::size_t i = 0; i < in.size; ++i) {
     if (cross(far, point(i)).norm() > 1e-6 * far.norm() * (std::max)(size, point(i).norm())) return false;

@@ -68,11 +68,10 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
   std::fill(inlier_mask.begin(), inlier_mask.end(), char(0));
   PnpRansacResult<Scalar> result;
   detail::ObservationArrays& observations = workspace.observations;
-  detail::load_observations(world, pixels, weights, camera, observations);
-  workspace.sampling.reserve(world.size());
+  detail::load_observations(world, pixels, weights, camera, observations, workspace.sampling);
   result.used = observations.size;
   if (observations.size < options.min_inliers || observations.size < 4) return result;
-  if (detail::on_a_line(observations)) {
+  if (detail::on_a_line(observations, workspace.sampling)) {
     result.status = RansacStatus::degenerate;
     return result;
   }
