@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <limits>
@@ -125,7 +126,7 @@ inline Problem read_bal(const std::string& file) {
 /// position), markers (image, track, x, y).
 inline Problem read_libmv(const std::string& file) {
   std::ifstream in(file, std::ios::binary);
-  if (!in) fail(file, "cannot be opened");
+  if (!in || std::filesystem::is_directory(file)) fail(file, "cannot be opened");
   const std::vector<char> bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
   std::size_t offset = 0;
   const auto at = [&] { return "byte " + std::to_string(offset) + ": "; };

@@ -53,27 +53,47 @@ void for_each_option(Options& o, const Visit& visit) {
   visit("probability.map_point.background_prior", p.map_point.background_prior);
 }
 
-// False: no option has this name.
+// False: no option has this name, or it has no such value.
 inline bool set_option(Options& options, const std::string& name, double value) {
-  bool known = false;
+  bool set = false;
   for_each_option(options, [&](const char* option, auto& field) {
-    if (name != option) return;
-    field = static_cast<std::decay_t<decltype(field)>>(value);
-    known = true;
+    using Field = std::decay_t<decltype(field)>;
+    if (name != option || !cfp::is_finite(value) || (std::is_same_v<Field, bool> && value != 0 && value != 1)) return;
+    field = static_cast<Field>(value);
+    set = true;
   });
-  return known;
+  return set;
 }
 
-// Throws std::runtime_error that says file and line where a name is none, or comes twice, or a value is no number.
+// The first option outside its range, as a file names it; empty: none.
+inline std::string invalid_option(const Options& o) {
+  const auto is_share = [](double x) { return x >= 0 && x <= 1; };
+  if (!(o.keypoint_sigma_px > 0)) return "keypoint_sigma_px";
+  if (!(o.baseline_fx > 0)) return "baseline_fx";
+  if (!(o.flow_edge_px >= 0)) return "flow_edge_px";
+  if (!is_share(o.unproven_share)) return "unproven_share";
+  if (!is_share(o.min_known_share)) return "min_known_share";
+  if (!is_share(o.features.room_share)) return "features.room_share";
+  const cfp::OptionPath field = cfp::invalid_field(o.probability);
+  return field ? "probability." + field.string() : std::string();
+}
+
+// Throws std::runtime_error that says file and line where a name is none, or comes twice, or a value is no number or
+// outside the option's range.
 inline OptionValues read_options(const std::filesystem::path& file) {
   OptionValues values;
+  std::map<std::string, int> lines;
+  Options options;
   cfp_examples::for_each_line(file, [&](int line, const std::vector<std::string>& words) {
-    Options any;
     if (words.size() != 2) cfp_examples::bad_line(file, line, "expected 'name value'");
     const double value = cfp_examples::parse_number(file, line, words[1], words[0].c_str());
-    if (!set_option(any, words[0], value)) cfp_examples::bad_line(file, line, "no option '" + words[0] + "'");
+    if (!set_option(options, words[0], value))
+      cfp_examples::bad_line(file, line, "no option '" + words[0] + "', or not of this value");
     if (!values.emplace(words[0], value).second) cfp_examples::bad_line(file, line, words[0] + " comes twice");
+    lines[words[0]] = line;
   });
+  const std::string invalid = invalid_option(options);  // a range may depend on another option
+  if (!invalid.empty()) cfp_examples::bad_line(file, lines[invalid], invalid + " is out of range");
   return values;
 }
 

@@ -40,7 +40,7 @@ inline DetectionsFile read_detections(std::istream& input, const std::string& na
   if (!input) return fail(0, "cannot be read");
   std::size_t number = 0;
   for (std::string line; std::getline(input, line);) {
-    ++number;
+    if (++number == 1) drop_byte_order_mark(line);
     line.resize(std::min(line.size(), line.find('#')));
     std::istringstream split(line);
     std::vector<std::string> words;
@@ -49,7 +49,7 @@ inline DetectionsFile read_detections(std::istream& input, const std::string& na
     const auto value = [&](std::size_t i) { return i < words.size() ? read_number(words[i]) : std::nullopt; };
     if (!value(0) || !std::isfinite(*value(0))) return fail(number, "no timestamp: '" + words[0] + "'");
     if (words.size() < 2) return fail(number, "no class after the timestamp");
-    if (!value(2)) return fail(number, "no score after class '" + words[1] + "'");
+    if (!value(2) || std::isnan(*value(2))) return fail(number, "no score after class '" + words[1] + "'");
     if (!value(3) || !value(4) || !value(5) || !value(6))
       return fail(number, "four numbers x1 y1 x2 y2 must follow the score");
     if (words.size() > 7) return fail(number, "surplus '" + words[7] + "' after the box");
@@ -68,6 +68,7 @@ inline DetectionsFile read_detections(std::istream& input, const std::string& na
     if (file.frames.empty() || timestamp > file.frames.back().timestamp) file.frames.push_back({timestamp, {}});
     file.frames.back().detections.push_back(d);
   }
+  if (input.bad()) return fail(number, "cannot be read");
   return file;
 }
 

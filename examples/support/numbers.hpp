@@ -18,6 +18,11 @@ inline std::optional<double> read_number(std::string_view word) {
   return value;
 }
 
+/// Takes the mark away that some editors put before the first line of a text in UTF-8.
+inline void drop_byte_order_mark(std::string& line) {
+  if (line.rfind("\xEF\xBB\xBF", 0) == 0) line.erase(0, 3);
+}
+
 /// As printf's %.<decimals>f.
 inline std::string fixed(double value, int decimals) {
   char text[512];

@@ -32,6 +32,7 @@ void for_each_line(const std::filesystem::path& file, const Visit& visit) {
   if (!stream) throw std::runtime_error("cannot read " + file.string());
   std::string text;
   for (int line = 1; std::getline(stream, text); ++line) {
+    if (line == 1) drop_byte_order_mark(text);
     text.resize(std::min(text.size(), text.find('#')));
     for (char& c : text) {
       if (c == ',' || c == '\t' || c == '\r') c = ' ';
@@ -41,6 +42,7 @@ void for_each_line(const std::filesystem::path& file, const Visit& visit) {
     for (std::string word; split >> word;) words.push_back(word);
     if (!words.empty()) visit(line, words);
   }
+  if (stream.bad()) throw std::runtime_error("cannot read " + file.string());  // a folder, for example
 }
 
 inline double parse_number(const std::filesystem::path& file, int line, const std::string& word, const char* meaning) {
@@ -73,7 +75,8 @@ inline std::vector<cfp::StampedPose<double>> read_tum_trajectory(const std::file
     cfp::StampedPose<double> pose;
     pose.time_s = v[0];
     pose.T_world_cam.translation << v[1], v[2], v[3];
-    const Eigen::Quaterniond q(v[7], v[4], v[5], v[6]);
+    Eigen::Quaterniond q(v[7], v[4], v[5], v[6]);
+    q.coeffs() /= q.coeffs().cwiseAbs().maxCoeff();  // squares of huge or tiny ones leave the range of numbers
     if (q.norm() > 0) {
       pose.T_world_cam.rotation = q.normalized().toRotationMatrix();
     } else {

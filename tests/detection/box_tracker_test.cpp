@@ -271,6 +271,23 @@ TEST_CASE("While the detector does not run, boxes are carried on for max_idle fr
   }
 }
 
+TEST_CASE("Between the runs of a slow detector boxes are carried on, however rarely it runs", "[detection]") {
+  for (const int n : {2, 7, 8, 10, 20}) {
+    cfp::BoxTracker<double> tracker;
+    int carried = 0;
+    for (int k = 0; k <= 5 * n; ++k) {
+      const Detections person{{{10, 10, 90, 200}, 0, 1}};
+      const auto result = k % n == 0 ? tracker.track(person, 1.0 / 30) : tracker.coast(1.0 / 30);
+      if (k % n == 0) REQUIRE(result.boxes.size() == 1);
+      for (const auto& box : result.boxes) CHECK(box.id == 1);
+      carried += k % n == 0 ? 0 : int(result.boxes.size());
+      if (k > n && k % n > 6) CHECK(result.boxes.empty());
+    }
+    INFO("every " << n << "th frame: " << carried << " carried");
+    CHECK(carried == 4 * (std::min)(n - 1, 6));  // from the second run on
+  }
+}
+
 TEST_CASE("A long gap ends all tracks", "[detection]") {
   cfp::BoxTracker<double> tracker;
   const Box box{10, 10, 60, 160};

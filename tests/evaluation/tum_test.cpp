@@ -50,6 +50,8 @@ TEST_CASE("A bad line is refused with file and line", "[evaluation]") {
   }
   CHECK(error_of([] { (void)cfp_examples::read_tum_trajectory("/nowhere/at/all.txt"); }).find("/nowhere/at/all.txt") !=
         std::string::npos);
+  const std::string folder = std::filesystem::temp_directory_path().string();
+  CHECK(error_of([&] { (void)cfp_examples::read_tum_trajectory(folder); }).find(folder) != std::string::npos);
   const TemporaryFile list("0.1 a.png b\n");
   CHECK(error_of([&] { (void)cfp_examples::read_tum_list(list.path); }).find(":1: ") != std::string::npos);
   const TemporaryFile camera("525 525 320 240 640 0 5000\n");
@@ -57,6 +59,15 @@ TEST_CASE("A bad line is refused with file and line", "[evaluation]") {
         std::string::npos);
   const TemporaryFile empty("# nothing\n");
   CHECK(!error_of([&] { (void)cfp_examples::read_tum_camera(empty.path); }).empty());
+}
+
+TEST_CASE("Quaternions of any length, and a mark of the byte order, are read", "[evaluation]") {
+  const TemporaryFile file(
+      "\xEF\xBB\xBF"
+      "1 0 0 0 1e200 0 0 1e200\n2 0 0 0 1e-200 0 0 1e-200\n3 0 0 0 1 0 0 1\n");
+  const auto poses = cfp_examples::read_tum_trajectory(file.path);
+  REQUIRE(poses.size() == 3);
+  for (const auto& pose : poses) CHECK((pose.T_world_cam.rotation - poses[2].T_world_cam.rotation).norm() < 1e-12);
 }
 
 TEST_CASE("Lost frames as SLAM systems print them are read and found unusable", "[evaluation]") {

@@ -87,10 +87,18 @@ TEST_CASE("Options come from a file, go through a run's settings, and are refuse
   CHECK(options_text({}) == "none");
   CHECK(options_from_text("none").baseline_fx == Options().baseline_fx);
   for (const char* bad :
-       {"baseline_fx", "baseline_fx 1 2", "baseline_fx much", "base 1", "baseline_fx 1\nbaseline_fx 2"}) {
+       {"baseline_fx", "baseline_fx 1 2", "baseline_fx much", "base 1", "baseline_fx 1\nbaseline_fx 2", "baseline_fx 0",
+        "keypoint_sigma_px nan", "keypoint_sigma_px -1", "give_depths 5", "flow_edge_px inf", "features.room_share 5",
+        "unproven_share -3", "min_known_share nan"}) {
     INFO(bad);
     CHECK(error_of([&] { read_options(file(bad)); }).find("o.txt:") != std::string::npos);
   }
+  const auto complaint = [&](const char* text) { return error_of([&] { read_options(file(text)); }); };
+  CHECK(complaint("# mine\nprobability.map_point.rate 7").find("o.txt:2: probability.map_point.rate") !=
+        std::string::npos);
+  // Each alone would be out of range.
+  CHECK(complaint("probability.coarse.flow.motion.min_sigma_px 50\nprobability.coarse.flow.motion.max_sigma_px 60") ==
+        "");
   for (const char* bad : {"baseline_fx=", "baseline_fx", "base=1"})
     CHECK_FALSE(error_of([&] { options_from_text(bad); }).empty());
 }

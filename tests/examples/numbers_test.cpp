@@ -100,6 +100,12 @@ TEST_CASE("Detections: damage is reported with its line", "[examples]") {
   CHECK(complaint("1 person 0.5 1 2 3\n") == "f:1: four numbers x1 y1 x2 y2 must follow the score");
   CHECK(complaint("1 person 0.5 1 2 3 4 5\n") == "f:1: surplus '5' after the box");
   CHECK(complaint("1 person 0.5 3 2 1 4\n") == "f:1: the box needs x1 < x2 and y1 < y2");
+  CHECK(complaint("1 person nan 1 2 3 4\n") == "f:1: no score after class 'person'");
+  CHECK(complaint("\xEF\xBB\xBF"
+                  "1 person 0.5 1 2 3 4\n")
+            .empty());
   CHECK(complaint("2 person 0.5 1 2 3 4\n1 person 0.5 1 2 3 4\n") ==
         "f:2: the timestamp is before that of the line above");
+  std::ifstream folder(std::filesystem::temp_directory_path());
+  CHECK(cfp_examples::read_detections(folder, "tmp").error == "tmp:0: cannot be read");
 }

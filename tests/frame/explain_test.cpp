@@ -1,6 +1,7 @@
 #include "cfp/frame/explain.hpp"
 
 #include <algorithm>
+#include <clocale>
 #include <limits>
 #include <string>
 #include <vector>
@@ -95,6 +96,21 @@ TEST_CASE("Each rule is told by its name", "[frame]") {
   CHECK(contains(text(behind, 0.9), "raised"));
   CHECK(cfp::explain(behind, 0.9, options, run.state).weight == 1);
   CHECK(cfp::explain(person, 1.0, options, run.state).reason == WeightReason::mismatch);
+}
+
+TEST_CASE("Numbers of an explanation have three decimals behind a point", "[frame]") {
+  const char* const before = std::setlocale(LC_NUMERIC, nullptr);
+  const std::string locale = before;
+  for (const char* name : {"C", "de_DE.UTF-8"}) {
+    if (std::setlocale(LC_NUMERIC, name) == nullptr) continue;  // not on this machine
+    CHECK(cfp::detail::number(1234.56789) == "1234.568");
+    CHECK(cfp::detail::number(-0.0625) == "-0.063");
+    CHECK(cfp::detail::number(-1e-9) == "0.000");
+    CHECK(cfp::detail::number(0.9999) == "1.000");
+    CHECK(cfp::detail::number(1e20) == "100000000000000000000");
+    CHECK(contains(cfp::detail::number(std::numeric_limits<double>::quiet_NaN()), "nan"));
+  }
+  std::setlocale(LC_NUMERIC, locale.c_str());
 }
 
 TEST_CASE("Nothing that was not asked is told", "[frame]") {

@@ -183,6 +183,17 @@ TEST_CASE("A gap is a time far above the usual; a recording that becomes slower 
   CHECK_FALSE(interval.is_gap(t - 10));
   CHECK_FALSE(interval.is_gap(std::numeric_limits<double>::quiet_NaN()));
   CHECK(gaps(1, 1.5) == 0);
+  for (const double wrong : {1e9, -500.0}) {  // one stamp of the future, a clock that was set back
+    for (int k = 0; k < 10; ++k) interval.is_gap(t += 1 / 30.0);
+    if (wrong > 0)
+      interval.is_gap(t + wrong);
+    else
+      t += wrong;
+    gaps(3, 1 / 30.0);
+    CHECK(gaps(60, 1 / 30.0) == 0);
+    CHECK(gaps(1, 5) == 1);
+    CHECK(gaps(5, 1 / 30.0) == 0);
+  }
 }
 
 TEST_CASE("Options of health outside their ranges are named", "[health]") {

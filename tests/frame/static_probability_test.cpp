@@ -224,6 +224,7 @@ TEST_CASE("An object index per keypoint replaces boxes and depths", "[frame]") {
     if (scene.is_person[i]) CHECK(state.boxes[static_cast<std::size_t>(state.box[i])].detection == object[i]);
   }
   CHECK(coarse.report.undecided_foregrounds == 0);
+  CHECK(coarse.report.stray_labels == 0);
   // A missed detection has no segmentation: its compensated box is separated by depth again.
   host.detections.clear();
   frame = host.current();
@@ -232,6 +233,24 @@ TEST_CASE("An object index per keypoint replaces boxes and depths", "[frame]") {
   CHECK(host.probability.state().boxes.size() == 2);
   CHECK(missed.report.background > 0);
   CHECK(missed.report.foreground > 100);
+  const auto on_people = static_cast<std::size_t>(std::count(scene.is_person.begin(), scene.is_person.end(), true));
+  CHECK(missed.report.stray_labels == on_people);
+}
+
+TEST_CASE("A mask whose labels name no detection is told", "[frame]") {
+  // 255 for what moves, as segmentations have it, beside one box of a detector: of detection 254.
+  const DynamicScene<double> scene = make_dynamic_scene<double>({}, 38);
+  Host host(scene);
+  host.probability.coarse(host.previous());
+  cfp::Frame<double> frame = host.current();
+  const std::vector<std::uint8_t> mask(640 * 480, 255);
+  frame.labels = {mask.data(), 640, 480, 640};
+  const auto wrong = host.probability.coarse(frame).report;
+  CHECK(wrong.stray_labels == scene.keypoints.size());
+  CHECK(wrong.foreground == 0);
+  const std::vector<std::uint8_t> first(640 * 480, 1);
+  frame.labels.labels = first.data();
+  CHECK(host.probability.coarse(frame).report.stray_labels == 0);
 }
 
 TEST_CASE("A missed detection is compensated, and with no-mdc it is not", "[frame]") {

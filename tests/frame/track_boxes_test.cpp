@@ -66,6 +66,29 @@ TEST_CASE("A time stamp that does not grow is reported, and the boxes stay", "[f
   }
 }
 
+TEST_CASE("Detections that are none are counted, and a detector that gives no others saw nothing", "[frame]") {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<cfp::Detection<double>> turned = {{{200, 400, 100, 100}, 0, 0.9}, {{100, 100, 200, 400}, 0, nan}};
+  Camera camera;
+  CHECK(camera.see(0, turned).report.skipped_detections == 2);
+  CHECK(camera.state.report.frames_without_detections == 1);
+  std::vector<cfp::Detection<double>> mixed = turned;
+  mixed.push_back(person[0]);
+  CHECK(camera.see(0.03, mixed).report.skipped_detections == 2);
+  CHECK(camera.state.report.frames_without_detections == 0);
+  CHECK(camera.see(0.06, person).report.skipped_detections == 0);
+}
+
+TEST_CASE("A gap that ends the tracks is told, as it is behind every frame of a clock that does not count seconds",
+          "[frame]") {
+  Camera camera;
+  CHECK_FALSE(camera.see(0, person).report.after_gap);
+  CHECK_FALSE(camera.see(0.03, person).report.after_gap);
+  CHECK(camera.see(33, person).report.after_gap);
+  CHECK(camera.state.boxes[0].id == 2);
+  CHECK_FALSE(camera.see(33.03, person).report.after_gap);
+}
+
 TEST_CASE("The image motion moves a compensated box", "[frame]") {
   Camera still, turning;
   cfp::Matrix3<double> shift = cfp::Matrix3<double>::Identity();

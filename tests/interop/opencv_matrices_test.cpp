@@ -182,7 +182,8 @@ TEMPLATE_TEST_CASE("A camera from OpenCV's matrices projects as they say", "[int
   CHECK(refused(skewed, {}));
   CHECK(refused(infinite, {}));
   CHECK(refused(flat, {}));
-  for (const double focal_length : {0.0, -535.4}) {
+  const double too_small = 0.1 * static_cast<double>(std::numeric_limits<Scalar>::denorm_min());
+  for (const double focal_length : {0.0, -535.4, too_small}) {
     flat = K.clone();
     flat.at<double>(0, 0) = focal_length;
     CHECK(refused(flat, {}));

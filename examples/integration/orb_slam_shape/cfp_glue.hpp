@@ -12,7 +12,8 @@ struct Miniature {
   using Frame = ::Frame;
   using Camera = cfp::PinholeCamera<float>;
   static cfp::PointSpan<float, 2> Keys(const Frame& F) {
-    return {&F.mvKeysUn.data()->pt.x, F.mvKeysUn.size(), sizeof(KeyPoint)};
+    if (F.mvKeysUn.empty()) return {};
+    return {&F.mvKeysUn[0].pt.x, F.mvKeysUn.size(), sizeof(KeyPoint)};
   }
   static cfp::DescriptorSpan Descriptors(const Frame& F) {
     return {F.mDescriptors.data(), F.mvKeysUn.size(), sizeof(Descriptor), sizeof(Descriptor)};

@@ -48,9 +48,9 @@ class BoxTracker {
     return result;
   }
 
-  /// A frame on which the detector did not run: nothing was missed, so tracks of one detection live on, but confirmed
-  /// tracks are output as compensated, and all age towards max_coast (or max_idle) all the same. For a detector that
-  /// runs on every n-th frame only.
+  /// A frame on which the detector did not run: nothing was missed, so all tracks live on, but what is output as
+  /// compensated are confirmed ones, up to max_coast (or max_idle) frames after their last detection. For a detector
+  /// that runs on every n-th frame only.
   BoxTrackerResult<Scalar> coast(Scalar dt_s, const Matrix3<Scalar>* image_motion = nullptr) {
     BoxTrackerResult<Scalar> result = advance(dt_s, image_motion);
     output(result, false);
@@ -181,9 +181,9 @@ class BoxTracker {
       const bool confirmed = track.hits >= options_.confirm_hits;
       if (track.compensated()) {
         const bool trusted = confirmed && track.missed <= options_.coast_per_hit * track.hits;
-        if (track.missed > longest || (detector_ran && !trusted) || !clip_to_image(track.box)) continue;
+        if ((detector_ran && (track.missed > longest || !trusted)) || !clip_to_image(track.box)) continue;
       }
-      const bool shown = !track.compensated() || confirmed;
+      const bool shown = !track.compensated() || (confirmed && track.missed <= longest);
       if (shown) {
         track.associated = track.shown;
         track.rate_x = track.filter.u.rate;

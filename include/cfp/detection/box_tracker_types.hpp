@@ -48,7 +48,9 @@ struct BoxTrackerOptions {
   double birth_threshold = -1e300;
   int confirm_hits = 2;  ///< detections before a track may be compensated, >= 1
   int max_coast = 6;     ///< missed frames in a row that are compensated, >= 0 (the paper's figure shows six)
-  int max_idle = 0;      ///< the same while the detector does not run; counts where it is more than max_coast, >= 0
+  /// the same while the detector does not run; counts where it is more than max_coast, >= 0. Longer a track goes on
+  /// without a box, until the detector runs
+  int max_idle = 0;
   /// where the detector runs, at most this many missed frames per detection so far, > 0 (1: no longer than it was seen)
   double coast_per_hit = 1.0;
   double min_visible = 0.25;  ///< a compensated box with a smaller share of its area in the image is dropped, in [0, 1]

@@ -3,6 +3,7 @@
 /// text.
 #pragma once
 
+#include <cmath>
 #include <string>
 
 #include "cfp/frame/frame_options.hpp"
@@ -65,10 +66,13 @@ template <typename Scalar>
           static_cast<double>(evidence.confidence)};
 }
 
-/// Three decimals.
+/// Three decimals, behind a point in every locale.
 [[nodiscard]] inline std::string number(double value) {
-  std::string text = std::to_string(value + (value < 0 ? -0.0005 : 0.0005));
-  return is_finite(value) ? text.substr(0, text.size() - 3) : text;
+  const double thousandths = std::round(1000 * std::abs(value));
+  if (!(thousandths < 1e15)) return std::to_string(value).substr(0, std::to_string(value).find_first_of(".,"));
+  const auto whole = static_cast<std::uint64_t>(thousandths);
+  return (value < 0 && whole > 0 ? "-" : "") + std::to_string(whole / 1000) + "." +
+         std::to_string(1000 + whole % 1000).substr(1);
 }
 
 [[nodiscard]] inline std::string constraint_text(const char* name, const char* from, const ConstraintExplanation& c) {
@@ -87,6 +91,7 @@ inline namespace CFP_ISA {
 template <typename Scalar>
 [[nodiscard]] KeypointExplanation explain(std::size_t i, non_deduced<Scalar> map_point_probability,
                                           const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
+  CFP_ASSERT(i < state.size());
   KeypointExplanation e;
   e.keypoint = i;
   e.label = state.label[i];

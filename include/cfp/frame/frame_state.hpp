@@ -33,8 +33,10 @@ struct FrameReport {
   Stage stage = Stage::coarse;  ///< fine: the constraints were asked
   // boxes
   Status time = Status::ok;                   ///< invalid_input: the time stamp did not grow, and the boxes stayed
+  bool after_gap = false;                     ///< of more than tracker.max_gap_s: all tracks ended (stamps in seconds?)
   std::size_t frames_without_detections = 0;  ///< in a row, with the detector running: the commonest cause of no effect
   std::size_t frames_since_detector = 0;      ///< on which the detector did not run
+  std::size_t skipped_detections = 0;         ///< improper boxes (x y w h?), or a score that is NaN: as if not there
   // objects
   FlowModelKind flow_model = FlowModelKind::none;            ///< what the flow pairs were judged by,
   FlowSupport flow_support = FlowSupport::none;              ///< what that rests on,
@@ -43,7 +45,8 @@ struct FrameReport {
   std::size_t unknown_objects = 0;                           ///< boxes whose O is not known
   // keypoints
   std::size_t outside = 0, foreground = 0, background = 0, invalid = 0;  ///< by label
-  std::size_t unreported = 0;             ///< keypoints on no object around which the flow moves: see UnreportedOptions
+  std::size_t stray_labels = 0;  ///< keypoints whose mask or object_of_keypoint names no detection of the frame
+  std::size_t unreported = 0;    ///< keypoints on no object around which the flow moves: see UnreportedOptions
   std::size_t undecided_foregrounds = 0;  ///< boxes that the depths could not separate: all inside is foreground
   // constraints
   ConstraintReport projection, epipolar;
@@ -147,6 +150,8 @@ void begin_frame(const Frame<Scalar>& frame, FrameState<Scalar>& state) {
   const std::size_t n = frame.keypoints.size();
   CFP_ASSERT(detail::fits(n, frame.depths));
   CFP_ASSERT(frame.descriptors.size == 0 || frame.descriptors.size == n);
+  CFP_ASSERT(frame.descriptors.size == 0 || frame.descriptors.row_bytes >= frame.descriptors.bytes);
+  CFP_ASSERT(frame.labels.empty() || frame.labels.row_bytes >= static_cast<std::size_t>(frame.labels.width));
   std::swap(state.previous, state.current);
   FrameMemory<Scalar>& current = state.current;
   current.known = false;  // until it is whole: what allocates may throw

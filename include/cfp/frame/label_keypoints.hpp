@@ -89,6 +89,20 @@ void score_flow_outside(const Frame<Scalar>& frame, const FrameOptions& options,
   }
 }
 
+/// How many keypoints are said to lie on a detection that the frame has not.
+template <typename Scalar>
+[[nodiscard]] std::size_t stray_labels(const Frame<Scalar>& frame, const FrameState<Scalar>& state) noexcept {
+  const std::size_t detections = frame.detections ? frame.detections->size() : 0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < state.size(); ++i) {
+    const auto& [x, y] = state.current.keypoints[i];
+    const std::int32_t object =
+        frame.object_of_keypoint.empty() ? label_at(frame.labels, x, y) - 1 : frame.object_of_keypoint[i];
+    count += object >= 0 && static_cast<std::size_t>(object) >= detections ? 1U : 0U;
+  }
+  return count;
+}
+
 }  // namespace CFP_ISA
 }  // namespace detail
 
@@ -142,6 +156,7 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
       state.box[i] = static_cast<std::int32_t>(b);
     }
   }
+  report.stray_labels = detail::stray_labels(frame, state);
   detail::score_flow_at_keypoints(frame, options, state);
   detail::score_flow_outside(frame, options, state);
   const auto count = [&](KeypointLabel label) {

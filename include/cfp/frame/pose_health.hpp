@@ -154,14 +154,21 @@ template <typename Scalar>
 class FrameInterval {
  public:
   /// Once per frame, with its time. True: there is a gap before it, longer than thrice the usual interval, and than
-  /// 0.2 s: over less, a velocity may be believed. A time that does not grow is no gap, and is not learnt. The usual
-  /// interval follows, by a fifth a frame: within some ten frames of a change by a few times, so that a recording that
+  /// 0.2 s: over less, a velocity may be believed. A time that does not grow is no gap, and is not learnt, but for
+  /// the second of two in a row that grow: the one before them was wrong, or the clock was set. The usual interval
+  /// follows, by a fifth a frame: within some ten frames of a change by a few times, so that a recording that
   /// becomes slower has no gap after each of its frames.
   bool is_gap(double time_s) noexcept {
     const double dt = time_s - last_s_;
     const bool known = is_finite(last_s_);
-    if (!is_finite(time_s) || (known && !(dt > 0))) return false;
+    if (!is_finite(time_s)) return false;
+    if (known && !(dt > 0)) {
+      if (time_s > refused_s_) last_s_ = time_s;
+      refused_s_ = time_s;
+      return false;
+    }
     last_s_ = time_s;
+    refused_s_ = std::numeric_limits<double>::infinity();
     if (!known) return false;
     if (!(usual_s_ > 0)) {
       usual_s_ = dt < shortest_s ? dt : shortest_s;
@@ -176,6 +183,7 @@ class FrameInterval {
  private:
   static constexpr double factor = 3, shortest_s = 0.2;
   double last_s_ = std::numeric_limits<double>::quiet_NaN(), usual_s_ = 0;
+  double refused_s_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace CFP_ISA

@@ -13,8 +13,8 @@ namespace cfp {
 inline namespace CFP_ISA {
 
 /// Sets state.boxes: what the tracker gives of the classes that can move. A frame whose detector did not run moves the
-/// tracks and misses nothing. A time stamp that did not grow, that is not finite
-/// or that follows one that is not is reported, and the boxes stay.
+/// tracks and misses nothing. A time stamp that did not grow or is not finite is reported, and the boxes stay; so is
+/// the frame after a first one of that kind, a gap that ended the tracks, and how many detections were none.
 template <typename Scalar>
 void track_boxes(const Frame<Scalar>& frame, const FrameOptions& options, BoxTracker<Scalar>& tracker,
                  FrameState<Scalar>& state) {
@@ -31,7 +31,10 @@ void track_boxes(const Frame<Scalar>& frame, const FrameOptions& options, BoxTra
   const BoxTrackerResult<Scalar> tracked = ran ? tracker.track(*frame.detections, static_cast<Scalar>(dt), motion)
                                                : tracker.coast(static_cast<Scalar>(dt), motion);
   report.frames_since_detector = ran ? 0 : report.frames_since_detector + 1;
-  if (ran) report.frames_without_detections = frame.detections->empty() ? report.frames_without_detections + 1 : 0;
+  report.after_gap = dt > options.tracker.max_gap_s;
+  report.skipped_detections = tracked.skipped;
+  const bool blind = ran && frame.detections->size() == tracked.skipped;
+  if (ran) report.frames_without_detections = blind ? report.frames_without_detections + 1 : 0;
   std::copy_if(tracked.boxes.begin(), tracked.boxes.end(), std::back_inserter(state.boxes),
                [&](const TrackedBox<Scalar>& box) {
                  return std::any_of(options.classes.begin(), options.classes.end(),

@@ -96,6 +96,7 @@ template <typename Scalar>
 template <typename Scalar>
 [[nodiscard]] Scalar model_weight(std::size_t i, non_deduced<Scalar> map_point_probability, const FrameOptions& options,
                                   const FrameState<Scalar>& state) noexcept {
+  CFP_ASSERT(i < state.size());
   const MapPointOptions& o = options.map_point;
   if (o.weight == WeightRule::posterior) return posterior_weight(i, map_point_probability, options, state);
   const Scalar k = state.static_probability[i];
@@ -108,6 +109,7 @@ template <typename Scalar>
 template <typename Scalar>
 [[nodiscard]] Scalar keypoint_weight(std::size_t i, non_deduced<Scalar> map_point_probability,
                                      const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
+  CFP_ASSERT(i < state.size());
   return map_point_probability >= Scalar(0) && is_raised(state.label[i], state.report.health.fallback)
              ? Scalar(1)
              : model_weight(i, map_point_probability, options, state);
@@ -119,6 +121,7 @@ template <typename Scalar>
 template <typename Scalar>
 [[nodiscard]] Scalar updated_map_point(std::size_t i, non_deduced<Scalar> map_point_probability,
                                        const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
+  CFP_ASSERT(i < state.size());
   if (!(map_point_probability >= Scalar(0)) || state.label[i] == KeypointLabel::invalid) return map_point_probability;
   const bool silent =
       options.map_point.weight == WeightRule::posterior && state.box[i] != no_box && state.report.constrained == 0;

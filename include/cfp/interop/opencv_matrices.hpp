@@ -140,7 +140,9 @@ template <typename Scalar>
   for (const double value : values) {
     if (!is_finite(static_cast<Scalar>(value))) return Status::invalid_input;
   }
-  if (!(values[0] > 0 && values[1] > 0) || detail::element(camera_matrix, 0, 1) != 0) return Status::invalid_input;
+  const auto positive = [](double focal_length) { return static_cast<Scalar>(focal_length) > 0; };
+  if (!positive(values[0]) || !positive(values[1]) || detail::element(camera_matrix, 0, 1) != 0)
+    return Status::invalid_input;
   const RadialTangentialCamera<double> read{values[0], values[1], values[2], values[3], values[4],
                                             values[5], values[6], values[7], values[8]};
   camera = read.template cast<Scalar>();
