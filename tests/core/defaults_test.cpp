@@ -7,7 +7,7 @@ TEST_CASE("The defaults of the box tracker", "[core]") {
   const cfp::BoxTrackerOptions o;
   CHECK(o.restart_gate == 4);
   CHECK((o.min_iou == 0.3 && o.min_score == -1e300 && o.birth_threshold == -1e300 && o.confirm_hits == 2));
-  CHECK((o.max_coast == 6 && o.max_idle == 0 && o.coast_per_hit == 1 && o.min_visible == 0.25 && o.max_gap_s == 2));
+  CHECK((o.max_coast == 6 && o.max_idle == 30 && o.coast_per_hit == 1 && o.min_visible == 0.25 && o.max_gap_s == 2));
   CHECK((o.image_width == 0 && o.image_height == 0));
   const cfp::BoxMotionOptions& m = o.motion;
   CHECK((m.edge_noise == 0.07 && m.centre_acceleration == 1 && m.size_acceleration == 0.2));

@@ -63,6 +63,7 @@ TEST_CASE("A variant switches its own parts off and nothing else", "[frame]") {
     CHECK(o.fine.enabled == !removes);
     CHECK((o.map_point.weight == cfp::WeightRule::product) == (removes || variant == V::no_posterior));
     CHECK((o.tracker.max_coast == 0) == (variant == V::no_mdc || variant == V::only_boxes));
+    CHECK((o.tracker.max_idle == 0) == (o.tracker.max_coast == 0));
     CHECK(o.coarse.use_depth_foreground == !(variant == V::no_dbscan || variant == V::only_boxes));
     CHECK(o.coarse.soft_background == (variant != V::no_ksp));
     CHECK(o.use_boxes == (variant != V::plain));

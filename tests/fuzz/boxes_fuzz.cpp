@@ -92,7 +92,7 @@ void tracker(FuzzInput& in) {
                                   : tracker.coast(dt, moved ? &motion : nullptr);
     for (const auto& box : result.boxes) {
       CFP_PROMISE(cfp::is_proper(box.box) && std::isfinite(box.box.width()) && std::isfinite(box.box.height()));
-      CFP_PROMISE(box.id >= 1 && box.missed >= 0 && box.missed <= options.max_coast);
+      CFP_PROMISE(box.id >= 1 && box.missed >= 0 && box.missed <= (std::max)(options.max_coast, options.max_idle));
       CFP_PROMISE(box.detection < static_cast<int>(detections.size()));
       newest = (std::max)(newest, box.id);
     }

@@ -12,8 +12,7 @@ struct Miniature {
   using Frame = ::Frame;
   using Camera = cfp::PinholeCamera<float>;
   static cfp::PointSpan<float, 2> Keys(const Frame& F) {
-    if (F.mvKeysUn.empty()) return {};
-    return {&F.mvKeysUn[0].pt.x, F.mvKeysUn.size(), sizeof(KeyPoint)};
+    return {reinterpret_cast<const float*>(F.mvKeysUn.data()), F.mvKeysUn.size(), sizeof(KeyPoint)};
   }
   static cfp::DescriptorSpan Descriptors(const Frame& F) {
     return {F.mDescriptors.data(), F.mvKeysUn.size(), sizeof(Descriptor), sizeof(Descriptor)};

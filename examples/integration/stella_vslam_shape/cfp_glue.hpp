@@ -24,8 +24,8 @@ class static_weights {
     const auto& obs = frm.frm_obs_;
     cfp::Frame<float> frame;
     frame.timestamp_s = frm.timestamp_;
-    if (!obs.undist_keypts_.empty())
-      frame.keypoints = {&obs.undist_keypts_[0].pt.x, obs.undist_keypts_.size(), sizeof(obs.undist_keypts_[0])};
+    const auto* const first = reinterpret_cast<const float*>(obs.undist_keypts_.data());
+    frame.keypoints = {first, obs.undist_keypts_.size(), sizeof(obs.undist_keypts_[0])};
     frame.depths = obs.depths_;
     frame.flow = flow;
     if (detections) frame.detections = *detections;

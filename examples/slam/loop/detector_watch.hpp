@@ -25,7 +25,7 @@ class DetectorWatch {
                                                                  const cfp::FrameState<float>& before,
                                                                  FrameRecord& record) {
     cfp::DetectorStatus status = health_.update(detections);
-    const bool left = before.boxes.empty() && int(before.report.frames_since_detector) < options_.max_idle;
+    const bool left = before.boxes.empty() && int(before.report.frames_since_detector) < carried_on_;
     if (status == cfp::DetectorStatus::silent && left) {
       health_.reset();
       status = cfp::DetectorStatus::ok;
@@ -51,6 +51,7 @@ class DetectorWatch {
 
  private:
   Options options_;
+  int carried_on_ = cfp::BoxTrackerOptions().max_idle;  // frames
   cfp::DetectorHealth<float> health_;
   cfp::DetectorLag<float> lag_;
   bool ok_ = true;

@@ -30,7 +30,6 @@ struct Options {
   cfp::PoseHealthOptions first_health{10, 0.3, 0, 0.1, 0.05}, health, relocalised_health{30, 0.4, 0.1, 0.02, 0.02};
   cfp::DetectorHealthOptions detector_health;
   cfp::DetectorLagOptions detector_lag;
-  int max_idle = 30;              // frames over which boxes are carried on while the detector is not believed
   double new_map_after_s = 1;     // of being lost
   double unproven_share = 0.01;   // in the pose: weight of what fewer than two keyframes saw, relative to all else
   double min_known_share = 0.05;  // of the proven points that should be in view: fewer found, and it is not there

@@ -11,7 +11,6 @@ namespace cfp_slam {
 Options fitted(Options options, const FrameSource& source, const cfp_examples::Detector& detector) {
   cfp::FrameOptions& probability = options.probability;
   probability = cfp::variant_options(options.variant, probability);
-  if (probability.tracker.max_coast > 0) probability.tracker.max_idle = options.max_idle;
   probability.coarse.flow.ransac.seed = options.seed;
   probability.classes = {{detector.class_of("person"), true}};  // -1: nothing that it finds can move
   cfp::validate(probability);

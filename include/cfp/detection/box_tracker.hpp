@@ -48,9 +48,9 @@ class BoxTracker {
     return result;
   }
 
-  /// A frame on which the detector did not run: nothing was missed, so all tracks live on, but what is output as
-  /// compensated are confirmed ones, up to max_coast (or max_idle) frames after their last detection. For a detector
-  /// that runs on every n-th frame only.
+  /// A frame on which the detector did not run: nothing was missed, so all tracks live on, those of one detection, too,
+  /// and are output as compensated up to max_idle (or max_coast) frames after their last one. For a detector that runs
+  /// on every n-th frame only.
   BoxTrackerResult<Scalar> coast(Scalar dt_s, const Matrix3<Scalar>* image_motion = nullptr) {
     BoxTrackerResult<Scalar> result = advance(dt_s, image_motion);
     output(result, false);
@@ -183,7 +183,7 @@ class BoxTracker {
         const bool trusted = confirmed && track.missed <= options_.coast_per_hit * track.hits;
         if ((detector_ran && (track.missed > longest || !trusted)) || !clip_to_image(track.box)) continue;
       }
-      const bool shown = !track.compensated() || (confirmed && track.missed <= longest);
+      const bool shown = !track.compensated() || ((confirmed || !detector_ran) && track.missed <= longest);
       if (shown) {
         track.associated = track.shown;
         track.rate_x = track.filter.u.rate;

@@ -46,11 +46,11 @@ struct BoxTrackerOptions {
   double min_score = -1e300;  ///< detections below are ignored
   /// detections below extend a track but start none (and are not output when they extend none)
   double birth_threshold = -1e300;
-  int confirm_hits = 2;  ///< detections before a track may be compensated, >= 1
+  int confirm_hits = 2;  ///< detections before a missed one may be compensated, >= 1
   int max_coast = 6;     ///< missed frames in a row that are compensated, >= 0 (the paper's figure shows six)
-  /// the same while the detector does not run; counts where it is more than max_coast, >= 0. Longer a track goes on
-  /// without a box, until the detector runs
-  int max_idle = 0;
+  /// the same while the detector does not run, for tracks of one detection, too; counts where it is more than
+  /// max_coast, >= 0. Longer a track goes on without a box, until the detector runs (cfp_posterior_study)
+  int max_idle = 30;
   /// where the detector runs, at most this many missed frames per detection so far, > 0 (1: no longer than it was seen)
   double coast_per_hit = 1.0;
   double min_visible = 0.25;  ///< a compensated box with a smaller share of its area in the image is dropped, in [0, 1]

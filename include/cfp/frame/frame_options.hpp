@@ -152,7 +152,7 @@ inline namespace CFP_ISA {
     base.fine.enabled = base.fine.enabled && !removes;
   }
   if (removes || variant == Variant::no_posterior) base.map_point.weight = WeightRule::product;
-  if (variant == Variant::no_mdc || variant == Variant::only_boxes) base.tracker.max_coast = 0;
+  if (variant == Variant::no_mdc || variant == Variant::only_boxes) base.tracker.max_coast = base.tracker.max_idle = 0;
   if (variant == Variant::no_dbscan || variant == Variant::only_boxes) base.coarse.use_depth_foreground = false;
   if (variant == Variant::no_ksp) base.coarse.soft_background = false;
   if (variant == Variant::plain) base.use_boxes = false;
