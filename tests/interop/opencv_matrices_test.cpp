@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -195,4 +196,22 @@ TEMPLATE_TEST_CASE("A camera from OpenCV's matrices projects as they say", "[int
   CHECK(refused(K, cv::Mat::zeros(1, 8, CV_64F)));
   CHECK(refused(K, cv::Mat::zeros(1, 5, CV_8U)));
   CHECK(refused(K, cv::Mat::ones(1, 5, CV_64F) * std::numeric_limits<double>::quiet_NaN()));
+}
+
+TEST_CASE("A matrix of no camera is refused: transposed, scaled, or not finite where no camera parameter stands",
+          "[interop]") {
+  const cv::Mat K = (cv::Mat_<double>(3, 3) << 535.4, 0, 320.1, 0, 539.2, 247.6, 0, 0, 1);
+  cfp::RadialTangentialCamera<double> camera;
+  CHECK(cfp::to_camera(cv::Mat(K.t()), {}, camera) == cfp::Status::invalid_input);
+  CHECK(cfp::to_camera(cv::Mat(2 * K), {}, camera) == cfp::Status::invalid_input);
+  for (const auto& [row, column] :
+       {std::pair(0, 1), std::pair(1, 0), std::pair(2, 0), std::pair(2, 1), std::pair(2, 2)}) {
+    for (const double wrong : {0.5, std::numeric_limits<double>::quiet_NaN()}) {
+      cv::Mat matrix = K.clone();
+      matrix.at<double>(row, column) = wrong;
+      CAPTURE(row, column, wrong);
+      CHECK(cfp::to_camera(matrix, {}, camera) == cfp::Status::invalid_input);
+    }
+  }
+  CHECK(cfp::to_camera(K, {}, camera) == cfp::Status::ok);
 }

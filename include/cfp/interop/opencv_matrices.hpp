@@ -121,7 +121,8 @@ Status to_se3(const cv::Mat& matrix, SE3<Scalar>& pose) noexcept {
 
 /// A camera from OpenCV's matrices, CV_32F or CV_64F: the 3x3 camera matrix, and k1, k2, p1, p2 or k1, k2, p1, p2, k3
 /// as a row or a column (empty: no distortion). invalid_input, and camera untouched: another size or type, a skew, a
-/// focal length that is not positive, an element that is not finite. For images without distortion: camera.pinhole().
+/// last row but (0, 0, 1), a focal length that is not positive, an element that is not finite. For images without
+/// distortion: camera.pinhole().
 template <typename Scalar>
 [[nodiscard]] Status to_camera(const cv::Mat& camera_matrix, const cv::Mat& distortion,
                                RadialTangentialCamera<Scalar>& camera) noexcept {
@@ -141,7 +142,9 @@ template <typename Scalar>
     if (!is_finite(static_cast<Scalar>(value))) return Status::invalid_input;
   }
   const auto positive = [](double focal_length) { return static_cast<Scalar>(focal_length) > 0; };
-  if (!positive(values[0]) || !positive(values[1]) || detail::element(camera_matrix, 0, 1) != 0)
+  const auto zero = [&](int row, int column) { return detail::element(camera_matrix, row, column) == 0; };
+  if (!positive(values[0]) || !positive(values[1]) || !zero(0, 1) || !zero(1, 0) || !zero(2, 0) || !zero(2, 1) ||
+      detail::element(camera_matrix, 2, 2) != 1)
     return Status::invalid_input;
   const RadialTangentialCamera<double> read{values[0], values[1], values[2], values[3], values[4],
                                             values[5], values[6], values[7], values[8]};
