@@ -208,6 +208,18 @@ TEST_CASE("Coverage tells of lost frames, gaps and late starts", "[evaluation]")
   CHECK_THAT(shifted.largest_stamp_difference_s, WithinAbs(0.004, 1e-12));
 }
 
+TEST_CASE("Coverage and errors are in the estimate's order where matched pairs cross", "[evaluation]") {
+  Trajectory<double> truth(3), estimate(3);
+  const double truth_s[] = {0.5, 1.005, 1.009}, estimate_s[] = {0.5, 1.0, 1.004};  // 1.005 takes 1.004
+  for (std::size_t k = 0; k < 3; ++k) truth[k].time_s = truth_s[k], estimate[k].time_s = estimate_s[k];
+  const auto result = cfp::absolute_trajectory_error(truth, estimate);
+  CHECK(result.errors.pose == std::vector<std::size_t>{0, 1, 2});
+  CHECK_THAT(result.coverage.time_fraction, WithinAbs(0.504 / 0.509, 1e-12));
+  CHECK_THAT(result.coverage.largest_stamp_difference_s, WithinAbs(0.009, 1e-12));
+  estimate.erase(estimate.begin());
+  CHECK_THAT(cfp::absolute_trajectory_error(truth, estimate).coverage.largest_gap_s, WithinAbs(0.004, 1e-12));
+}
+
 TEMPLATE_TEST_CASE("Hostile trajectories and options give finite results and a status", "[evaluation]", float, double) {
   constexpr TestType nan = std::numeric_limits<TestType>::quiet_NaN(), huge = (std::numeric_limits<TestType>::max)();
   Trajectory<TestType> none, one(1), far(4), broken(3);

@@ -82,8 +82,8 @@ template <typename Poses>
 
 /// One-to-one association as in the TUM script associate.py: the pair of free stamps with the smallest |first − (second
 /// + offset)| is matched first, ties go to the earlier first stamp and then to the earlier second one, until no pair
-/// differs by less than max_difference_s. Matches come in order of time. O(n log n) in the poses and in the pairs that
-/// differ by less than max_difference_s.
+/// differs by less than max_difference_s. Matches come in order of the first stamp. O(n log n) in the poses and in the
+/// pairs that differ by less than max_difference_s.
 template <typename First, typename Second>
 [[nodiscard]] std::vector<TimeMatch> associate(const First& first, const Second& second,
                                                const AssociationOptions& options = {}) {
@@ -109,9 +109,9 @@ template <typename First, typename Second>
   return matches;
 }
 
-/// Coverage of the matches (first = truth, second = estimate), which are in order of time. expected_poses 0 stands for
-/// all usable estimated poses. Without a match all fractions and times are 0; times saturate at the largest double.
-/// O(n log n).
+/// Coverage of the matches (first = truth, second = estimate), which are in order of the estimate's stamps.
+/// expected_poses 0 stands for all usable estimated poses. Without a match all fractions and times are 0; times
+/// saturate at the largest double. O(n log n).
 template <typename Truth, typename Estimate>
 [[nodiscard]] TrajectoryCoverage trajectory_coverage(const Truth& truth, const Estimate& estimate,
                                                      const std::vector<TimeMatch>& matches, std::size_t expected_poses,

@@ -5,6 +5,7 @@
 /// are named below. Both functions take unsorted trajectories with duplicates and broken poses (see time_order).
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -44,8 +45,8 @@ struct TrajectoryErrorResult {
 };
 
 /// translation_m: |t_truth − S t_estimate| after alignment; the field's "ATE" is its rmse. rotation_deg: angle of
-/// R_truthᵀ S.R R_estimate; not in the TUM script. degenerate: the matched poses do not fix the alignment's rotation;
-/// errors valid.
+/// R_truthᵀ S.R R_estimate; not in the TUM script. degenerate: the matched poses do not fix the alignment's rotation
+/// (one pose, one place, a straight line), and rotation_deg can be anything; translation_m is valid.
 struct AbsoluteErrorResult : TrajectoryErrorResult {
   Similarity S_truth_estimate;  ///< the alignment
   AlignmentMode alignment = AlignmentMode::rigid;
@@ -99,7 +100,11 @@ template <typename Truth, typename Estimate>
     result.status = Status::invalid_input;
     return result;
   }
-  const std::vector<TimeMatch> matches = associate(truth, estimate, options.association);
+  std::vector<TimeMatch> matches = associate(truth, estimate, options.association);
+  // In order of the truth so far; where frames are lost, pairs of fast trajectories may cross.
+  std::sort(matches.begin(), matches.end(), [&](const TimeMatch& a, const TimeMatch& b) {
+    return estimate[a.second].time_s < estimate[b.second].time_s;
+  });
   std::vector<Vector3<double>> truth_points, estimate_points;
   for (const TimeMatch& m : matches) {
     truth_points.push_back(truth[m.first].T_world_cam.translation.template cast<double>());
