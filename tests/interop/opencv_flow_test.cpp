@@ -245,3 +245,18 @@ TEST_CASE("The caller's image may be overwritten between the calls", "[flow]") {
   REQUIRE(own.current().size() > 100);
   CHECK((own.previous() == shared.previous() && own.current() == shared.current()));
 }
+
+TEST_CASE("A part of a larger image gives the pairs of its copy", "[flow]") {
+  const cv::Mat image = texture();
+  const cv::Rect part(40, 30, 200, 150);
+  cfp::OpticalFlowTracker of_part, of_copy;
+  for (const double shift : {0.0, 2.5}) {
+    cv::Mat whole(image.size(), CV_8UC1, cv::Scalar(shift > 0 ? 255 : 0));  // what lies around changes
+    moved(image, shift, 0)(part).copyTo(whole(part));
+    of_part.track(whole(part), {}, {});
+    of_copy.track(whole(part).clone(), {}, {});
+  }
+  CHECK(of_part.previous().size() > 100);
+  CHECK(of_part.previous() == of_copy.previous());
+  CHECK(of_part.current() == of_copy.current());
+}

@@ -72,9 +72,11 @@ class OpticalFlowTracker {
     to_.clear();
     if (gray.empty()) return reset();
     const cv::Size window(options_.window, options_.window);
-    // A copy of the image (the last argument): the caller may overwrite it before the next call.
-    const int top = cv::buildOpticalFlowPyramid(gray, pyramid_, window, options_.levels - 1, true,
-                                                cv::BORDER_REFLECT_101, cv::BORDER_CONSTANT, false);
+    // A copy of the image (the last argument): the caller may overwrite it before the next call. Isolated: what lies
+    // around a part of a larger image is not read.
+    const int border = cv::BORDER_REFLECT_101 | cv::BORDER_ISOLATED;
+    const int top = cv::buildOpticalFlowPyramid(gray, pyramid_, window, options_.levels - 1, true, border,
+                                                cv::BORDER_CONSTANT, false);
     if (first) return;
     choose(keypoints, boxes, gray.size());
     find_corners(room);
