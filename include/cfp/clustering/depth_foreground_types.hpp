@@ -15,7 +15,7 @@ namespace cfp {
 template <typename Scalar>
 struct ForegroundInput {
   span<const Scalar> depths_m;  ///< not positive or not finite: no depth there
-  PointSpan<Scalar, 2> pixels;  ///< one per depth, px; empty: unknown. Of use only with `box`.
+  PointSpan<Scalar, 2> pixels;  ///< one per depth, px, finite; empty: unknown. Of use only with `box`.
   Box<Scalar> box;              ///< px; improper: unknown
   Scalar previous_depth_m{};    ///< `depth_m` of the same object's result in the frame before; not positive: unknown
 };

@@ -33,7 +33,7 @@ class Random {
   }
   /// Uniform in [0, 1), 53 random bits.
   [[nodiscard]] constexpr double uniform() noexcept { return static_cast<double>((*this)() >> 11U) * 0x1.0p-53; }
-  /// Uniform in [low, high).
+  /// Uniform in [low, high); high itself by rounding alone.
   [[nodiscard]] constexpr double uniform(double low, double high) noexcept { return low + (high - low) * uniform(); }
   /// Uniform in {0, …, n − 1}, n in [1, 2^32); the bias is below n / 2^32.
   [[nodiscard]] constexpr std::uint32_t index(std::uint32_t n) noexcept {

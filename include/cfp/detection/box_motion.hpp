@@ -188,7 +188,7 @@ template <typename Scalar>
 /// the mapped inscribed ellipse, w' = |(J00 w, J01 h)|, so that small rotations there and back do not inflate a box
 /// (bounding the corners does). The variances of the centre follow J; its cross terms between u and v are dropped, as
 /// the split form needs. Returns false, and leaves the filter, when H is not finite, the centre falls behind the
-/// camera, or a size leaves the limits.
+/// camera, or the centre or a size leaves the limits of predict_box.
 template <typename Scalar>
 [[nodiscard]] bool warp_box(BoxFilter<Scalar>& filter, const Matrix3<Scalar>& H) noexcept {
   const Scalar u = filter.u.value, v = filter.v.value;

@@ -38,8 +38,8 @@ template <typename Scalar>
   return density;
 }
 
-/// Q(x; k) = Γ(k/2, x/2) / Γ(k/2): the probability of a value above x. 1 for x <= 0, 0 at +inf, non-increasing;
-/// erfc(sqrt(x/2)) for k = 1, exp(-x/2) for k = 2, and two more degrees of freedom add twice their density.
+/// Q(x; k) = Γ(k/2, x/2) / Γ(k/2): the probability of a value above x. 1 for x <= 0, 0 at +inf, non-increasing but for
+/// rounding; erfc(sqrt(x/2)) for k = 1, exp(-x/2) for k = 2, and two more degrees of freedom add twice their density.
 template <typename Scalar>
 [[nodiscard]] Scalar chi_squared_survival(const Scalar& x, int k) noexcept {
   using std::erfc;

@@ -10,7 +10,8 @@ namespace cfp {
 inline namespace CFP_ISA {
 
 /// The real root of x^3 + a x^2 + b x + c farthest from the other two: never a double one, and exact to rounding unless
-/// all three coincide. NaN when a coefficient is, any value when their cubes overflow.
+/// all three coincide. Any value when a coefficient is not finite or their cubes overflow, and a rough one where the
+/// sixth power of the root underflows.
 template <typename Scalar>
 [[nodiscard]] Scalar isolated_cubic_root(Scalar a, Scalar b, Scalar c) noexcept {
   // x = t - a / 3: t^3 - 3 q t + 2 r = 0. The root sought lies beyond both turning points, t = +-sqrt(q), on the side
@@ -41,7 +42,7 @@ template <typename Scalar>
 }
 
 /// Real roots of x^3 + a x^2 + b x + c in roots[0 .. count), the isolated one first; returns the count, 1 or 3 (a
-/// double root counts twice), or 0 when a coefficient is not finite or the roots over- or underflow. The other two come
+/// double root counts twice), or 0 when a coefficient is not finite or their cubes overflow. The other two come
 /// from the quadratic that is left, then a Newton step on the cubic itself; a root at distance d from the next is exact
 /// to rounding / d. Allocates nothing.
 template <typename Scalar>

@@ -16,7 +16,7 @@ template <typename Scalar>
 
 /// K_D, the factor for a background keypoint (paper eq. K^D): (1 - O_Th) / O_Th^4 * K^3 + 1 for O <= O_Th, else 1 / K.
 /// With K = O, K K_D is in [O, 1], non-decreasing in O, and continuous at O_Th, where it is 1. K = 0 in the second
-/// branch (no object with O > O_Th > 0 starts there) gives 1, so that the factor is always finite. O_Th in (0, 1).
+/// branch (no object with O > O_Th > 0 starts there) gives 1; a denormal K overflows there. O_Th in (0, 1).
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar background_factor(Scalar keypoint_probability, Scalar object_probability,
                                                  Scalar object_threshold) noexcept {
