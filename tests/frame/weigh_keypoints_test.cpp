@@ -217,7 +217,7 @@ TEST_CASE("What its depth puts on a person who moves is not at rest where the fl
   run.coarse(options, frame, run.scene.camera);
   std::size_t seen = 0;
   for (std::size_t i = 0; i < run.m.size(); ++i) {
-    if (!cfp::is_placed(i, run.state)) continue;
+    if (!cfp::is_placed(i, options, run.state)) continue;
     auto& object = run.state.objects[static_cast<std::size_t>(run.state.box[i])];
     REQUIRE(object.static_probability < 0.5);
     CHECK(cfp::explain(i, 0.98, options, run.state).placed);
@@ -230,6 +230,11 @@ TEST_CASE("What its depth puts on a person who moves is not at rest where the fl
     const double depth = std::exchange(run.state.current.depths[i], 0.0);
     CHECK_THAT(cfp::model_weight(i, 0.98, options, run.state), WithinAbs(0.98, 1e-9));
     run.state.current.depths[i] = depth;
+    auto rigid = options, unseparated = options;  // all in the box is foreground, the wall, too
+    rigid.classes = {{0, false}};
+    unseparated.coarse.use_depth_foreground = false;
+    CHECK_FALSE(cfp::is_placed(i, rigid, run.state));
+    CHECK_FALSE(cfp::is_placed(i, unseparated, run.state));
     ++seen;
   }
   CHECK(seen > 100);

@@ -99,7 +99,7 @@ template <typename Scalar>
   e.match = state.match[i];
   e.coarse_probability = e.label == KeypointLabel::invalid ? 0 : 1;
   e.flow_probability = static_cast<double>(state.flow_probability[i]);
-  e.placed = is_placed(i, state);
+  e.placed = is_placed(i, options, state);
   if (e.box != no_box) {
     const auto b = static_cast<std::size_t>(e.box);
     const bool foreground = e.label == KeypointLabel::foreground;

@@ -8,6 +8,7 @@
 #include "cfp/core/span.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
+#include "cfp/frame/object_members_impl.hpp"
 #include "cfp/probability/first_stage_probability.hpp"
 #include "cfp/probability/map_point.hpp"
 #include "cfp/probability/second_stage_probability.hpp"
@@ -33,13 +34,14 @@ template <typename Scalar>
   return state.label[i] == KeypointLabel::foreground || is_unreported(i, state);
 }
 
-/// Whether its depth puts keypoint i on an object of known O. Without depths the wall in a box counts as foreground,
-/// too.
+/// Whether its depth puts keypoint i on an object of known O. Without depths, and in boxes of rigid classes, the wall
+/// counts as foreground, too.
 template <typename Scalar>
-[[nodiscard]] bool is_placed(std::size_t i, const FrameState<Scalar>& state) noexcept {
-  return state.label[i] == KeypointLabel::foreground && i < state.current.depths.size() &&
-         is_valid_depth(state.current.depths[i]) &&
-         state.objects[static_cast<std::size_t>(state.box[i])].status == Status::ok;
+[[nodiscard]] bool is_placed(std::size_t i, const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
+  if (state.label[i] != KeypointLabel::foreground || i >= state.current.depths.size()) return false;
+  const auto b = static_cast<std::size_t>(state.box[i]);
+  return detail::is_told_by_depth(state.boxes[b], options) && is_valid_depth(state.current.depths[i]) &&
+         state.objects[b].status == Status::ok;
 }
 
 /// E of keypoint i: first_stage_evidence of the flow at its place and of its object; 1/2 on none.
@@ -50,7 +52,7 @@ template <typename Scalar>
       state.box[i] != no_box ? state.objects[static_cast<std::size_t>(state.box[i])].static_probability : 1;
   return static_cast<Scalar>(first_stage_evidence(static_cast<double>(state.flow_probability[i]), o,
                                                   state.label[i] == KeypointLabel::foreground, options.object_threshold,
-                                                  is_placed(i, state)));
+                                                  is_placed(i, options, state)));
 }
 
 /// M of a map point of which nothing is known when keypoint i observes it: 1 outside all boxes where nothing moves and
