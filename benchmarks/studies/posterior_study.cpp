@@ -329,6 +329,15 @@ std::vector<Rule> rules() {
       }).detector_every = every;
     }
   }
+  const auto unreported = [&](const std::string& name, double radius_px, double depth_share) {
+    add("30th, " + name, [&](auto& o) {
+      o.coarse.unreported.radius_px = radius_px, o.coarse.unreported.depth_share = depth_share;
+    }).detector_every = 30;
+  };
+  const cfp::UnreportedOptions chosen;
+  for (const int radius_px : {0, 30, 90})
+    unreported("unrep. " + std::to_string(radius_px) + " px", radius_px, chosen.depth_share);
+  unreported("any depth", chosen.radius_px, 100);
   const auto vary = [&](const char* name, std::initializer_list<double> values, double cfp::MapPointOptions::*field) {
     for (const double value : values) {
       char text[32];

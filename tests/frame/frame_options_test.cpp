@@ -16,7 +16,8 @@ TEST_CASE("Frame options outside their range are named by their whole path", "[f
   CHECK(named([](auto& o) { o.coarse.flow.ransac.confidence = 2; }) == "coarse.flow.ransac.confidence");
   CHECK(named([](auto& o) { o.coarse.flow_radius_px = -1; }) == "coarse.flow_radius_px");
   CHECK(named([](auto& o) { o.coarse.unreported.radius_px = -1; }) == "coarse.unreported.radius_px");
-  CHECK(named([](auto& o) { o.coarse.unreported.min_pairs = 0; }) == "coarse.unreported.min_pairs");
+  CHECK(named([](auto& o) { o.coarse.unreported.depth_share = -1; }) == "coarse.unreported.depth_share");
+  CHECK(named([](auto& o) { o.coarse.unreported.pairs = 0; }) == "coarse.unreported.pairs");
   CHECK(named([](auto& o) { o.coarse.unreported.max_share = 1.1; }) == "coarse.unreported.max_share");
   CHECK(named([](auto& o) { o.coarse.flow.motion.search_above_px = 0; }) == "coarse.flow.motion.search_above_px");
   CHECK(named([](auto& o) { o.coarse.flow.motion.shared_depth_ratio = -1; }) ==

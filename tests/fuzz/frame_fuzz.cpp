@@ -56,6 +56,7 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
                        &options.min_inlier_weight,
                        &options.coarse.flow_radius_px,
                        &options.coarse.unreported.radius_px,
+                       &options.coarse.unreported.depth_share,
                        &options.coarse.unreported.max_share,
                        &flow.camera_acceleration_m_s2,
                        &flow.motion.search_above_px,

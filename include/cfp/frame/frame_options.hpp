@@ -23,12 +23,16 @@ struct ObjectClass {
   bool non_rigid = true;  ///< people, animals: told from the background by depth; rigid: all inside is foreground
 };
 
-/// What moves and no detector reports. WeightRule::posterior: a keypoint in no box counts as on a moving object where
-/// most flow pairs around it move. Not in the paper, for which all outside of boxes is static.
+/// What moves and no detector reports. WeightRule::posterior: a keypoint in no box counts as on a moving object where,
+/// of the flow pairs on no object near it and at its depth, `pairs` that move are nearer than as many that rest.
+/// Without depths all near are asked. Not in the paper, for which all outside of boxes is static.
 struct UnreportedOptions {
-  double radius_px = 30;      ///< around the keypoint, >= 0; 0: nothing of this
-  std::size_t min_pairs = 6;  ///< there, on no object, >= 1
-  double max_share = 0.4;     ///< of all pairs on no object: if more move, nothing is said of any, in [0, 1]
+  double radius_px = 60;     ///< around the keypoint, >= 0; 0: nothing of this
+  double depth_share = 0.1;  ///< of the keypoint's depth: a pair farther from it in depth is not asked, >= 0
+  std::size_t pairs = 3;     ///< that move, >= 1
+  /// Of the pairs on no object, and of the keypoints: if more move, or half as many that lie farther than the rest,
+  /// nothing is said of any, since it may as well be the room behind something large. In [0, 1].
+  double max_share = 0.4;
 };
 
 /// The paper's first stage: objects and depth (sections IV-B and IV-C).
@@ -88,7 +92,8 @@ inline namespace CFP_ISA {
 
 [[nodiscard]] constexpr OptionPath invalid_field(const UnreportedOptions& o) noexcept {
   if (!detail::non_negative(o.radius_px)) return "radius_px";
-  if (o.min_pairs < 1) return "min_pairs";
+  if (!detail::non_negative(o.depth_share)) return "depth_share";
+  if (o.pairs < 1) return "pairs";
   return o.max_share >= 0 && o.max_share <= 1 ? OptionPath() : "max_share";
 }
 

@@ -10,6 +10,7 @@
 #include "cfp/frame/frame_state.hpp"
 #include "cfp/frame/object_members_impl.hpp"
 #include "cfp/frame/point_grid_impl.hpp"
+#include "cfp/frame/unreported_impl.hpp"
 #include "cfp/probability/first_stage_probability.hpp"
 
 namespace cfp {
@@ -40,52 +41,6 @@ void score_flow_at_keypoints(const Frame<Scalar>& frame, const FrameOptions& opt
       return false;
     });
     if (has_distance(distance)) state.flow_probability[i] = object_score(distance, scored);
-  }
-}
-
-/// Sets state.flow_probability of the keypoints on no object around which the flow moves: the median score of the pairs
-/// on no object nearby, as of an object that nobody reported. Of all others it stays as it is.
-template <typename Scalar>
-void score_flow_outside(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
-  const UnreportedOptions& unreported = options.coarse.unreported;
-  const Scalar radius_px = static_cast<Scalar>(unreported.radius_px), radius_sq = radius_px * radius_px;
-  if (!looks_for_unreported(options) || state.flow_distances.empty()) return;
-  const ObjectProbabilityOptions scored = scaled_to_flow(options.coarse.object, state.report);
-  const Scalar threshold = static_cast<Scalar>(options.object_threshold);
-  FrameScratch<Scalar>& scratch = state.scratch;
-  scratch.points.clear();  // of the pairs on no object; those that move come first
-  scratch.samples.clear();
-  std::size_t moving = 0;
-  for (std::size_t p = 0; p < frame.flow.current.size(); ++p) {
-    if (scratch.outside[p] == 0 || !has_distance(state.flow_distances[p])) continue;
-    scratch.points.push_back({frame.flow.current(p, 0), frame.flow.current(p, 1)});
-    scratch.samples.push_back(object_score(state.flow_distances[p], scored));
-    if (!(scratch.samples.back() < threshold)) continue;
-    std::swap(scratch.points.back(), scratch.points[moving]);
-    std::swap(scratch.samples.back(), scratch.samples[moving++]);
-  }
-  // Too many: what moves may as well be the camera.
-  if (static_cast<double>(moving) > unreported.max_share * static_cast<double>(scratch.points.size())) return;
-  const auto moving_end = scratch.points.begin() + static_cast<std::ptrdiff_t>(moving);
-  for (std::size_t i = 0; i < state.size(); ++i) {
-    if (state.label[i] != KeypointLabel::outside) continue;
-    const auto is_near = [&, x = state.current.keypoints[i][0],
-                          y = state.current.keypoints[i][1]](const std::array<Scalar, 2>& point) {
-      const Scalar dx = point[0] - x, dy = point[1] - y;
-      return dx * dx + dy * dy < radius_sq;
-    };
-    const auto moving_near = static_cast<std::size_t>(std::count_if(scratch.points.begin(), moving_end, is_near));
-    if (2 * moving_near < unreported.min_pairs) continue;
-    scratch.scratch.clear();  // scores nearby
-    for (std::size_t p = 0; p < scratch.points.size(); ++p) {
-      if (is_near(scratch.points[p])) scratch.scratch.push_back(scratch.samples[p]);
-    }
-    const std::size_t n = scratch.scratch.size();
-    if (n < unreported.min_pairs) continue;
-    const Scalar median = order_statistic(span<Scalar>(scratch.scratch), n / 2);
-    if (!(median < threshold)) continue;
-    state.flow_probability[i] = median;
-    ++state.report.unreported;
   }
 }
 
@@ -158,7 +113,7 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
   }
   report.stray_labels = detail::stray_labels(frame, state);
   detail::score_flow_at_keypoints(frame, options, state);
-  detail::score_flow_outside(frame, options, state);
+  detail::score_flow_outside(frame.flow, options, state);
   const auto count = [&](KeypointLabel label) {
     return static_cast<std::size_t>(std::count(state.label.begin(), state.label.end(), label));
   };

@@ -1,0 +1,123 @@
+/// @file unreported_impl.hpp
+/// The search for what moves and no detector reports, by the flow outside of objects: UnreportedOptions. Not an
+/// interface.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "cfp/core/numeric.hpp"
+#include "cfp/frame/frame_options.hpp"
+#include "cfp/frame/frame_state.hpp"
+#include "cfp/frame/point_grid_impl.hpp"
+#include "cfp/math/order_statistic.hpp"
+#include "cfp/probability/object.hpp"
+
+namespace cfp::detail {
+inline namespace CFP_ISA {
+
+/// Puts the flow pairs on no object into scratch.grid, their scores into scratch.samples (of others: -1). Whether few
+/// enough of them move that this is not the camera.
+template <typename Scalar>
+[[nodiscard]] bool gather_pairs_outside(const FlowPairs<Scalar>& flow, const FrameOptions& options,
+                                        FrameState<Scalar>& state) {
+  const UnreportedOptions& unreported = options.coarse.unreported;
+  const ObjectProbabilityOptions scored = scaled_to_flow(options.coarse.object, state.report);
+  FrameScratch<Scalar>& scratch = state.scratch;
+  scratch.samples.assign(flow.current.size(), Scalar(-1));
+  std::size_t moving = 0, all = 0;
+  for (std::size_t p = 0; p < scratch.samples.size(); ++p) {
+    if (scratch.outside[p] == 0 || !has_distance(state.flow_distances[p])) continue;
+    scratch.samples[p] = object_score(state.flow_distances[p], scored);
+    moving += scratch.samples[p] < static_cast<Scalar>(options.object_threshold) ? 1U : 0U;
+    ++all;
+  }
+  if (moving < unreported.pairs || static_cast<double>(moving) > unreported.max_share * static_cast<double>(all))
+    return false;
+  const auto is_scored = [&](std::size_t p) { return scratch.samples[p] >= 0; };
+  fill_grid(flow.current, is_scored, static_cast<Scalar>(unreported.radius_px), scratch.grid);
+  return true;
+}
+
+/// Of the pairs near keypoint i, at its depth where both have one: the median score of the nearest `pairs` that move,
+/// if these are nearer than as many that rest; -1 if not.
+template <typename Scalar>
+[[nodiscard]] Scalar score_moving_near(std::size_t i, const FlowPairs<Scalar>& flow, const FrameOptions& options,
+                                       FrameState<Scalar>& state) {
+  const UnreportedOptions& unreported = options.coarse.unreported;
+  const Scalar threshold = static_cast<Scalar>(options.object_threshold);
+  const Scalar radius_px = static_cast<Scalar>(unreported.radius_px);
+  const Scalar x = state.current.keypoints[i][0], y = state.current.keypoints[i][1];
+  const Scalar depth = state.current.depths.empty() ? Scalar(0) : state.current.depths[i];
+  const Scalar reach = static_cast<Scalar>(unreported.depth_share) * depth;
+  const bool by_depth = is_valid_depth(depth) && !flow.previous_depths.empty();
+  FrameScratch<Scalar>& scratch = state.scratch;
+  auto& near = scratch.points;  // squared distance and score
+  near.clear();
+  visit_near(scratch.grid, x, y, [&](const auto& pair) {
+    const Scalar apart_sq = (pair.x - x) * (pair.x - x) + (pair.y - y) * (pair.y - y);
+    const bool elsewhere = by_depth && is_valid_depth(flow.previous_depths[pair.index]) &&
+                           std::abs(flow.previous_depths[pair.index] - depth) > reach;
+    if (apart_sq < radius_px * radius_px && !elsewhere) near.push_back({apart_sq, scratch.samples[pair.index]});
+    return false;
+  });
+  // The nearest 2 n - 1 hold n that move, or n that rest.
+  const std::size_t decide = (std::min)(near.size(), 2 * unreported.pairs - 1);
+  std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(decide), near.end());
+  scratch.scratch.clear();
+  for (std::size_t k = 0; k < decide && scratch.scratch.size() < unreported.pairs; ++k) {
+    if (near[k][1] < threshold) scratch.scratch.push_back(near[k][1]);
+  }
+  if (scratch.scratch.size() < unreported.pairs) return Scalar(-1);
+  return order_statistic(span<Scalar>(scratch.scratch), quantile_rank(0.5, unreported.pairs) - 1);
+}
+
+/// Median depth of the keypoints on no object of which the flow says that they move, or of the others; 0: unknown.
+template <typename Scalar>
+[[nodiscard]] Scalar median_depth_outside(bool moving, FrameState<Scalar>& state) {
+  std::vector<Scalar>& depths = state.scratch.depths;
+  depths.clear();
+  for (std::size_t i = 0; i < state.current.depths.size(); ++i) {
+    if (state.label[i] == KeypointLabel::outside && (state.flow_probability[i] >= 0) == moving &&
+        is_valid_depth(state.current.depths[i]))
+      depths.push_back(state.current.depths[i]);
+  }
+  return depths.empty() ? Scalar(0) : order_statistic(span<Scalar>(depths), quantile_rank(0.5, depths.size()) - 1);
+}
+
+/// Whether what would count as moving may be something that nobody reported: not where it holds too many of the
+/// keypoints, nor where it holds half as many and is what lies farther, as a room behind a board that carries the
+/// motion with it.
+template <typename Scalar>
+[[nodiscard]] bool is_credible(std::size_t moving, std::size_t all, const UnreportedOptions& options,
+                               FrameState<Scalar>& state) {
+  const double most = options.max_share * static_cast<double>(all);
+  if (static_cast<double>(2 * moving) <= most) return true;
+  return static_cast<double>(moving) <= most && median_depth_outside(true, state) <= median_depth_outside(false, state);
+}
+
+/// Sets state.flow_probability of the keypoints on no object around which the flow moves: score_moving_near, as of an
+/// object that nobody reported. Of all others it stays as it is.
+template <typename Scalar>
+void score_flow_outside(const FlowPairs<Scalar>& flow, const FrameOptions& options, FrameState<Scalar>& state) {
+  if (!looks_for_unreported(options) || state.flow_distances.empty()) return;
+  if (!gather_pairs_outside(flow, options, state)) return;
+  std::size_t moving = 0, all = 0;
+  for (std::size_t i = 0; i < state.size(); ++i) {
+    if (state.label[i] != KeypointLabel::outside) continue;
+    state.flow_probability[i] = score_moving_near(i, flow, options, state);
+    moving += state.flow_probability[i] >= 0 ? 1U : 0U;
+    ++all;
+  }
+  if (is_credible(moving, all, options.coarse.unreported, state)) {
+    state.report.unreported = moving;
+    return;
+  }
+  for (std::size_t i = 0; i < state.size(); ++i) {
+    if (state.label[i] == KeypointLabel::outside) state.flow_probability[i] = Scalar(-1);
+  }
+}
+
+}  // namespace CFP_ISA
+}  // namespace cfp::detail
