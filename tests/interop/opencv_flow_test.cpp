@@ -260,3 +260,17 @@ TEST_CASE("A part of a larger image gives the pairs of its copy", "[flow]") {
   CHECK(of_part.previous() == of_copy.previous());
   CHECK(of_part.current() == of_copy.current());
 }
+
+TEST_CASE("An image of colours or of other depth is refused by name, and the next grey one is followed", "[flow]") {
+  const cv::Mat image = texture();
+  cfp::OpticalFlowTracker tracker;
+  tracker.track(image, {}, {});
+  for (const int type : {CV_8UC3, CV_16UC1, CV_32FC1}) {
+    const cv::Mat other = cv::Mat::zeros(image.size(), type);
+    CHECK_THROWS_AS(tracker.track(other, {}, {}), cv::Exception);
+  }
+  tracker.track(moved(image, 2, 1), {}, {});
+  REQUIRE(tracker.current().size() > 100);
+  const cv::Point2f shift = tracker.current()[0] - tracker.previous()[0];
+  CHECK(near(shift, {2, 1}, 0.2F));
+}

@@ -54,7 +54,9 @@ class span {
   using iterator = T*;
 
   constexpr span() noexcept = default;
-  constexpr span(T* data, std::size_t size) noexcept : data_(data), size_(size) {}
+  constexpr span(T* data, std::size_t size) noexcept : data_(data), size_(size) {
+    CFP_ASSERT(data != nullptr || size == 0);
+  }
   template <typename C, typename = detail::contiguous_of<C, T>>
   constexpr span(C&& range) noexcept : data_(std::data(range)), size_(static_cast<std::size_t>(std::size(range))) {}
 
@@ -111,7 +113,9 @@ class PointSpan {
       : first_(reinterpret_cast<const unsigned char*>(first)),
         size_(size),
         point_stride_(point_stride_bytes),
-        coordinate_stride_(coordinate_stride_bytes) {}
+        coordinate_stride_(coordinate_stride_bytes) {
+    CFP_ASSERT(first != nullptr || size == 0);
+  }
   /// From any contiguous container of std::array<Scalar, Dim> or Eigen column vectors.
   template <typename C, std::enable_if_t<detail::is_point<range_value_t<C>, Scalar, Dim>::value, int> = 0>
   PointSpan(const C& points) noexcept

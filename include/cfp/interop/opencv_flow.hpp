@@ -63,9 +63,11 @@ class OpticalFlowTracker {
   /// Makes the pairs between the image of the last call and this one (8-bit grey; none after the first call, or when
   /// the size has changed). keypoints and boxes are those of the previous image, which is where tracking starts;
   /// improper boxes hold nothing. room: 8-bit, 0 where the previous image shows what may move, people in boxes but not
-  /// what is seen behind them; empty, or of another size than the image: unknown.
+  /// what is seen behind them; empty, or of another size than the image: unknown. Throws cv::Exception where an image
+  /// is not 8-bit grey, and stays as it was.
   void track(const cv::Mat& gray, const std::vector<cv::KeyPoint>& keypoints, span<const Box<float>> boxes,
              const cv::Mat& room = {}) {
+    CV_Assert(gray.empty() || gray.type() == CV_8UC1);
     std::swap(previous_pyramid_, pyramid_);
     const bool first = gray.empty() || previous_pyramid_.empty() || previous_pyramid_[0].size() != gray.size();
     from_.clear();

@@ -87,8 +87,8 @@ template <typename Scalar>
 
 /// Bayes' rule with M of before as the prior of a keypoint: odds = odds(M) odds(E) odds(K)^constraint_power, where E is
 /// what the first stage says of its object and K what the constraints say of the keypoint; each kept in
-/// [evidence_limit, 1 - evidence_limit], so that none can silence the others. In (0, 1], 1 by
-/// rounding alone, continuous and non-decreasing in all three; 1/2 says nothing. NaN counts as 0. Not in the paper.
+/// [evidence_limit, 1 - evidence_limit], so that none can silence the others. In (0, 1], 1 by rounding alone,
+/// continuous and non-decreasing in all three; 1/2 says nothing. NaN counts as 0. Not in the paper.
 template <typename Scalar>
 [[nodiscard]] Scalar posterior_probability(Scalar keypoint_probability, Scalar object_evidence,
                                            Scalar map_point_probability, const MapPointOptions& options) noexcept {
