@@ -342,6 +342,39 @@ TEST_CASE("Too few, collinear or unrelated matches leave the identity and say wh
   CHECK(run(anywhere, places) == RansacStatus::no_consensus);
 }
 
+TEMPLATE_TEST_CASE("Points on a line are degenerate beside mismatches, too, and far from the origin", "[robust]", float,
+                   double) {
+  PnpRansacWorkspace workspace;
+  cfp::Random random(59, "line");
+  const PinholeCamera<TestType> seen_by = camera<TestType>;
+  for (const double off_m : {0.0, 10.0, 100.0, 1000.0}) {
+    for (const int mismatches : {0, 1, 5, 20}) {
+      cfp::SE3<TestType> T_cam_world;
+      T_cam_world.translation = cfp::Vector3<TestType>(TestType(-off_m), TestType(-off_m), 0);
+      std::vector<std::array<TestType, 3>> world;
+      std::vector<std::array<TestType, 2>> pixels;
+      for (int i = 0; i < 40; ++i) {
+        const double along = i / 39.0;
+        world.push_back({TestType(off_m - 1 + 2 * along), TestType(off_m + 0.5 - 0.7 * along), TestType(3 + along)});
+        cfp::Vector2<TestType> pixel(0, 0);
+        const auto& x = world.back();
+        REQUIRE(seen_by.project(T_cam_world * cfp::Vector3<TestType>(x[0], x[1], x[2]), pixel));
+        pixels.push_back({pixel.x(), pixel.y()});
+      }
+      for (int i = 0; i < mismatches; ++i) {
+        world.push_back({TestType(off_m + random.uniform(-2, 2)), TestType(off_m + random.uniform(-2, 2)),
+                         TestType(random.uniform(1, 5))});
+        pixels.push_back({TestType(random.uniform(0, 640)), TestType(random.uniform(0, 480))});
+      }
+      std::vector<char> mask(world.size(), 1);
+      const auto result = pnp_ransac(world, pixels, {}, seen_by, PnpRansacOptions{}, workspace, mask);
+      CAPTURE(off_m, mismatches);
+      CHECK(result.status == RansacStatus::degenerate);
+      CHECK(std::count(mask.begin(), mask.end(), 1) == 0);
+    }
+  }
+}
+
 TEST_CASE("The loss of the refinement grows with the distance, up to the weight", "[robust]") {
   cfp::detail::ObservationArrays in;
   std::vector<double> scratch;

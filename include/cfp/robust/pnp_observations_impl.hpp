@@ -26,6 +26,8 @@ enum ObservationRow : std::size_t { X, Y, Z, ray_x, ray_y, s11, s12, s22, observ
 
 struct ObservationArrays : RansacColumns<observation_rows> {
   std::array<double, 3> origin = {0, 0, 0};  // coordinate by coordinate the median: few broken points leave it in place
+
+  [[nodiscard]] CFP_INLINE Vector3<double> point(std::size_t i) const { return {row(X)[i], row(Y)[i], row(Z)[i]}; }
 };
 
 inline namespace CFP_ISA {
@@ -67,22 +69,51 @@ void load_observations(const PointSpan<Scalar, 3>& world, const PointSpan<Scalar
   finish(out);
 }
 
+// What the coordinates given, whose epsilon that is, may err by rounding; relative to the origin they err less.
+[[nodiscard]] inline double rounding_of(const ObservationArrays& in, double epsilon) {
+  return 4 * epsilon * Vector3<double>(in.origin[0], in.origin[1], in.origin[2]).norm();
+}
+
 // Whether the points lie on a line or in one place, to the rounding of float coordinates: relative to the size of the
 // half that is nearest to the origin, as one point may be broken and far away.
-[[nodiscard]] inline bool on_a_line(const ObservationArrays& in, std::vector<double>& scratch) {
-  const auto point = [&](std::size_t i) { return Vector3<double>(in.row(X)[i], in.row(Y)[i], in.row(Z)[i]); };
+[[nodiscard]] inline bool on_a_line(const ObservationArrays& in, double rounding, std::vector<double>& scratch) {
   Vector3<double> far = Vector3<double>::Zero();
   scratch.clear();
   for (std::size_t i = 0; i < in.size; ++i) {
-    scratch.push_back(point(i).norm());
-    if (scratch.back() > far.norm()) far = point(i);
+    scratch.push_back(in.point(i).norm());
+    if (scratch.back() > far.norm()) far = in.point(i);
   }
   double size = order_statistic(span<double>(scratch), in.size / 2);
   size = size > 0 ? size : far.norm();  // most in one place
   for (std::size_t i = 0; i < in.size; ++i) {
-    if (cross(far, point(i)).norm() > 1e-6 * far.norm() * (std::max)(size, point(i).norm())) return false;
+    const Vector3<double> p = in.point(i);
+    if (cross(far, p).norm() > far.norm() * (1e-6 * (std::max)(size, p.norm()) + rounding)) return false;
   }
   return true;
+}
+
+// Whether a line holds four and all but two of the points that `counts` accepts: the turn about it rests on too little.
+// The line is sought through the first, the middle and the last of them.
+template <typename Counts>
+[[nodiscard]] bool hang_on_a_line(const ObservationArrays& in, double rounding, const Counts& counts,
+                                  std::vector<double>& scratch) {
+  scratch.clear();
+  for (std::size_t i = 0; i < in.size; ++i) {
+    if (counts(i)) scratch.push_back(static_cast<double>(i));
+  }
+  const std::size_t n = scratch.size();
+  const auto point = [&](std::size_t k) { return in.point(static_cast<std::size_t>(scratch[k])); };
+  const auto is_line = [&](std::size_t from, std::size_t to) {
+    const Vector3<double> start = point(from), along = point(to) - start;
+    double size = along.norm();
+    for (std::size_t k = 0; k < n; ++k) size = (std::max)(size, (point(k) - start).norm());
+    if (!(along.norm() > 0.05 * size)) return false;
+    std::size_t off = 0;
+    for (std::size_t k = 0; k < n; ++k)
+      off += cross(along, Vector3<double>(point(k) - start)).norm() > size * (1e-6 * size + rounding) ? 1U : 0U;
+    return off <= 2 && n >= off + 4;
+  };
+  return n >= 4 && (is_line(0, n / 2) || is_line(n / 2, n - 1) || is_line(0, n - 1));
 }
 
 // Whether the points that `counts` accepts are in four places at least: any three have a pose.

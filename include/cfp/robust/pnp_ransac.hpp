@@ -5,6 +5,7 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
 #include <vector>
 
 #include "cfp/core/span.hpp"
@@ -56,7 +57,8 @@ inline namespace CFP_ISA {
 ///
 /// A pose is found only where more observations lie near their projections than chance would put there: with nothing
 /// but mismatches on an object of 40 to 160 px, eight inliers or more come up by chance. Points on a line, or in one
-/// place, are degenerate; inliers in three places are no consensus, however many they are.
+/// place, are degenerate, and so are inliers of which four or more, and all but two, lie on one; those in three places
+/// are no consensus, however many they are.
 template <typename Camera, typename Scalar = typename Camera::ScalarType>
 [[nodiscard]] PnpRansacResult<Scalar> pnp_ransac(PointSpan<non_deduced<Scalar>, 3> world,
                                                  PointSpan<non_deduced<Scalar>, 2> pixels,
@@ -71,7 +73,9 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
   detail::load_observations(world, pixels, weights, camera, observations, workspace.sampling);
   result.used = observations.size;
   if (observations.size < options.min_inliers || observations.size < 4) return result;
-  if (detail::on_a_line(observations, workspace.sampling)) {
+  const double rounding =
+      detail::rounding_of(observations, static_cast<double>(std::numeric_limits<Scalar>::epsilon()));
+  if (detail::on_a_line(observations, rounding, workspace.sampling)) {
     result.status = RansacStatus::degenerate;
     return result;
   }
@@ -95,6 +99,10 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
   };
   detail::report_inliers(observations, is_inlier, options.min_inliers, inlier_mask, result);
   if (result.found() && !detail::four_places(observations, is_inlier)) detail::refuse(inlier_mask, result);
+  if (result.found() && detail::hang_on_a_line(observations, rounding, is_inlier, workspace.sampling)) {
+    detail::refuse(inlier_mask, result);
+    result.status = RansacStatus::degenerate;
+  }
   const bool few = 5 * result.inliers < 2 * result.used;  // chance makes no more, save where all pixels are one
   if (few && result.found() && !problem.stands_out(search.best.model, search.iterations))
     detail::refuse(inlier_mask, result);
