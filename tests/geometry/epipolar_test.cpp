@@ -88,6 +88,11 @@ TEMPLATE_TEST_CASE("where there is no line there is no distance", "[geometry]", 
   CHECK(cfp::sampson_distance(none, anywhere, anywhere) == no_distance<TestType>);
   CHECK(cfp::has_distance(cfp::epipolar_distance(F, Vector2<TestType>(320.5, 240), anywhere)));
   CHECK_FALSE(cfp::has_distance(no_distance<TestType>));
+  const cfp::PinholeCamera<TestType> large{6000, 6000, 3840, 2880};  // of an image of 8k
+  const Vector2<TestType> beside(3845, 2880), above(3845, 2882);
+  CHECK_THAT(double(cfp::epipolar_distance(cfp::fundamental_from_pose(large, forward), beside, above)),
+             WithinAbs(2, 0.1));
+  CHECK(cfp::has_distance(cfp::sampson_distance(cfp::fundamental_from_pose(large, forward), beside, above)));
   Matrix3<TestType> broken = F;
   broken(2, 2) = std::numeric_limits<TestType>::quiet_NaN();
   CHECK(cfp::epipolar_distance(broken, anywhere, epipole) == no_distance<TestType>);

@@ -197,3 +197,22 @@ TEST_CASE("Pairs that have no distance get none, and float is near double", "[ge
                         options, without);
   CHECK(without == out);
 }
+
+TEST_CASE("Where the motion is uncertain in one direction alone a float sees what a double does",
+          "[geometry][motion_distance]") {
+  const cfp::PinholeCamera<float> long_lens{8000, 8000, 0, 0};
+  cfp::UncertainMotion<float> forward;
+  forward.covariance(2, 2) = 1;
+  for (int a = 1; a < 40; ++a) {
+    for (int b = 1; b < 40; ++b) {
+      const cfp::Vector2<float> previous(100.0F * float(a), 100.0F * float(b));
+      const cfp::Vector2<float> across = cfp::Vector2<float>(-previous.y(), previous.x()).normalized();
+      const cfp::Vector2<float> current = previous + 10.0F * across;
+      const float found = cfp::motion_distance(previous, 1.0F, current, forward, long_lens, 0.5F, {});
+      const double expected =
+          cfp::motion_distance<cfp::PinholeCamera<double>>(previous.cast<double>(), 1, current.cast<double>(),
+                                                           forward.cast<double>(), long_lens.cast<double>(), 0.5, {});
+      CHECK_THAT(double(found), WithinAbs(expected, 0.01));
+    }
+  }
+}

@@ -39,21 +39,31 @@ template <typename Scalar>
   return F / largest;
 }
 
-/// Square of the size, per unit of |(u, v, 1)|, below which the normal of the line F (u, v, 1) is rounding noise.
+/// Per column of F (or row, for F^T) and unit of u, v and 1: the square of the size below which what it adds to the
+/// normal of the line F (u, v, 1) is rounding noise.
 template <typename Scalar>
-[[nodiscard]] Scalar line_noise(const Matrix3<Scalar>& F) noexcept {
+[[nodiscard]] Vector3<Scalar> line_noise(const Matrix3<Scalar>& F, bool transposed = false) noexcept {
   const Scalar tolerance(Tolerance<Scalar>::degenerate);
-  return tolerance * tolerance * F.template topRows<2>().squaredNorm();
+  const auto of = [&](int k) {
+    const Scalar x = tolerance * (transposed ? F(k, 0) : F(0, k)), y = tolerance * (transposed ? F(k, 1) : F(1, k));
+    return x * x + y * y;
+  };
+  return {of(0), of(1), of(2)};
+}
+
+/// line_noise of the line of x.
+template <typename Scalar>
+[[nodiscard]] Scalar noise_at(const Vector3<Scalar>& noise, const Vector2<Scalar>& x) noexcept {
+  return noise.x() * x.x() * x.x() + noise.y() * x.y() * x.y() + noise.z();
 }
 
 /// epipolar_distance for an F of unit_scale, whose line_noise is given.
 template <typename Scalar>
-[[nodiscard]] Scalar scaled_epipolar_distance(const Matrix3<Scalar>& F, const Scalar& noise,
+[[nodiscard]] Scalar scaled_epipolar_distance(const Matrix3<Scalar>& F, const Vector3<Scalar>& noise,
                                               const Vector2<Scalar>& x_prev, const Vector2<Scalar>& x_cur) noexcept {
   const Vector3<Scalar> line = F.col(0) * x_prev.x() + F.col(1) * x_prev.y() + F.col(2);
   return ratio_distance(Scalar(line.x() * x_cur.x() + line.y() * x_cur.y() + line.z()),
-                        Scalar(line.x() * line.x() + line.y() * line.y()),
-                        Scalar(noise * (x_prev.squaredNorm() + Scalar(1))));
+                        Scalar(line.x() * line.x() + line.y() * line.y()), noise_at(noise, x_prev));
 }
 
 }  // namespace CFP_ISA
@@ -102,9 +112,8 @@ template <typename Scalar>
   const Vector3<Scalar> cur(x_cur.x(), x_cur.y(), Scalar(1));
   const Scalar a_prev = G.col(0).dot(cur), b_prev = G.col(1).dot(cur);
   const Scalar norm_sq = line.x() * line.x() + line.y() * line.y() + a_prev * a_prev + b_prev * b_prev;
-  const Scalar tolerance(Tolerance<Scalar>::degenerate);
-  const Scalar noise = detail::line_noise(G) * (x_prev.squaredNorm() + Scalar(1)) +
-                       tolerance * tolerance * G.template leftCols<2>().squaredNorm() * cur.squaredNorm();
+  const Scalar noise =
+      detail::noise_at(detail::line_noise(G), x_prev) + detail::noise_at(detail::line_noise(G, true), x_cur);
   return detail::ratio_distance(line.x() * x_cur.x() + line.y() * x_cur.y() + line.z(), norm_sq, noise);
 }
 
@@ -114,7 +123,7 @@ void epipolar_distances(const Matrix3<Scalar>& F, const PointSpan<non_deduced<Sc
                         const PointSpan<non_deduced<Scalar>, 2>& cur, span<non_deduced<Scalar>> out) noexcept {
   CFP_ASSERT(prev.size() == cur.size() && prev.size() == out.size());
   const Matrix3<Scalar> G = detail::unit_scale(F);
-  const Scalar noise = detail::line_noise(G);
+  const Vector3<Scalar> noise = detail::line_noise(G);
   for (std::size_t i = 0; i < out.size(); ++i) out[i] = detail::scaled_epipolar_distance(G, noise, prev[i], cur[i]);
 }
 

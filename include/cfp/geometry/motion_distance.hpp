@@ -73,31 +73,33 @@ template <typename Camera, typename Scalar>
   const Scalar none = Scalar(no_distance<double>);
   MotionResidual<Scalar> pair;
   if (!motion_residual(pixel_prev, depth_prev, pixel_cur, motion.T_cur_prev, camera, options, pair)) return none;
-  // W = I + M C M^T / sigma^2, and its inverse.
-  Scalar a = Scalar(1), b = Scalar(0), c = Scalar(1);
+  // W = I + A with A = M C M^T / sigma^2, and its inverse; in double, as det A may be a difference of large numbers.
+  using Real = decltype(Scalar() + double());
+  Real a(0), b(0), c(0);
   if (!exact) {
-    const Scalar per_variance = Scalar(1) / (sigma_px * sigma_px);
-    a = b = c = Scalar(0);
+    const Real per_variance = Real(1) / (Real(sigma_px) * Real(sigma_px));
     for (int k = 0; k < 6; ++k) {
-      Scalar first(0), second(0);  // of column k of M C
-      for (int i = 0; i < 6; ++i) first += pair.M[0][i] * motion.covariance(i, k);
-      for (int i = 0; i < 6; ++i) second += pair.M[1][i] * motion.covariance(i, k);
-      a += first * pair.M[0][k];
-      b += first * pair.M[1][k];
-      c += second * pair.M[1][k];
+      Real first(0), second(0);  // of column k of M C
+      for (int i = 0; i < 6; ++i) first += Real(pair.M[0][i]) * Real(motion.covariance(i, k));
+      for (int i = 0; i < 6; ++i) second += Real(pair.M[1][i]) * Real(motion.covariance(i, k));
+      a += first * Real(pair.M[0][k]);
+      b += first * Real(pair.M[1][k]);
+      c += second * Real(pair.M[1][k]);
     }
-    a = Scalar(1) + per_variance * a, b = per_variance * b, c = Scalar(1) + per_variance * c;
+    a *= per_variance, b *= per_variance, c *= per_variance;
   }
-  const Scalar det = a * c - b * b;
-  const auto times_inverse = [&](const Vector2<Scalar>& v) {
-    return Vector2<Scalar>((c * v[0] - b * v[1]) / det, (a * v[1] - b * v[0]) / det);
-  };
+  const Real rank_two = a * c - b * b;  // not below 0 but for rounding
+  const Real det = Real(1) + a + c + (rank_two > Real(0) ? rank_two : Real(0));
+  a += Real(1), c += Real(1);
+  using V = Vector2<Real>;
+  const V r = pair.r.template cast<Real>(), along = pair.along.template cast<Real>();
+  const auto times_inverse = [&](const V& v) { return V((c * v[0] - b * v[1]) / det, (a * v[1] - b * v[0]) / det); };
   // Sherman and Morrison: the inverse of W + kappa J J^T takes r its part along J but for 1 / (1 + kappa J^T W^-1 J).
-  const Vector2<Scalar> along_w = times_inverse(pair.along);
-  const Scalar spread = pair.sigma_z / sigma_px, kappa = spread * spread;
-  const Scalar explained = pair.r.dot(along_w), length_sq = pair.along.dot(along_w);
+  const V along_w = times_inverse(along);
+  const Real spread = Real(pair.sigma_z) / Real(sigma_px), kappa = spread * spread;
+  const Real explained = r.dot(along_w), length_sq = along.dot(along_w);
   const Scalar distance_sq =
-      pair.r.dot(times_inverse(pair.r)) - explained * explained * (kappa / (Scalar(1) + kappa * length_sq));
+      static_cast<Scalar>(r.dot(times_inverse(r)) - explained * explained * (kappa / (Real(1) + kappa * length_sq)));
   const Scalar distance = sqrt(distance_sq > Scalar(0) ? distance_sq : Scalar(0));
   return has_distance(distance) && is_finite(distance_sq) ? distance : none;
 }
