@@ -72,4 +72,7 @@ TEST_CASE("Health of hostile and empty frames is finite", "[pipeline]") {
   const cfp::FrameHealth health = frame.apply({false, 10});
   CHECK_THAT(health.effective_points, WithinAbs(3, 1e-9));
   CHECK(Frame{}.apply().effective_points == 0);
+  Frame unmatched;  // nothing to raise
+  unmatched.add(50, KeypointLabel::foreground, 0.1, -1);
+  CHECK(unmatched.apply().fallback == WeightFallback::none);
 }

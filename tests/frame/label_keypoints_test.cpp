@@ -414,3 +414,18 @@ TEST_CASE("Where most keypoints would move, or the room behind them, nothing is 
     CHECK(board.marked(bold)[0] > 0.8);
   }
 }
+
+TEST_CASE("Where few pairs have a depth, their motion accuses nothing outside of boxes", "[frame]") {
+  DynamicSceneOptions options = quiet();
+  options.points_per_person = 24;
+  for (const std::uint64_t seed : {90U, 91U, 92U}) {
+    Unreported scene(options, seed);
+    REQUIRE(scene.marked()[1] > 0.8);
+    for (std::size_t i = 0; i < scene.run.scene.previous_depths.size(); ++i) {  // out of the depth camera's range
+      if (scene.run.scene.is_person[i] == 0 && i % 7 != 0) scene.run.scene.previous_depths[i] = 0;
+    }
+    const std::array<double, 2> said = scene.marked();
+    REQUIRE(scene.run.state.report.flow_model == cfp::FlowModelKind::motion);
+    CHECK((said[0] == 0 && said[1] == 0));
+  }
+}

@@ -76,7 +76,11 @@ TEST_CASE("Detections that are none are counted, and a detector that gives no ot
   mixed.push_back(person[0]);
   CHECK(camera.see(0.03, mixed).report.skipped_detections == 2);
   CHECK(camera.state.report.frames_without_detections == 0);
+  CHECK(camera.state.report.other_detections == 0);
   CHECK(camera.see(0.06, person).report.skipped_detections == 0);
+  const std::vector<cfp::Detection<double>> chairs(3, {{100, 100, 200, 400}, 56, 0.9});
+  CHECK(camera.see(0.09, chairs).report.other_detections == 3);
+  CHECK(camera.state.report.skipped_detections == 0);
 }
 
 TEST_CASE("A gap that ends the tracks is told, as it is behind every frame of a clock that does not count seconds",

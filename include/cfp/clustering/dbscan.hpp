@@ -37,6 +37,8 @@ struct DbscanWorkspace {
   SortWorkspace<Scalar> sort;
   std::vector<std::uint32_t> neighbours;
   std::vector<int> labels;  // of sorted values
+
+  void reserve(std::size_t n) { sort.reserve(n), neighbours.reserve(n), labels.reserve(n); }
 };
 
 namespace detail {

@@ -22,6 +22,8 @@ namespace cfp {
 template <typename Scalar>
 struct ForegroundWorkspace : DbscanWorkspace<Scalar> {
   std::vector<double> odds;
+
+  void reserve(std::size_t n) { DbscanWorkspace<Scalar>::reserve(n), odds.reserve(n + 1); }
 };
 
 namespace detail {

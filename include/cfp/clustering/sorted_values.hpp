@@ -24,6 +24,8 @@ struct SortWorkspace {
   std::vector<std::uint32_t> kept, index;
   std::vector<std::size_t> bucket_end;
   std::vector<Scalar> values;
+
+  void reserve(std::size_t n) { kept.reserve(n), index.reserve(n), bucket_end.reserve(2 * n + 2), values.reserve(n); }
 };
 
 inline namespace CFP_ISA {

@@ -25,7 +25,8 @@ struct ObjectClass {
 
 /// What moves and no detector reports. WeightRule::posterior: a keypoint in no box counts as on a moving object where,
 /// of the flow pairs on no object near it and at its depth, `pairs` that move are nearer than as many that rest.
-/// Without depths all near are asked. Not in the paper, for which all outside of boxes is static.
+/// Without depths all near are asked; where less than a quarter of the pairs have one, nothing is said. Not in the
+/// paper, for which all outside of boxes is static.
 struct UnreportedOptions {
   double radius_px = 60;     ///< around the keypoint, >= 0; 0: nothing of this
   double depth_share = 0.1;  ///< of the keypoint's depth: a pair farther from it in depth is not asked, >= 0
@@ -72,7 +73,7 @@ struct FrameOptions {
   FineOptions fine;
   MapPointOptions map_point;
   HealthOptions health;
-  double min_creation_probability = 0.3;  ///< keypoints with a smaller K should make no map point, in [0, 1]
+  double min_creation_probability = 0.3;  ///< keypoints of which less is known should make no map point, in [0, 1]
   double min_inlier_weight = 0.1;         ///< inliers of at most this weight should not count for the pose, in [0, 1)
 };
 

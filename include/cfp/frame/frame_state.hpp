@@ -37,6 +37,7 @@ struct FrameReport {
   std::size_t frames_without_detections = 0;  ///< in a row, with the detector running: the commonest cause of no effect
   std::size_t frames_since_detector = 0;      ///< on which the detector did not run
   std::size_t skipped_detections = 0;         ///< improper boxes (x y w h?), or a score that is NaN: as if not there
+  std::size_t other_detections = 0;           ///< of classes that FrameOptions::classes does not name: ignored
   // objects
   FlowModelKind flow_model = FlowModelKind::none;            ///< what the flow pairs were judged by,
   FlowSupport flow_support = FlowSupport::none;              ///< what that rests on,
@@ -189,6 +190,7 @@ void begin_frame(const Frame<Scalar>& frame, FrameState<Scalar>& state) {
   scratch.depths.reserve(most);
   scratch.samples.reserve(most);
   scratch.scratch.reserve(most);
+  scratch.foreground.reserve(most);
   state.boxes.clear();
   state.objects.clear();
   FrameReport report;

@@ -67,15 +67,16 @@ template <typename Scalar>
 }
 
 /// frame_health, and the fallback: while the effective observations are fewer than min_effective_points, the weights of
-/// the background keypoints are raised to 1, then those of all keypoints with a map point. The figures are those of the
-/// model's own weights; `fallback` says what was done. Allocates nothing.
+/// the background keypoints are raised to 1, then those of all keypoints with a map point; without any there is nothing
+/// to raise, and no fallback. The figures are those of the model's own weights; `fallback` says what was done.
+/// Allocates nothing.
 template <typename Scalar>
 FrameHealth apply_fallback(span<const KeypointLabel> label, span<const Scalar> map_point_probability,
                            span<Scalar> weight, const HealthOptions& options) noexcept {
   FrameHealth health = frame_health(label, map_point_probability, span<const Scalar>(weight));
   double effective_points = health.effective_points;
   for (const WeightFallback fallback : {WeightFallback::background, WeightFallback::all}) {
-    if (!options.use_fallback || effective_points >= options.min_effective_points) break;
+    if (!options.use_fallback || health.observations == 0 || effective_points >= options.min_effective_points) break;
     health.fallback = fallback;
     for (std::size_t i = 0; i < weight.size(); ++i) {
       if (map_point_probability[i] >= Scalar(0) && is_raised(label[i], fallback)) weight[i] = Scalar(1);

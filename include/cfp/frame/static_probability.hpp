@@ -41,8 +41,8 @@ struct StageResult {
 inline namespace CFP_ISA {
 
 /// One per camera: tracks of boxes, the frame before, scratch memory. Not thread-safe; objects share nothing. After the
-/// largest frame of a kind (flow with depths, without) has been seen, a call allocates nothing. Same frames and
-/// options, same bits. The camera is any type with the interface of PinholeCamera.
+/// largest frame of each FlowModelKind has been seen, a call allocates nothing. Same frames and options, same bits. The
+/// camera is any type with the interface of PinholeCamera.
 template <typename Camera>
 class StaticProbability {
  public:
@@ -68,7 +68,8 @@ class StaticProbability {
   /// The weights of the stage that ran last, for matches made since (motion model, then local map): M per keypoint as
   /// it was before this frame, negative where there is no map point.
   span<const Scalar> weights(span<const Scalar> map_point_probability) { return result(map_point_probability).weight; }
-  /// The same for one keypoint that joins later. M negative: it has no map point.
+  /// The same for one keypoint that joins later, under the fallback that the last of these calls decided on: after many
+  /// new matches ask for all weights anew. M negative: it has no map point.
   [[nodiscard]] Scalar weight(std::size_t keypoint, Scalar map_point_probability) const noexcept {
     return keypoint_weight(keypoint, map_point_probability, options_, state_);
   }
@@ -116,7 +117,7 @@ class StaticProbability {
     return unknown_;
   }
   StageResult<Scalar> result(span<const Scalar> map_point_probability) {
-    weigh_keypoints(or_unknown(map_point_probability), options_, state_);
+    weigh_keypoints(map_point_probability, options_, state_);
     return {state_.weight, state_.static_probability, state_.report};
   }
 

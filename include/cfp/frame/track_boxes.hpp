@@ -35,11 +35,14 @@ void track_boxes(const Frame<Scalar>& frame, const FrameOptions& options, BoxTra
   report.skipped_detections = tracked.skipped;
   const bool blind = ran && frame.detections->size() == tracked.skipped;
   if (ran) report.frames_without_detections = blind ? report.frames_without_detections + 1 : 0;
-  std::copy_if(tracked.boxes.begin(), tracked.boxes.end(), std::back_inserter(state.boxes),
-               [&](const TrackedBox<Scalar>& box) {
-                 return std::any_of(options.classes.begin(), options.classes.end(),
-                                    [&](const ObjectClass& c) { return c.class_id == box.class_id; });
-               });
+  const auto is_other = [&](const auto& object) {
+    return std::none_of(options.classes.begin(), options.classes.end(),
+                        [&](const ObjectClass& c) { return c.class_id == object.class_id; });
+  };
+  if (ran)
+    report.other_detections =
+        static_cast<std::size_t>(std::count_if(frame.detections->begin(), frame.detections->end(), is_other));
+  std::remove_copy_if(tracked.boxes.begin(), tracked.boxes.end(), std::back_inserter(state.boxes), is_other);
 }
 
 }  // namespace CFP_ISA

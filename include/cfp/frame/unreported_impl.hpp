@@ -18,7 +18,7 @@ namespace cfp::detail {
 inline namespace CFP_ISA {
 
 /// Puts the flow pairs on no object into scratch.grid, their scores into scratch.samples (of others: -1). Whether few
-/// enough of them move that this is not the camera.
+/// enough of them move that this is not the camera, whose motion must rest on more than a few of them, too.
 template <typename Scalar>
 [[nodiscard]] bool gather_pairs_outside(const FlowPairs<Scalar>& flow, const FrameOptions& options,
                                         FrameState<Scalar>& state) {
@@ -26,14 +26,17 @@ template <typename Scalar>
   const ObjectProbabilityOptions scored = scaled_to_flow(options.coarse.object, state.report);
   FrameScratch<Scalar>& scratch = state.scratch;
   scratch.samples.assign(flow.current.size(), Scalar(-1));
-  std::size_t moving = 0, all = 0;
+  const bool by_depth = state.report.flow_model == FlowModelKind::motion && !flow.previous_depths.empty();
+  std::size_t moving = 0, all = 0, tell = 0;
   for (std::size_t p = 0; p < scratch.samples.size(); ++p) {
     if (scratch.outside[p] == 0 || !has_distance(state.flow_distances[p])) continue;
+    tell += !by_depth || is_valid_depth(flow.previous_depths[p]) ? 1U : 0U;
     scratch.samples[p] = object_score(state.flow_distances[p], scored);
     moving += scratch.samples[p] < static_cast<Scalar>(options.object_threshold) ? 1U : 0U;
     ++all;
   }
-  if (moving < unreported.pairs || static_cast<double>(moving) > unreported.max_share * static_cast<double>(all))
+  if (moving < unreported.pairs || 4 * tell < all ||
+      static_cast<double>(moving) > unreported.max_share * static_cast<double>(all))
     return false;
   const auto is_scored = [&](std::size_t p) { return scratch.samples[p] >= 0; };
   fill_grid(flow.current, is_scored, static_cast<Scalar>(unreported.radius_px), scratch.grid);

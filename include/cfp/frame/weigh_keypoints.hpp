@@ -152,18 +152,21 @@ void update_map_points(const FrameOptions& options, FrameState<Scalar>& state,
 }
 
 /// Sets the weight of every keypoint, and with too few effective observations raises them (apply_fallback).
+/// map_point_probability may be empty, for a host that keeps none: every keypoint then counts as an observation.
 template <typename Scalar>
 void weigh_keypoints(span<const non_deduced<Scalar>> map_point_probability, const FrameOptions& options,
                      FrameState<Scalar>& state) noexcept {
-  CFP_ASSERT(map_point_probability.size() == state.size());
+  CFP_ASSERT(detail::fits(state.size(), map_point_probability));
   state.report.mismatched = 0;
   for (std::size_t i = 0; i < state.size(); ++i) {
-    const Scalar m = map_point_probability[i];
+    const Scalar m = map_point_probability.empty() ? Scalar(-1) : map_point_probability[i];
     state.weight[i] = model_weight(i, m, options, state);
     if (is_mismatched(i, m, options, state)) ++state.report.mismatched;
   }
-  state.report.health = apply_fallback(span<const KeypointLabel>(state.label), map_point_probability,
-                                       span<Scalar>(state.weight), options.health);
+  const span<const Scalar> observed =
+      map_point_probability.empty() ? span<const Scalar>(state.weight) : map_point_probability;
+  state.report.health =
+      apply_fallback(span<const KeypointLabel>(state.label), observed, span<Scalar>(state.weight), options.health);
 }
 
 /// Whether a keypoint with this K may make a map point: one that moves would be a landmark that walks.
