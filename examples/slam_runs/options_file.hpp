@@ -71,7 +71,7 @@ inline std::string invalid_option(const Options& o) {
   if (!(o.keypoint_sigma_px > 0)) return "keypoint_sigma_px";
   if (!(o.baseline_fx > 0)) return "baseline_fx";
   if (!(o.flow_edge_px >= 0)) return "flow_edge_px";
-  if (!is_share(o.unproven_share)) return "unproven_share";
+  if (!(o.unproven_share >= 0)) return "unproven_share";
   if (!is_share(o.min_known_share)) return "min_known_share";
   if (!is_share(o.features.room_share)) return "features.room_share";
   const cfp::OptionPath field = cfp::invalid_field(o.probability);

@@ -67,7 +67,7 @@ class StaticWeights {
     }
   }
 
-  // Where inliers are counted, and where a keypoint is about to make a map point (whose M is its K).
+  // Where inliers are counted, and where a keypoint is about to make a map point (whose M is k, what is known of it).
   bool CountsAsInlier(const Frame& F, std::size_t i) const {
     return cfp::counts_as_inlier(F.mvWeight[i], mProbability.options());
   }

@@ -1,5 +1,6 @@
 // All that a system in the shape of stella_vslam needs to use cfp: this class as a member of tracking_module, and
-// landmark::static_probability_ (std::atomic<float> there, as the mapping module reads it).
+// landmark::static_probability_ (std::atomic<float> there, as the mapping module reads it). Keypoints are undistorted:
+// objects must be detected in the undistorted image, too.
 #pragma once
 
 #include <cstdint>
