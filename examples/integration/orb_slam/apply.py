@@ -47,7 +47,8 @@ STEPS = [
      r"\1\n    std::atomic<float> mStaticProbability{1.0f};  // cfp: M, read by the mapping thread", 1),
     # 2: the adapter beside Tracking, and the door for the host's program
     (2, "include/Tracking.h", "", r"(#include\s*<mutex>)",
-     r'#include<memory>\n#include<optional>\n#include"orb_slam2.hpp"  // of cfp, examples/integration/orb_slam\n\n\1', 1),
+     r'#include<iostream>\n#include<memory>\n#include<optional>\n'
+     r'#include"orb_slam2.hpp"  // of cfp, examples/integration/orb_slam\n\n\1', 1),
     (2, "include/Tracking.h", "", r"(\nclass Tracking\s*\n\{\s*\n\s*public:)",
      r"\ntypedef cfp_integration::StaticWeights<cfp_integration::OrbSlam2<Frame> > StaticWeights;\n\1"
      r"\n    // cfp\n    void UseStaticWeights(const cfp::FrameOptions &options)\n    {\n"
