@@ -89,11 +89,13 @@ template <typename Camera, typename Scalar>
     a *= per_variance, b *= per_variance, c *= per_variance;
   }
   const Real rank_two = a * c - b * b;  // not below 0 but for rounding
-  const Real det = Real(1) + a + c + (rank_two > Real(0) ? rank_two : Real(0));
+  const Real per_det = Real(1) / (Real(1) + a + c + (rank_two > Real(0) ? rank_two : Real(0)));
   a += Real(1), c += Real(1);
   using V = Vector2<Real>;
   const V r = pair.r.template cast<Real>(), along = pair.along.template cast<Real>();
-  const auto times_inverse = [&](const V& v) { return V((c * v[0] - b * v[1]) / det, (a * v[1] - b * v[0]) / det); };
+  const auto times_inverse = [&](const V& v) {
+    return V((c * v[0] - b * v[1]) * per_det, (a * v[1] - b * v[0]) * per_det);
+  };
   // Sherman and Morrison: the inverse of W + kappa J J^T takes r its part along J but for 1 / (1 + kappa J^T W^-1 J).
   const V along_w = times_inverse(along);
   const Real spread = Real(pair.sigma_z) / Real(sigma_px), kappa = spread * spread;
