@@ -386,15 +386,18 @@ struct Unreported {
 TEST_CASE("A few pairs on somebody whom nobody reports are told from the wall around them by depth", "[frame]") {
   DynamicSceneOptions few = quiet();
   few.points_per_person = 24;
-  for (const std::uint64_t seed : {93U, 94U, 95U}) {
+  cfp::FrameOptions any_depth;
+  any_depth.coarse.unreported.depth_share = 100;
+  double found = 0, found_at_any_depth = 0;
+  for (const std::uint64_t seed : {93U, 94U, 95U, 96U, 97U, 98U}) {
     Unreported scene(few, seed);
-    const std::array<double, 2> by_depth = scene.marked();
-    CHECK(by_depth[0] < 0.01);
-    CHECK(by_depth[1] > 0.8);
-    cfp::FrameOptions options;
-    options.coarse.unreported.depth_share = 100;
-    CHECK(scene.marked(options)[1] < 0.5 * by_depth[1]);
+    const std::array<double, 2> said = scene.marked();
+    CHECK(said[0] < 0.01);
+    CHECK(said[1] > 0.8);
+    found += said[1];
+    found_at_any_depth += scene.marked(any_depth)[1];
   }
+  CHECK(found_at_any_depth < 0.6 * found);
 }
 
 TEST_CASE("Where most keypoints would move, or the room behind them, nothing is said of what nobody reports",
