@@ -92,6 +92,15 @@ TEST_CASE("A rank beyond the end counts as the last", "[math]") {
   CHECK(cfp::order_statistic(span(values), 1000) == 3);
 }
 
+TEST_CASE("A quantile is the value at its rank", "[math]") {
+  std::vector<double> values = {5, 1, 4, 2, 3};
+  CHECK(cfp::quantile(span(values), 0.5) == 3);
+  CHECK(cfp::quantile(span(values), 0.2) == 1);
+  CHECK(cfp::quantile(span(values), 0.21) == 2);
+  CHECK(cfp::quantile(span(values), 1) == 5);
+  CHECK(cfp::quantile(span<double>(), 0.5) == 0);
+}
+
 TEMPLATE_TEST_CASE("no values give 0", "[math]", float, double) {
   CHECK(cfp::order_statistic(span<TestType>(), 0) == 0);
 }

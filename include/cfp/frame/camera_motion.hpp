@@ -78,7 +78,7 @@ inline namespace CFP_ISA {
 template <typename Scalar>
 [[nodiscard]] Scalar robust_sigma(span<Scalar> distances, int degrees_of_freedom) noexcept {
   const std::size_t n = copy_distances(span<const Scalar>(distances), distances);
-  const Scalar median = order_statistic(distances.subspan(0, n), quantile_rank(0.5, n) - 1);
+  const Scalar median = quantile(distances.subspan(0, n), 0.5);
   return median / Scalar(degrees_of_freedom == 1 ? 0.674489750196082 : 1.177410022515475);
 }
 
@@ -109,7 +109,7 @@ template <typename Scalar>
   for (const auto& point : points) {
     if (is_finite(point[0])) depths.push_back(point[2]);
   }
-  return order_statistic(span<Scalar>(depths), quantile_rank(share, depths.size()) - 1);
+  return quantile(span<Scalar>(depths), share);
 }
 
 /// The motion that most of the `taken` workspace.points agree to; false, and T untouched, without one. Its threshold is
@@ -212,9 +212,8 @@ template <typename Scalar>
   believe(T);
   if (!refine(T, detail::last_round(options.pose, 1.0 / 3))) return motion;
   const CameraMotion<Scalar> tight = motion;
-  const Scalar worse = 1 + 20 / static_cast<Scalar>(taken);
-  if (!refine(T, detail::last_round(options.pose, 1)) || motion.sigma_px > worse * tight.sigma_px) return tight;
-  return motion;
+  const Scalar most_px = tight.sigma_px * (1 + 20 / static_cast<Scalar>(taken));
+  return refine(T, detail::last_round(options.pose, 1)) && motion.sigma_px <= most_px ? motion : tight;
 }
 
 }  // namespace CFP_ISA

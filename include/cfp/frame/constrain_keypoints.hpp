@@ -84,7 +84,7 @@ template <typename Scalar>
   depths.clear();
   std::copy_if(scratch.depths.begin(), scratch.depths.end(), std::back_inserter(depths),
                [](Scalar z) { return is_valid_depth(z); });
-  const Scalar median = order_statistic(span<Scalar>(depths), quantile_rank(0.5, depths.size()) - 1);
+  const Scalar median = quantile(span<Scalar>(depths), 0.5);
   return t > options.min_parallax * static_cast<double>(median);
 }
 

@@ -73,7 +73,7 @@ template <typename Scalar>
     if (near[k][1] < threshold) scratch.scratch.push_back(near[k][1]);
   }
   if (scratch.scratch.size() < unreported.pairs) return Scalar(-1);
-  return order_statistic(span<Scalar>(scratch.scratch), quantile_rank(0.5, unreported.pairs) - 1);
+  return quantile(span<Scalar>(scratch.scratch), 0.5);
 }
 
 /// Median depth of the keypoints on no object of which the flow says that they move, or of the others; 0: unknown.
@@ -86,7 +86,7 @@ template <typename Scalar>
         is_valid_depth(state.current.depths[i]))
       depths.push_back(state.current.depths[i]);
   }
-  return depths.empty() ? Scalar(0) : order_statistic(span<Scalar>(depths), quantile_rank(0.5, depths.size()) - 1);
+  return quantile(span<Scalar>(depths), 0.5);
 }
 
 /// Whether what would count as moving may be something that nobody reported: not where it holds too many of the

@@ -80,5 +80,11 @@ template <typename Scalar>
   return values[rank0];
 }
 
+/// The q-quantile, at quantile_rank. Reorders `values`; 0 without any.
+template <typename Scalar>
+[[nodiscard]] Scalar quantile(span<Scalar> values, double q) noexcept {
+  return order_statistic(values, quantile_rank(q, values.size()) - 1);
+}
+
 }  // namespace CFP_ISA
 }  // namespace cfp

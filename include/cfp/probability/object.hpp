@@ -126,7 +126,7 @@ template <typename Range, typename Scalar = range_value_t<Range>>
   const span<Scalar> scores = workspace.subspan(0, n);
   for (Scalar& value : scores) value = object_score(value, options);
   double sum = 0;
-  for (const double q : options.positions) sum += static_cast<double>(order_statistic(scores, quantile_rank(q, n) - 1));
+  for (const double q : options.positions) sum += static_cast<double>(quantile(scores, q));
   result.static_probability = clamp_probability(sum / static_cast<double>(options.positions.size()));
   result.status = Status::ok;
   return result;
