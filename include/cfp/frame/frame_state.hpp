@@ -90,7 +90,7 @@ struct FrameScratch {
   FlowModelWorkspace<Scalar> flow;
   ForegroundWorkspace<Scalar> foreground;
   DescriptorMatchWorkspace<Scalar> matching;
-  detail::PointGrid<Scalar> grid;
+  detail::PointGrid<Scalar> grid, resting;
   std::vector<std::array<Scalar, 2>> points, undistorted_previous, undistorted_current;
   std::vector<Scalar> depths, projection, epipolar, samples, scratch;
   std::vector<std::int32_t> members;

@@ -17,29 +17,35 @@
 namespace cfp::detail {
 inline namespace CFP_ISA {
 
-/// Puts the flow pairs on no object into scratch.grid, their scores into scratch.samples (of others: -1). Whether few
-/// enough of them move that this is not the camera, whose motion must rest on more than a few of them, too.
+/// Puts the flow pairs on no object into scratch.grid where they move, into scratch.resting where they do not, and
+/// their scores into scratch.samples. Whether few enough move that this is not the camera, whose motion must rest on
+/// more than a few of them, too.
 template <typename Scalar>
 [[nodiscard]] bool gather_pairs_outside(const FlowPairs<Scalar>& flow, const FrameOptions& options,
                                         FrameState<Scalar>& state) {
   const UnreportedOptions& unreported = options.coarse.unreported;
   const ObjectProbabilityOptions scored = scaled_to_flow(options.coarse.object, state.report);
+  const Scalar threshold = static_cast<Scalar>(options.object_threshold);
   FrameScratch<Scalar>& scratch = state.scratch;
-  scratch.samples.assign(flow.current.size(), Scalar(-1));
+  const std::size_t n = flow.current.size();
+  scratch.samples.assign(n, Scalar(-1));  // of pairs without a score
   const bool by_depth = state.report.flow_model == FlowModelKind::motion && !flow.previous_depths.empty();
   std::size_t moving = 0, all = 0, tell = 0;
-  for (std::size_t p = 0; p < scratch.samples.size(); ++p) {
+  for (std::size_t p = 0; p < n; ++p) {
     if (scratch.outside[p] == 0 || !has_distance(state.flow_distances[p])) continue;
     tell += !by_depth || is_valid_depth(flow.previous_depths[p]) ? 1U : 0U;
     scratch.samples[p] = object_score(state.flow_distances[p], scored);
-    moving += scratch.samples[p] < static_cast<Scalar>(options.object_threshold) ? 1U : 0U;
+    moving += scratch.samples[p] < threshold ? 1U : 0U;
     ++all;
   }
   if (moving < unreported.pairs || 4 * tell < all ||
       static_cast<double>(moving) > unreported.max_share * static_cast<double>(all))
     return false;
-  const auto is_scored = [&](std::size_t p) { return scratch.samples[p] >= 0; };
-  fill_grid(flow.current, is_scored, static_cast<Scalar>(unreported.radius_px), scratch.grid);
+  const Scalar radius_px = static_cast<Scalar>(unreported.radius_px);
+  const auto moves = [&](std::size_t p) { return scratch.samples[p] >= 0 && scratch.samples[p] < threshold; };
+  const auto rests = [&](std::size_t p) { return scratch.samples[p] >= threshold; };
+  fill_grid(flow.current, moves, radius_px, scratch.grid);
+  fill_grid(flow.current, rests, radius_px, scratch.resting);
   return true;
 }
 
@@ -49,30 +55,34 @@ template <typename Scalar>
 [[nodiscard]] Scalar score_moving_near(std::size_t i, const FlowPairs<Scalar>& flow, const FrameOptions& options,
                                        FrameState<Scalar>& state) {
   const UnreportedOptions& unreported = options.coarse.unreported;
-  const Scalar threshold = static_cast<Scalar>(options.object_threshold);
   const Scalar radius_px = static_cast<Scalar>(unreported.radius_px);
   const Scalar x = state.current.keypoints[i][0], y = state.current.keypoints[i][1];
   const Scalar depth = state.current.depths.empty() ? Scalar(0) : state.current.depths[i];
   const Scalar reach = static_cast<Scalar>(unreported.depth_share) * depth;
   const bool by_depth = is_valid_depth(depth) && !flow.previous_depths.empty();
+  const auto visit_here = [&](const PointGrid<Scalar>& grid, Scalar below_sq, const auto& visit) {
+    visit_near(grid, x, y, [&](const auto& pair) {
+      const Scalar apart_sq = (pair.x - x) * (pair.x - x) + (pair.y - y) * (pair.y - y);
+      const bool elsewhere = by_depth && is_valid_depth(flow.previous_depths[pair.index]) &&
+                             std::abs(flow.previous_depths[pair.index] - depth) > reach;
+      return apart_sq < below_sq && !elsewhere && visit(pair.index, apart_sq);
+    });
+  };
   FrameScratch<Scalar>& scratch = state.scratch;
-  auto& near = scratch.points;  // squared distance and score
-  near.clear();
-  visit_near(scratch.grid, x, y, [&](const auto& pair) {
-    const Scalar apart_sq = (pair.x - x) * (pair.x - x) + (pair.y - y) * (pair.y - y);
-    const bool elsewhere = by_depth && is_valid_depth(flow.previous_depths[pair.index]) &&
-                           std::abs(flow.previous_depths[pair.index] - depth) > reach;
-    if (apart_sq < radius_px * radius_px && !elsewhere) near.push_back({apart_sq, scratch.samples[pair.index]});
+  auto& moving = scratch.points;  // squared distance and score
+  moving.clear();
+  visit_here(scratch.grid, radius_px * radius_px, [&](std::uint32_t pair, Scalar apart_sq) {
+    moving.push_back({apart_sq, scratch.samples[pair]});
     return false;
   });
-  // The nearest 2 n - 1 hold n that move, or n that rest.
-  const std::size_t decide = (std::min)(near.size(), 2 * unreported.pairs - 1);
-  std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(decide), near.end());
+  if (moving.size() < unreported.pairs) return Scalar(-1);
+  const auto last = moving.begin() + static_cast<std::ptrdiff_t>(unreported.pairs);
+  std::partial_sort(moving.begin(), last, moving.end());
+  std::size_t resting = 0;
+  visit_here(scratch.resting, (*(last - 1))[0], [&](std::uint32_t, Scalar) { return ++resting == unreported.pairs; });
+  if (resting == unreported.pairs) return Scalar(-1);
   scratch.scratch.clear();
-  for (std::size_t k = 0; k < decide && scratch.scratch.size() < unreported.pairs; ++k) {
-    if (near[k][1] < threshold) scratch.scratch.push_back(near[k][1]);
-  }
-  if (scratch.scratch.size() < unreported.pairs) return Scalar(-1);
+  for (auto near = moving.begin(); near != last; ++near) scratch.scratch.push_back((*near)[1]);
   return quantile(span<Scalar>(scratch.scratch), 0.5);
 }
 
