@@ -63,28 +63,34 @@ template <typename Camera, typename Scalar>
   return true;
 }
 
-/// motion_distance; of an exact motion the covariance is zero and takes no time.
+/// What distances are computed in: at least double, as det W may be a difference of large numbers.
+template <typename Scalar>
+using AtLeastDouble = decltype(Scalar() + double());
+
+/// motion_distance, with the 36 values of the motion's covariance; null: it is exact.
 template <typename Camera, typename Scalar>
 [[nodiscard]] Scalar distance_under(const Vector2<Scalar>& pixel_prev, const Scalar& depth_prev,
-                                    const Vector2<Scalar>& pixel_cur, const UncertainMotion<Scalar>& motion, bool exact,
-                                    const Camera& camera, const Scalar& sigma_px,
-                                    const MotionDistanceOptions& options) noexcept {
+                                    const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
+                                    const AtLeastDouble<Scalar>* covariance, const Camera& camera,
+                                    const Scalar& sigma_px, const MotionDistanceOptions& options) noexcept {
   using std::sqrt;
+  using Real = AtLeastDouble<Scalar>;
   const Scalar none = Scalar(no_distance<double>);
   MotionResidual<Scalar> pair;
-  if (!motion_residual(pixel_prev, depth_prev, pixel_cur, motion.T_cur_prev, camera, options, pair)) return none;
-  // W = I + A with A = M C M^T / sigma^2, and its inverse; in double, as det A may be a difference of large numbers.
-  using Real = decltype(Scalar() + double());
+  if (!motion_residual(pixel_prev, depth_prev, pixel_cur, T_cur_prev, camera, options, pair)) return none;
+  // W = I + A with A = M C M^T / sigma^2, and its inverse.
   Real a(0), b(0), c(0);
-  if (!exact) {
+  if (covariance != nullptr) {
     const Real per_variance = Real(1) / (Real(sigma_px) * Real(sigma_px));
+    Real first[6] = {}, second[6] = {};  // the rows of M C
+    for (int i = 0; i < 6; ++i) {
+      for (int k = 0; k < 6; ++k) first[k] += Real(pair.M[0][i]) * covariance[6 * i + k];
+      for (int k = 0; k < 6; ++k) second[k] += Real(pair.M[1][i]) * covariance[6 * i + k];
+    }
     for (int k = 0; k < 6; ++k) {
-      Real first(0), second(0);  // of column k of M C
-      for (int i = 0; i < 6; ++i) first += Real(pair.M[0][i]) * Real(motion.covariance(i, k));
-      for (int i = 0; i < 6; ++i) second += Real(pair.M[1][i]) * Real(motion.covariance(i, k));
-      a += first * Real(pair.M[0][k]);
-      b += first * Real(pair.M[1][k]);
-      c += second * Real(pair.M[1][k]);
+      a += first[k] * Real(pair.M[0][k]);
+      b += first[k] * Real(pair.M[1][k]);
+      c += second[k] * Real(pair.M[1][k]);
     }
     a *= per_variance, b *= per_variance, c *= per_variance;
   }
@@ -131,8 +137,9 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
                                      const UncertainMotion<non_deduced<Scalar>>& motion, const Camera& camera,
                                      const non_deduced<Scalar>& sigma_px,
                                      const MotionDistanceOptions& options) noexcept {
-  return detail::distance_under<Camera, Scalar>(pixel_prev, depth_prev, pixel_cur, motion, false, camera, sigma_px,
-                                                options);
+  const auto precise = motion.template cast<detail::AtLeastDouble<Scalar>>();
+  return detail::distance_under<Camera, Scalar>(pixel_prev, depth_prev, pixel_cur, motion.T_cur_prev,
+                                                precise.covariance.data(), camera, sigma_px, options);
 }
 
 /// motion_distance of every pair. `depths_prev` may be empty: none is known. Sizes must agree. Allocates nothing.
@@ -143,10 +150,12 @@ void motion_distances(const PointSpan<non_deduced<Scalar>, 2>& prev, span<const 
                       span<non_deduced<Scalar>> out) noexcept {
   CFP_ASSERT(prev.size() == out.size() && cur.size() == out.size());
   CFP_ASSERT(detail::fits(out.size(), depths_prev));
-  const bool exact = motion.covariance.isZero(0);
+  const auto precise = motion.template cast<detail::AtLeastDouble<Scalar>>();
+  const auto* covariance = motion.covariance.isZero(0) ? nullptr : precise.covariance.data();
   for (std::size_t i = 0; i < out.size(); ++i) {
     const Scalar depth = depths_prev.empty() ? Scalar(0) : depths_prev[i];
-    out[i] = detail::distance_under<Camera, Scalar>(prev[i], depth, cur[i], motion, exact, camera, sigma_px, options);
+    out[i] = detail::distance_under<Camera, Scalar>(prev[i], depth, cur[i], motion.T_cur_prev, covariance, camera,
+                                                    sigma_px, options);
   }
 }
 
