@@ -400,6 +400,22 @@ TEST_CASE("A few pairs on somebody whom nobody reports are told from the wall ar
   CHECK(found_at_any_depth < 0.6 * found);
 }
 
+TEST_CASE("In a hall beyond the depths somebody near whom nobody reports is not taken for the room", "[frame]") {
+  DynamicSceneOptions hall = quiet();
+  hall.people = 1, hall.points_per_person = 240, hall.wall_points = 1000;
+  hall.translation_m = 0.003;
+  for (const std::uint64_t seed : {93U, 94U, 95U, 96U, 97U, 98U}) {
+    Unreported scene(hall, seed);
+    for (std::vector<double>* depths : {&scene.run.scene.depths, &scene.run.scene.previous_depths})
+      std::replace_if(
+          depths->begin(), depths->end(), [](double z) { return z > 3; }, 0.0);
+    const std::array<double, 2> said = scene.marked();
+    CHECK(scene.run.state.report.flow_model == cfp::FlowModelKind::motion_up_to_scale);
+    CHECK(said[1] > 0.7);
+    CHECK(said[0] < 0.12);  // the wall between the points of somebody who is transparent
+  }
+}
+
 TEST_CASE("Where most keypoints would move, or the room behind them, nothing is said of what nobody reports",
           "[frame]") {
   for (const std::uint64_t seed : {96U, 97U, 98U}) {
@@ -427,6 +443,7 @@ TEST_CASE("Where few pairs have a depth, their motion accuses nothing outside of
     for (std::size_t i = 0; i < scene.run.scene.previous_depths.size(); ++i) {  // out of the depth camera's range
       if (scene.run.scene.is_person[i] == 0 && i % 7 != 0) scene.run.scene.previous_depths[i] = 0;
     }
+    scene.run.scene.boxes = {{0, 0, 5, 5}};  // somebody else is reported: his O rests on what depths there are
     const std::array<double, 2> said = scene.marked();
     REQUIRE(scene.run.state.report.flow_model == cfp::FlowModelKind::motion);
     CHECK((said[0] == 0 && said[1] == 0));

@@ -39,16 +39,21 @@ template <typename Scalar>
 
 /// What the flow pairs are judged by: the host's motion if it is exact, or its F; else the model of the pairs outside
 /// all boxes, joined with the host's motion where it is one of known depths, and that motion alone where there is none.
+/// Without boxes few depths are left out: see UnreportedOptions::min_known_depths.
 template <typename Scalar>
 [[nodiscard]] FlowModel<Scalar> flow_model(const Frame<Scalar>& frame, const FlowPairs<Scalar>& undistorted_flow,
-                                           const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
+                                           const PinholeCamera<Scalar>& camera, const CoarseOptions& coarse,
                                            FrameState<Scalar>& state) {
+  const FlowModelOptions& options = coarse.flow;
   const span<const char> outside(state.scratch.outside);
   const auto& given = frame.T_cur_prev;
   const bool exact = given && given->covariance.isZero(0);
   FlowModel<Scalar> model;
   if (!exact && !frame.fundamental) {
-    model = estimate_flow_model(undistorted_flow, outside, camera, options, state.scratch.flow);
+    FlowPairs<Scalar> judges = undistorted_flow;
+    if (state.boxes.empty() && !given && share_with_depth(judges, outside) < coarse.unreported.min_known_depths)
+      judges.previous_depths = {};
+    model = estimate_flow_model(judges, outside, camera, options, state.scratch.flow);
     if (model.kind == FlowModelKind::motion) {
       const double time_s = elapsed_s(state);
       model.motion =
@@ -151,7 +156,7 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   const CoarseOptions& coarse = options.coarse;
   detail::label_pairs(frame, options, state);
   const FlowSupport support = detail::mark_outside(n, coarse.flow, scratch);
-  const FlowModel<Scalar> model = detail::flow_model(frame, flow, pinhole, coarse.flow, state);
+  const FlowModel<Scalar> model = detail::flow_model(frame, flow, pinhole, coarse, state);
   report.flow_model = model.kind;
   report.flow_support = model.support == FlowSupport::outside_pairs ? support : model.support;
   report.flow_status = model.status;

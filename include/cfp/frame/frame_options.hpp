@@ -25,8 +25,7 @@ struct ObjectClass {
 
 /// What moves and no detector reports. WeightRule::posterior: a keypoint in no box counts as on a moving object where,
 /// of the flow pairs on no object near it and at its depth, `pairs` that move are nearer than as many that rest.
-/// Without depths all near are asked; where less than a quarter of the pairs have one, nothing is said. Not in the
-/// paper, for which all outside of boxes is static.
+/// Without depths all near are asked. Not in the paper, for which all outside of boxes is static.
 struct UnreportedOptions {
   double radius_px = 60;     ///< around the keypoint, >= 0; 0: nothing of this
   double depth_share = 0.1;  ///< of the keypoint's depth: a pair farther from it in depth is not asked, >= 0
@@ -34,6 +33,11 @@ struct UnreportedOptions {
   /// Of the pairs on no object, and of the keypoints: if more move, or half as many that lie farther than the rest,
   /// nothing is said of any, since it may as well be the room behind something large. In [0, 1].
   double max_share = 0.4;
+  /// Beyond a depth camera's range somebody near may hold all depths, and be taken for the room by them. Where a
+  /// smaller share of the pairs on no object have one, the motion of a frame without boxes is not estimated by depth;
+  /// in one with boxes, where it is less than half of that, nothing is said. In [0, 1]; 0: depths always count
+  /// (cfp_unreported_study).
+  double min_known_depths = 0.5;
 };
 
 /// The paper's first stage: objects and depth (sections IV-B and IV-C).
@@ -95,7 +99,8 @@ inline namespace CFP_ISA {
   if (!detail::non_negative(o.radius_px)) return "radius_px";
   if (!detail::non_negative(o.depth_share)) return "depth_share";
   if (o.pairs < 1) return "pairs";
-  return o.max_share >= 0 && o.max_share <= 1 ? OptionPath() : "max_share";
+  if (!(o.max_share >= 0 && o.max_share <= 1)) return "max_share";
+  return o.min_known_depths >= 0 && o.min_known_depths <= 1 ? OptionPath() : "min_known_depths";
 }
 
 [[nodiscard]] inline OptionPath invalid_field(const CoarseOptions& o) noexcept {

@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "cfp/core/numeric.hpp"
+#include "cfp/frame/estimate_objects.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
 #include "cfp/frame/point_grid_impl.hpp"
@@ -29,17 +31,17 @@ template <typename Scalar>
   FrameScratch<Scalar>& scratch = state.scratch;
   const std::size_t n = flow.current.size();
   scratch.samples.assign(n, Scalar(-1));  // of pairs without a score
-  const bool by_depth = state.report.flow_model == FlowModelKind::motion && !flow.previous_depths.empty();
-  std::size_t moving = 0, all = 0, tell = 0;
+  std::size_t moving = 0, all = 0;
   for (std::size_t p = 0; p < n; ++p) {
     if (scratch.outside[p] == 0 || !has_distance(state.flow_distances[p])) continue;
-    tell += !by_depth || is_valid_depth(flow.previous_depths[p]) ? 1U : 0U;
     scratch.samples[p] = object_score(state.flow_distances[p], scored);
     moving += scratch.samples[p] < threshold ? 1U : 0U;
     ++all;
   }
-  if (moving < unreported.pairs || 4 * tell < all ||
-      static_cast<double>(moving) > unreported.max_share * static_cast<double>(all))
+  if (moving < unreported.pairs || static_cast<double>(moving) > unreported.max_share * static_cast<double>(all))
+    return false;
+  const bool by_depth = state.report.flow_model == FlowModelKind::motion && !flow.previous_depths.empty();
+  if (by_depth && 2 * share_with_depth(flow, span<const char>(scratch.outside)) < unreported.min_known_depths)
     return false;
   const Scalar radius_px = static_cast<Scalar>(unreported.radius_px);
   const auto moves = [&](std::size_t p) { return scratch.samples[p] >= 0 && scratch.samples[p] < threshold; };
@@ -86,17 +88,20 @@ template <typename Scalar>
   return quantile(span<Scalar>(scratch.scratch), 0.5);
 }
 
-/// Median depth of the keypoints on no object of which the flow says that they move, or of the others; 0: unknown.
+/// Median depth of the keypoints on no object of which the flow says that they move, or of the others; infinite where
+/// fewer than a quarter of them have one, as beyond the range of a depth camera.
 template <typename Scalar>
 [[nodiscard]] Scalar median_depth_outside(bool moving, FrameState<Scalar>& state) {
   std::vector<Scalar>& depths = state.scratch.depths;
   depths.clear();
-  for (std::size_t i = 0; i < state.current.depths.size(); ++i) {
-    if (state.label[i] == KeypointLabel::outside && (state.flow_probability[i] >= 0) == moving &&
-        is_valid_depth(state.current.depths[i]))
+  std::size_t all = 0;
+  for (std::size_t i = 0; i < state.size(); ++i) {
+    if (state.label[i] != KeypointLabel::outside || (state.flow_probability[i] >= 0) != moving) continue;
+    ++all;
+    if (i < state.current.depths.size() && is_valid_depth(state.current.depths[i]))
       depths.push_back(state.current.depths[i]);
   }
-  return quantile(span<Scalar>(depths), 0.5);
+  return 4 * depths.size() < all ? std::numeric_limits<Scalar>::infinity() : quantile(span<Scalar>(depths), 0.5);
 }
 
 /// Whether what would count as moving may be something that nobody reported: not where it holds too many of the

@@ -1,0 +1,184 @@
+// Beyond the range of a depth camera, which share of the flow's pairs must have a depth for their motion to be the
+// camera's? No boxes; somebody 1.5 to 2.5 m away who walks with 0.8 m/s, across or along the axis, or stands, holds
+// `walker` of 400 flow pairs and as many keypoints, what is at rest within 2.2 to 4.4 m `near` of them. The others are
+// 6 to 25 m away and without depth (hall), or 2.5 to 6 m, and three of five depths are missing at random (holes). The
+// camera rests, moves across or along its axis or turns; who walks across before a camera that moves so, too, is left
+// out, as nothing but depth tells. Depth noise as of structured light. Per share (UnreportedOptions::min_known_depths),
+// means over cameras and walks: keypoints with a weight above 0.5 on who walks / on who stands / below it on the rest.
+//
+//   cfp_unreported_study [frames, default 50] [seed, default 7] | --smoke
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <vector>
+
+#include "cfp/core/random.hpp"
+#include "cfp/frame/static_probability.hpp"
+
+namespace {
+
+using V2 = cfp::Vector2<double>;
+using V3 = cfp::Vector3<double>;
+
+enum class Path { rests, across, along, turns };
+
+struct Scene {
+  bool hall = true;
+  double near = 0, walker = 0.1, noise_px = 0.2, camera_m = 0.5 / 30;
+  Path camera = Path::rests, person = Path::across;
+};
+
+struct Counts {
+  double right = 0, all = 0;
+};
+
+// Keypoints that have the weight asked for: on the person above 0.5, elsewhere below.
+struct Judged {
+  Counts person, room;
+};
+
+class Frames {
+ public:
+  Frames(const Scene& scene, cfp::Random& random) : scene_(scene), random_(random) {}
+
+  void make() {
+    previous.clear(), current.clear(), keypoints.clear(), flow_depths.clear(), depths.clear(), on_person.clear();
+    const cfp::SE3<double> T_cur_prev = motion();
+    const double step = (random_.uniform() < 0.5 ? 0.8 : -0.8) / 30;
+    const V3 shift(scene_.person == Path::across ? step : 0, 0, scene_.person == Path::along ? step : 0);
+    person_ = V3(random_.uniform(-0.6, 0.6), 0, random_.uniform(1.5, 2.5));
+    for (int i = 0; i < 800; ++i) {
+      bool person = false;
+      const V3 point = sample(person), moved = T_cur_prev * V3(point + (person ? shift : V3(0, 0, 0)));
+      V2 from, to;
+      if (!camera.project(point, from) || !camera.project(moved, to) || !in_image(to)) continue;
+      if (!person && point.z() > person_.z() && (is_covered(from) || is_covered(to))) continue;
+      if (i % 2 == 0) {
+        keypoints.push_back({to.x(), to.y()});
+        depths.push_back(measured(moved.z()));
+        on_person.push_back(person ? 1 : 0);
+      } else {
+        const double s = scene_.noise_px;
+        previous.push_back({from.x() + s * random_.normal(), from.y() + s * random_.normal()});
+        current.push_back({to.x() + s * random_.normal(), to.y() + s * random_.normal()});
+        flow_depths.push_back(measured(point.z()));
+      }
+    }
+  }
+
+  cfp::PinholeCamera<double> camera{525, 525, 320, 240};
+  std::vector<std::array<double, 2>> previous, current, keypoints;
+  std::vector<double> flow_depths, depths;
+  std::vector<char> on_person;
+
+ private:
+  cfp::SE3<double> motion() {
+    cfp::Vector6<double> xi = cfp::Vector6<double>::Zero();
+    if (scene_.camera == Path::across) xi[0] = scene_.camera_m;
+    if (scene_.camera == Path::along) xi[2] = -scene_.camera_m;
+    if (scene_.camera == Path::turns) xi[4] = 0.02;
+    for (int k = 0; k < 6; ++k) xi[k] += (k < 3 ? 0.001 : 0.002) * random_.normal();
+    return cfp::se3_exp(xi);
+  }
+  V3 sample(bool& person) {
+    const double share = random_.uniform();
+    person = share < scene_.walker;
+    if (person)
+      return person_ + V3(random_.uniform(-0.25, 0.25), random_.uniform(-0.8, 0.8), random_.uniform(-0.1, 0.1));
+    const bool near = share < scene_.walker + scene_.near;
+    const double z = near ? random_.uniform(2.2, 4.4) : scene_.hall ? random_.uniform(6, 25) : random_.uniform(2.5, 6);
+    return {z * random_.uniform(-0.6, 0.6), z * random_.uniform(near ? 0.1 : -0.45, 0.45), z};
+  }
+  bool is_covered(const V2& pixel) const {
+    return std::abs((pixel.x() - 320) / 525 * person_.z() - person_.x()) < 0.3 &&
+           std::abs((pixel.y() - 240) / 525 * person_.z()) < 0.85;
+  }
+  static bool in_image(const V2& p) { return p.x() >= 0 && p.x() < 640 && p.y() >= 0 && p.y() < 480; }
+  double measured(double z) {
+    const bool missing = scene_.hall ? z > 4.5 : random_.uniform() < 0.6;
+    return missing ? 0 : z + 0.0016 * z * z * random_.normal();
+  }
+
+  Scene scene_;
+  cfp::Random& random_;
+  V3 person_;
+};
+
+Judged judge(const Scene& scene, double min_known_depths, int frames, std::uint64_t seed) {
+  cfp::Random random(seed, "unreported study");
+  Frames made(scene, random);
+  cfp::FrameOptions options;
+  options.coarse.unreported.min_known_depths = min_known_depths;
+  cfp::StaticProbability probability(made.camera, options);
+  const std::vector<cfp::Detection<double>> nobody;
+  Judged judged;
+  for (int k = 0; k < frames + 3; ++k) {
+    made.make();
+    cfp::Frame<double> frame;
+    frame.timestamp_s = 1000 + k / 30.0;
+    frame.keypoints = made.keypoints;
+    frame.depths = made.depths;
+    frame.detections = nobody;
+    frame.flow = {made.previous, made.current, made.flow_depths};
+    const auto weight = probability.coarse(frame).weight;
+    for (std::size_t i = 0; k >= 3 && i < weight.size(); ++i) {
+      const bool person = made.on_person[i] != 0;
+      Counts& counts = person ? judged.person : judged.room;
+      counts.right += (weight[i] > 0.5) == person ? 1 : 0;
+      ++counts.all;
+    }
+  }
+  return judged;
+}
+
+double percent(const Counts& counts) { return counts.all > 0 ? 100 * counts.right / counts.all : 0; }
+
+void print_cell(Scene scene, double min_known_depths, int frames, std::uint64_t seed) {
+  Counts walking, standing, room;  // means of per cents
+  const auto add = [](Counts& mean, const Counts& counts) { mean.right += percent(counts) / 100, ++mean.all; };
+  for (const Path camera : {Path::rests, Path::across, Path::along, Path::turns}) {
+    for (const Path person : {Path::rests, Path::across, Path::along}) {
+      scene.camera = camera, scene.person = person;
+      if (camera == Path::across && person == Path::across) continue;
+      const Judged judged = judge(scene, min_known_depths, frames, seed);
+      add(person == Path::rests ? standing : walking, judged.person);
+      add(room, judged.room);
+    }
+  }
+  std::printf(" %.0f / %.0f / %.1f |", percent(walking), percent(standing), percent(room));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const bool smoke = argc > 1 && std::strcmp(argv[1], "--smoke") == 0;
+  const int frames = smoke ? 2 : argc > 1 ? std::atoi(argv[1]) : 50;
+  const int seed = argc > 2 ? std::atoi(argv[2]) : 7;
+  if (frames < 1 || seed < 0) {
+    std::fprintf(stderr, "usage: cfp_unreported_study [frames >= 1] [seed >= 0] | --smoke\n");
+    return 2;
+  }
+  constexpr std::array<double, 4> shares = {0, 0.25, 0.5, 0.75};
+  std::printf("%d frames a cell, seed %d: %% above 0.5 of who walks / who stands / below 0.5 of the room\n\n", frames,
+              seed);
+  std::printf("| room | near | walker | noise px | camera m/s | depths always | a quarter | half | three quarters |\n");
+  std::printf("|---|--:|--:|--:|--:|--:|--:|--:|--:|\n");
+  for (const bool hall : {true, false}) {
+    for (const double near : {0.0, 0.1, 0.2, 0.3}) {
+      for (const double walker : {0.05, 0.1, 0.2}) {
+        for (const double noise_px : {0.2, 0.4}) {
+          for (const double speed : {0.1, 0.5}) {
+            if (smoke && (near > 0 || walker > 0.1 || noise_px > 0.2)) continue;
+            if (!hall && near != 0.1) continue;  // the room is as near
+            std::printf("| %s | %.1f | %.2f | %.1f | %.1f |", hall ? "hall" : "holes", near, walker, noise_px, speed);
+            for (const double share : shares)
+              print_cell({hall, near, walker, noise_px, speed / 30}, share, frames, static_cast<std::uint64_t>(seed));
+            std::printf("\n");
+          }
+        }
+      }
+    }
+  }
+}
