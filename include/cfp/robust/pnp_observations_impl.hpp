@@ -119,19 +119,12 @@ template <typename Counts>
 // Whether the points that `counts` accepts are in four places at least: any three have a pose.
 template <typename Counts>
 [[nodiscard]] bool four_places(const ObservationArrays& in, const Counts& counts) {
-  std::array<std::size_t, 3> places = {};
-  std::size_t known = 0;
-  const auto together = [&](std::size_t i, std::size_t k) {
-    return in.row(X)[i] == in.row(X)[k] && in.row(Y)[i] == in.row(Y)[k] && in.row(Z)[i] == in.row(Z)[k];
-  };
-  for (std::size_t i = 0; i < in.size; ++i) {
-    const auto is_here = [&](std::size_t k) { return together(i, k); };
-    if (!counts(i) || std::any_of(places.begin(), places.begin() + static_cast<std::ptrdiff_t>(known), is_here))
-      continue;
-    if (known == places.size()) return true;
-    places[known++] = i;
+  Vector3<double> places[4];
+  Vector3<double>* end = places;
+  for (std::size_t i = 0; i < in.size && end != places + 4; ++i) {
+    if (counts(i) && std::find(places, end, in.point(i)) == end) *end++ = in.point(i);
   }
-  return false;
+  return end == places + 4;
 }
 
 // The reprojections of as many observations as P has lanes, from the i-th on: residual (u, v) in px, linearised at the
