@@ -71,16 +71,14 @@ template <typename T>
   return true;
 }
 
-// Seven-point solver on scaled pixels: the matrices of the pencil through the null space whose determinant vanishes.
+// Seven-point solver on scaled pixels (x, y, 1): the matrices of the pencil through the null space whose determinant
+// vanishes.
 template <typename T>
-[[nodiscard]] int solve_seven_point(const std::array<Vector2<T>, 7>& p, const std::array<Vector2<T>, 7>& q,
+[[nodiscard]] int solve_seven_point(const std::array<Vector3<T>, 7>& p, const std::array<Vector3<T>, 7>& q,
                                     std::array<Matrix3<T>, 3>& F) noexcept {
   T A[7][9];
   for (std::size_t i = 0; i < 7; ++i) {
-    for (int r = 0; r < 3; ++r) {
-      const T factor = r < 2 ? q[i][r] : T(1);
-      A[i][3 * r] = factor * p[i][0], A[i][3 * r + 1] = factor * p[i][1], A[i][3 * r + 2] = factor;
-    }
+    for (int k = 0; k < 9; ++k) A[i][k] = q[i][k / 3] * p[i][k % 3];
   }
   Matrix3<T> a, b;
   if (!seven_point_null_space(A, a, b)) return 0;
@@ -156,11 +154,11 @@ template <typename Scalar>
   CFP_ASSERT(pairs.previous.size() == 7);
   const detail::PairScaling scaling = detail::scale_pairs(pairs);
   if (scaling.used < 7 || !scaling.valid()) return 0;
-  std::array<Vector2<double>, 7> p, q;
+  std::array<Vector3<double>, 7> p, q;
   detail::for_each_pair(pairs,
                         [&](std::size_t i, const Vector2<double>& previous, const Vector2<double>& current, double) {
-                          p[i] = scaled(scaling.previous, previous).template head<2>();
-                          q[i] = scaled(scaling.current, current).template head<2>();
+                          p[i] = scaled(scaling.previous, previous);
+                          q[i] = scaled(scaling.current, current);
                         });
   std::array<Matrix3<double>, 3> found;
   const int count = detail::solve_seven_point(p, q, found);

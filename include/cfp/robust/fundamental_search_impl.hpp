@@ -22,14 +22,11 @@ inline namespace CFP_ISA {
 // Both points of every pair of a sample must lie on the same side of the cameras: Chum, Werner, Matas: "Epipolar
 // geometry estimation via RANSAC benefits from the oriented epipolar constraint", ICPR 2004.
 template <typename T>
-[[nodiscard]] bool is_oriented(const Matrix3<T>& F, const std::array<Vector2<T>, 7>& p,
-                               const std::array<Vector2<T>, 7>& q) noexcept {
+[[nodiscard]] bool is_oriented(const Matrix3<T>& F, const std::array<Vector3<T>, 7>& p,
+                               const std::array<Vector3<T>, 7>& q) noexcept {
   const Vector3<T> epipole = epipole_of(F);
   int positive = 0;
-  for (std::size_t i = 0; i < 7; ++i) {
-    const Vector3<T> line = F * Vector3<T>(p[i].x(), p[i].y(), 1);
-    positive += cross(epipole, Vector3<T>(q[i].x(), q[i].y(), 1)).dot(line) > 0 ? 1 : 0;
-  }
+  for (std::size_t i = 0; i < 7; ++i) positive += cross(epipole, q[i]).dot(Vector3<T>(F * p[i])) > 0 ? 1 : 0;
   return positive == 0 || positive == 7;
 }
 
@@ -73,10 +70,10 @@ struct FundamentalSearch {
 
   template <typename Visit>
   void solve(const Sample& sample, Visit&& visit) const {
-    std::array<Vector2<T>, 7> p, q;
+    std::array<Vector3<T>, 7> p, q;
     for (std::size_t k = 0; k < 7; ++k) {
-      p[k] = previous_point<T>(pairs, sample[k]).template head<2>();
-      q[k] = current_point<T>(pairs, sample[k]).template head<2>();
+      p[k] = previous_point<T>(pairs, sample[k]);
+      q[k] = current_point<T>(pairs, sample[k]);
     }
     std::array<Matrix3<T>, 3> solutions;
     const int count = solve_seven_point(p, q, solutions);
