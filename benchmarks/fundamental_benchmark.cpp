@@ -122,7 +122,7 @@ void real_data(int repetitions) {
           for (std::size_t i = 0; i < scene.prev.size(); ++i) {
             if (scene.is_inlier[i] == 0) continue;
             const cfp::Vector2<double> a(scene.prev[i][0], scene.prev[i][1]), b(scene.cur[i][0], scene.cur[i][1]);
-            const double d = cfp::sampson_distance<double>(F, a, b);
+            const double d = cfp_test::sampson_distance<double>(F, a, b);
             distances.push_back(d >= 0 && d < 1e3 ? d : 1e3);  // no F
           }
           errors_px[m].push_back(cfp_benchmark::median(distances));

@@ -207,7 +207,7 @@ Problem make_problem(Kind kind, double noise, double outliers, double base_m, bo
     const Vector2<double> p(problem.previous[i][0], problem.previous[i][1]),
         q(problem.current[i][0], problem.current[i][1]);
     problem.true_distances.push_back(problem.dimensions == 2 ? ((H * p.homogeneous()).hnormalized() - q).norm()
-                                                             : cfp::sampson_distance<double>(F, p, q));
+                                                             : cfp_test::sampson_distance<double>(F, p, q));
   }
   problem.determined = kind == Kind::volume || kind == Kind::few || kind == Kind::mostly_plane ||
                        kind == Kind::moving_walker || kind == Kind::one_pixel;
@@ -247,7 +247,7 @@ bool is_told(const Problem& problem, const Matrix3<double>& F) {
   std::vector<double> distances;
   for (std::size_t i = 0; i < problem.previous.size(); ++i) {
     const auto &p = problem.previous[i], &q = problem.current[i];
-    distances.push_back(cfp::sampson_distance<double>(F, {p[0], p[1]}, {q[0], q[1]}));
+    distances.push_back(cfp_test::sampson_distance<double>(F, {p[0], p[1]}, {q[0], q[1]}));
   }
   const double of_F = nats(distances, 1, 7);
   if (problem.true_distances.empty()) return of_F < 0;
@@ -276,7 +276,7 @@ void judge(const Problem& problem, const Matrix3<double>& F, bool named, double 
   std::vector<double> distances;
   for (std::size_t i = 0; i < problem.exact_previous.size(); ++i) {
     const auto &p = problem.exact_previous[i], &q = problem.exact_current[i];
-    const double d = cfp::sampson_distance<double>(F, {p[0], p[1]}, {q[0], q[1]});
+    const double d = cfp_test::sampson_distance<double>(F, {p[0], p[1]}, {q[0], q[1]});
     distances.push_back(d >= 0 ? d : 1e3);
   }
   std::nth_element(distances.begin(), distances.begin() + 100, distances.end());

@@ -72,7 +72,6 @@ static void instantiate_geometry() noexcept {
   use(&cfp::has_distance<Scalar>);
   use(&cfp::epipolar_line<Scalar>);
   use(&cfp::epipolar_distance<Scalar>);
-  use(&cfp::sampson_distance<Scalar>);
   use(&cfp::epipolar_distances<Scalar>);
   use(&cfp::nearest_fundamental<Scalar>);
   use(&cfp::fundamental_8point<Scalar>);

@@ -45,8 +45,8 @@ TEMPLATE_TEST_CASE("Eight points recover the exact F", "[geometry]", float, doub
     REQUIRE(cfp::fundamental_8point(PointPairs{scene.prev, scene.cur}, F) == Status::ok);
     // Float pixels carry 3e-5 px of rounding, which eight points alone may amplify.
     for (std::size_t i = 0; i < scene.prev.size(); ++i) {
-      const double distance = double(
-          cfp::sampson_distance<TestType>(F, {scene.prev[i][0], scene.prev[i][1]}, {scene.cur[i][0], scene.cur[i][1]}));
+      const double distance = double(cfp_test::sampson_distance<TestType>(F, {scene.prev[i][0], scene.prev[i][1]},
+                                                                          {scene.cur[i][0], scene.cur[i][1]}));
       CHECK(distance >= 0);
       CHECK(distance < (std::is_same_v<TestType, float> ? 5e-2 : 1e-6));
     }
@@ -74,8 +74,8 @@ TEMPLATE_TEST_CASE("Seven points give the true F among their solutions", "[geome
       if (!std::is_same_v<TestType, double>) continue;
       CHECK(std::abs(F.determinant()) < 1e-12);
       for (std::size_t i = 0; i < 7; ++i) {
-        CHECK(cfp::sampson_distance<double>(F, {scene.prev[i][0], scene.prev[i][1]},
-                                            {scene.cur[i][0], scene.cur[i][1]}) < 1e-5);
+        CHECK(cfp_test::sampson_distance<double>(F, {scene.prev[i][0], scene.prev[i][1]},
+                                                 {scene.cur[i][0], scene.cur[i][1]}) < 1e-5);
       }
     }
     found += best < (std::is_same_v<TestType, float> ? 0.02 : 1e-6) ? 1 : 0;

@@ -117,7 +117,7 @@ CFP_PROPERTIES("Properties of distances between views", "[geometry]",
                   return zero_for_truth(
                       random, [](const auto& camera, const auto& T, const auto& prev, const auto& cur, double) {
                         const Matrix3<double> F = cfp::fundamental_from_pose(camera, T);
-                        return std::fmax(cfp::epipolar_distance(F, prev, cur), cfp::sampson_distance(F, prev, cur));
+                        return cfp::epipolar_distance(F, prev, cur);
                       });
                 }},
                {"the motion distance of a point's own pixels is zero", 300,
@@ -151,16 +151,7 @@ CFP_PROPERTIES("Properties of distances between views", "[geometry]",
                                         other = -std::exp2(static_cast<double>(random.index(41)) - 20) * F;
                   const Vector2<double> prev = cfp_testing::pixel(random), cur = cfp_testing::pixel(random);
                   return std::abs(cfp::epipolar_distance(F, prev, cur) - cfp::epipolar_distance(other, prev, cur)) <
-                             1e-9 &&
-                         std::abs(cfp::sampson_distance(F, prev, cur) - cfp::sampson_distance(other, prev, cur)) < 1e-9;
-                }},
-               {"the Sampson distance does not care which view is the first", 300,
-                [](Random& random) {
-                  const Matrix3<double> F = cfp::fundamental_from_pose(cfp_testing::pinhole_camera<double>(random),
-                                                                       motion(random)),
-                                        back = F.transpose();
-                  const Vector2<double> prev = cfp_testing::pixel(random), cur = cfp_testing::pixel(random);
-                  return std::abs(cfp::sampson_distance(F, prev, cur) - cfp::sampson_distance(back, cur, prev)) < 1e-9;
+                         1e-9;
                 }},
                {"a rotation of the camera is a homography", 300,
                 [](Random& random) {

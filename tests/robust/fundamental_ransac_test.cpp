@@ -270,7 +270,7 @@ TEST_CASE("Little parallax beside a plane is found below mismatches, at the nois
           const cfp::Vector3<double> point = elsewhere.uniform(0.6, 5) * ray;
           cfp::Vector2<double> u, v;
           REQUIRE((scene.camera.project(point, u) && scene.camera.project(scene.T_cur_prev * point, v)));
-          distances.push_back(cfp::sampson_distance<double>(result.F, u, v));
+          distances.push_back(cfp_test::sampson_distance<double>(result.F, u, v));
         }
         std::nth_element(distances.begin(), distances.begin() + 100, distances.end());
         wrong += distances[100] < 0.05 + noise_px ? 0 : 1;

@@ -96,7 +96,7 @@ CFP_PROPERTIES("Properties of the robust fundamental matrix", "[robust]",
                   if (!result.found()) return true;
                   for (std::size_t i = 0; i < mask.size(); ++i) {
                     const auto &p = scene.prev[i], &q = scene.cur[i];
-                    const double d = cfp::sampson_distance<double>(result.F, {p[0], p[1]}, {q[0], q[1]});
+                    const double d = cfp_test::sampson_distance<double>(result.F, {p[0], p[1]}, {q[0], q[1]});
                     if ((mask[i] != 0) != (d <= cfp::FundamentalRansacOptions().threshold_px) && std::abs(d - 1) > 1e-3)
                       return false;
                   }

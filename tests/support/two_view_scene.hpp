@@ -87,6 +87,19 @@ inline cfp::Matrix3<double> scaled_fundamental(const cfp::Matrix3<double>& F, co
       .normalized();
 }
 
+/// |x_cur^T F x_prev| / sqrt(A^2 + B^2 + A'^2 + B'^2), (A, B, C) = F x_prev, (A', B', C') = F^T x_cur: to first order
+/// the distance (px) of the pair to the nearest one that fulfils the constraint; -1 for F = 0. Hartley, Zisserman, 2nd
+/// ed., eq. (11.9).
+template <typename Scalar>
+double sampson_distance(const cfp::Matrix3<Scalar>& F, const cfp::Vector2<Scalar>& x_prev,
+                        const cfp::Vector2<Scalar>& x_cur) {
+  const cfp::Matrix3<double> G = F.template cast<double>();
+  const cfp::Vector3<double> p(double(x_prev.x()), double(x_prev.y()), 1), q(double(x_cur.x()), double(x_cur.y()), 1);
+  const cfp::Vector3<double> line = G * p, back = G.transpose() * q;
+  const double norm_sq = line.head<2>().squaredNorm() + back.head<2>().squaredNorm();
+  return norm_sq > 0 ? std::abs(q.dot(line)) / std::sqrt(norm_sq) : -1;
+}
+
 /// Median Sampson distance (px) of the exact true pairs under F: how good F is.
 template <typename Scalar>
 double median_sampson_of_truth(const TwoViewScene<Scalar>& scene, const cfp::Matrix3<Scalar>& F) {
@@ -95,7 +108,7 @@ double median_sampson_of_truth(const TwoViewScene<Scalar>& scene, const cfp::Mat
     if (scene.is_inlier[i] == 0) continue;
     const auto& p = scene.exact_prev[i];
     const auto& q = scene.exact_cur[i];
-    distances.push_back(static_cast<double>(cfp::sampson_distance<Scalar>(F, {p[0], p[1]}, {q[0], q[1]})));
+    distances.push_back(sampson_distance<Scalar>(F, {p[0], p[1]}, {q[0], q[1]}));
   }
   if (distances.empty()) return 0;
   std::nth_element(distances.begin(), distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2),

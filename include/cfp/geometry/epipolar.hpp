@@ -21,16 +21,6 @@ namespace cfp {
 namespace detail {
 inline namespace CFP_ISA {
 
-/// |numerator| / sqrt(norm_sq), or no_distance unless norm_sq > noise_sq >= 0 and the quotient is finite.
-template <typename Scalar>
-[[nodiscard]] Scalar ratio_distance(const Scalar& numerator, const Scalar& norm_sq, const Scalar& noise_sq) noexcept {
-  using std::abs;
-  using std::sqrt;
-  if (!(norm_sq > noise_sq)) return Scalar(no_distance<double>);
-  const Scalar distance = abs(numerator) / sqrt(norm_sq);
-  return has_distance(distance) ? distance : Scalar(no_distance<double>);
-}
-
 /// F over its largest coefficient, so that squares neither over- nor underflow; zero when F is zero or not finite.
 template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> unit_scale(const Matrix3<Scalar>& F) noexcept {
@@ -39,31 +29,26 @@ template <typename Scalar>
   return F / largest;
 }
 
-/// Per column of F (or row, for F^T) and unit of u, v and 1: the square of the size below which what it adds to the
-/// normal of the line F (u, v, 1) is rounding noise.
+/// Per column of F and unit of u, v and 1: the square of the size below which what it adds to the normal of the line
+/// F (u, v, 1) is rounding noise.
 template <typename Scalar>
-[[nodiscard]] Vector3<Scalar> line_noise(const Matrix3<Scalar>& F, bool transposed = false) noexcept {
+[[nodiscard]] Vector3<Scalar> line_noise(const Matrix3<Scalar>& F) noexcept {
   const Scalar tolerance(Tolerance<Scalar>::degenerate);
-  const auto of = [&](int k) {
-    const Scalar x = tolerance * (transposed ? F(k, 0) : F(0, k)), y = tolerance * (transposed ? F(k, 1) : F(1, k));
-    return x * x + y * y;
-  };
-  return {of(0), of(1), of(2)};
-}
-
-/// line_noise of the line of x.
-template <typename Scalar>
-[[nodiscard]] Scalar noise_at(const Vector3<Scalar>& noise, const Vector2<Scalar>& x) noexcept {
-  return noise.x() * x.x() * x.x() + noise.y() * x.y() * x.y() + noise.z();
+  return (tolerance * F.template topRows<2>()).colwise().squaredNorm().transpose();
 }
 
 /// epipolar_distance for an F of unit_scale, whose line_noise is given.
 template <typename Scalar>
 [[nodiscard]] Scalar scaled_epipolar_distance(const Matrix3<Scalar>& F, const Vector3<Scalar>& noise,
                                               const Vector2<Scalar>& x_prev, const Vector2<Scalar>& x_cur) noexcept {
+  using std::abs;
+  using std::sqrt;
   const Vector3<Scalar> line = F.col(0) * x_prev.x() + F.col(1) * x_prev.y() + F.col(2);
-  return ratio_distance(Scalar(line.x() * x_cur.x() + line.y() * x_cur.y() + line.z()),
-                        Scalar(line.x() * line.x() + line.y() * line.y()), noise_at(noise, x_prev));
+  const Scalar norm_sq = line.x() * line.x() + line.y() * line.y();
+  const Scalar noise_sq = noise.x() * x_prev.x() * x_prev.x() + noise.y() * x_prev.y() * x_prev.y() + noise.z();
+  if (!(norm_sq > noise_sq)) return Scalar(no_distance<double>);
+  const Scalar distance = abs(line.x() * x_cur.x() + line.y() * x_cur.y() + line.z()) / sqrt(norm_sq);
+  return has_distance(distance) ? distance : Scalar(no_distance<double>);
 }
 
 }  // namespace CFP_ISA
@@ -100,21 +85,6 @@ template <typename Scalar>
                                        const Vector2<Scalar>& x_cur) noexcept {
   const Matrix3<Scalar> G = detail::unit_scale(F);
   return detail::scaled_epipolar_distance(G, detail::line_noise(G), x_prev, x_cur);
-}
-
-/// |x_cur^T F x_prev| / sqrt(A^2 + B^2 + A'^2 + B'^2), (A', B', C') = F^T x_cur: to first order the distance in pixels
-/// of the pair to the nearest pair that fulfils the constraint (Sampson). Hartley, Zisserman, 2nd ed., eq. (11.9).
-template <typename Scalar>
-[[nodiscard]] Scalar sampson_distance(const Matrix3<Scalar>& F, const Vector2<Scalar>& x_prev,
-                                      const Vector2<Scalar>& x_cur) noexcept {
-  const Matrix3<Scalar> G = detail::unit_scale(F);
-  const Vector3<Scalar> line = epipolar_line(G, x_prev);
-  const Vector3<Scalar> cur(x_cur.x(), x_cur.y(), Scalar(1));
-  const Scalar a_prev = G.col(0).dot(cur), b_prev = G.col(1).dot(cur);
-  const Scalar norm_sq = line.x() * line.x() + line.y() * line.y() + a_prev * a_prev + b_prev * b_prev;
-  const Scalar noise =
-      detail::noise_at(detail::line_noise(G), x_prev) + detail::noise_at(detail::line_noise(G, true), x_cur);
-  return detail::ratio_distance(line.x() * x_cur.x() + line.y() * x_cur.y() + line.z(), norm_sq, noise);
 }
 
 /// epipolar_distance of every correspondence. Allocates nothing.
