@@ -52,7 +52,6 @@
 #include "cfp/geometry/distance.hpp"
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/fundamental.hpp"
-#include "cfp/geometry/homography.hpp"
 #include "cfp/geometry/motion_distance.hpp"
 #include "cfp/geometry/p3p.hpp"
 #include "cfp/geometry/point_pairs.hpp"

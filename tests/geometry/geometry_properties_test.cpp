@@ -8,7 +8,6 @@
 #include "cfp/geometry/depth_noise.hpp"
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/fundamental.hpp"
-#include "cfp/geometry/homography.hpp"
 #include "cfp/geometry/motion_distance.hpp"
 #include "cfp/geometry/p3p.hpp"
 #include "cfp_testing/generators.hpp"

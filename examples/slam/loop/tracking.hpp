@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "cfp/frame/static_probability.hpp"
-#include "cfp/geometry/homography.hpp"
+#include "cfp/geometry/epipolar.hpp"
 #include "cfp/interop/opencv.hpp"
 #include "detector_watch.hpp"
 #include "front_end.hpp"

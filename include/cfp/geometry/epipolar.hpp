@@ -1,6 +1,7 @@
 /// @file epipolar.hpp
 /// Epipolar geometry of two views: F from a pose, epipolar lines and the distances of correspondences to them (paper
-/// sections IV-B and IV-D). Convention: x_cur^T F x_prev = 0, with pixels of an undistorted image.
+/// sections IV-B and IV-D), and what is left of it when the camera only turns. Convention: x_cur^T F x_prev = 0, with
+/// pixels of an undistorted image.
 ///
 /// A distance is >= 0 and finite, or `no_distance` (-1) where there is none: the line is undefined (A = B = 0 up to
 /// rounding: the point is at the epipole, F is zero or not finite), or a coordinate is not finite. No distance depends
@@ -69,6 +70,14 @@ template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> fundamental_from_pose(const PinholeCamera<Scalar>& camera,
                                                     const SE3<Scalar>& T_cur_prev) noexcept {
   return fundamental_from_pose(camera, camera, T_cur_prev);
+}
+
+/// The motion of the whole image when the camera turns by R (of T_cur_prev), where there is no F: K R K^-1 with the
+/// camera matrix K. For the box tracker, which knows nothing of the camera.
+template <typename Scalar>
+[[nodiscard]] Matrix3<Scalar> rotation_homography(const PinholeCamera<Scalar>& camera,
+                                                  const Matrix3<non_deduced<Scalar>>& R) noexcept {
+  return camera.matrix() * R * inverse(camera.matrix());
 }
 
 /// The line (A, B, C) = F x_prev in the current image: A u + B v + C = 0.
