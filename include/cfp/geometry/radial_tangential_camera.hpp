@@ -62,36 +62,32 @@ template <typename Scalar>
 template <typename Scalar>
 [[nodiscard]] bool find_ray(const RadialTangentialCamera<Scalar>& camera, const Vector2<Scalar>& pixel,
                             Vector3<Scalar>& ray) noexcept {
-  const Scalar target_x = (pixel.x() - camera.cx) / camera.fx;
-  const Scalar target_y = (pixel.y() - camera.cy) / camera.fy;
-  Scalar error_sq = target_x * target_x + target_y * target_y;
+  const Vector2<Scalar> target((pixel.x() - camera.cx) / camera.fx, (pixel.y() - camera.cy) / camera.fy);
+  Scalar error_sq = target.squaredNorm();
   // With the factors they have in the polynomial of the fold: where that is not finite, nothing is projected.
   const Scalar radial = Scalar(3) * camera.k1 + Scalar(5) * camera.k2 + Scalar(7) * camera.k3;
   if (!is_finite(error_sq) || !is_finite(Scalar(radial + camera.p1 + camera.p2))) return false;
   const Scalar unit_roundoff(std::numeric_limits<Scalar>::epsilon());
   const Scalar enough_sq = Scalar(256) * unit_roundoff * unit_roundoff * (Scalar(1) + error_sq);
   // On the axis the distortion is 0 and its Jacobian the identity: the first step is the target itself.
-  Scalar x(0), y(0), step_x = target_x, step_y = target_y;
+  Vector2<Scalar> found = Vector2<Scalar>::Zero(), step = target;
   for (int evaluation = 0; evaluation < 40 && !(error_sq <= enough_sq); ++evaluation) {
     DistortedPoint<Scalar> d;
-    const bool valid = distort(camera, Scalar(x + step_x), Scalar(y + step_y), d);
-    const Scalar ex = target_x - d.x;
-    const Scalar ey = target_y - d.y;
-    const Scalar candidate_error_sq = ex * ex + ey * ey;
+    const Vector2<Scalar> candidate = found + step;
+    const bool valid = distort(camera, candidate.x(), candidate.y(), d);
+    const Vector2<Scalar> error = target - Vector2<Scalar>(d.x, d.y);
+    const Scalar candidate_error_sq = error.squaredNorm();
     if (!valid || !(candidate_error_sq < error_sq)) {
-      step_x *= Scalar(0.5);
-      step_y *= Scalar(0.5);
+      step *= Scalar(0.5);
       continue;
     }
-    x += step_x;
-    y += step_y;
+    found = candidate;
     error_sq = candidate_error_sq;
     const Scalar inv_determinant = Scalar(1) / (d.xx * d.yy - d.xy * d.xy);
-    step_x = (d.yy * ex - d.xy * ey) * inv_determinant;
-    step_y = (d.xx * ey - d.xy * ex) * inv_determinant;
+    step = Vector2<Scalar>(d.yy * error.x() - d.xy * error.y(), d.xx * error.y() - d.xy * error.x()) * inv_determinant;
   }
   if (!(error_sq <= enough_sq)) return false;
-  ray = {x, y, Scalar(1)};
+  ray = {found.x(), found.y(), Scalar(1)};
   return true;
 }
 
