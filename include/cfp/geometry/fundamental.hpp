@@ -57,11 +57,9 @@ template <typename T>
     }
   }
   for (int free = 0; free < 2; ++free) {
-    T x[9];
-    x[7] = free == 0 ? 1 : 0;
-    x[8] = free == 0 ? 0 : 1;
+    T x[9] = {};
+    x[7 + free] = 1;
     for (int k = 6; k >= 0; --k) {
-      x[k] = 0;
       for (int c = k + 1; c < 9; ++c) x[k] -= A[k][c] * x[c];
     }
     Matrix3<T>& F = free == 0 ? F1 : F2;
