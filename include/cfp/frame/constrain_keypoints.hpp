@@ -62,8 +62,9 @@ template <typename Scalar>
   const auto fit = [&](bool inside) {
     scratch.samples.clear();
     for (std::size_t i = 0; i < distances.size(); ++i) {
+      const Scalar m = map_point_probability.empty() ? Scalar(-1) : map_point_probability[i];
       if ((state.label[i] == KeypointLabel::outside && !is_unreported(i, state)) ||
-          (inside && model_weight(i, map_point_probability[i], options, state) >= Scalar(0.5)))
+          (inside && model_weight(i, m, options, state) >= Scalar(0.5)))
         scratch.samples.push_back(distances[i]);
     }
     return fit_constraint(scratch.samples, constraint, scratch.scratch);
@@ -96,14 +97,14 @@ inline namespace CFP_ISA {
 /// Sets K of every keypoint in a box. In order: the distances d^T (reprojection_distances) and d^F
 /// (epipolar_distances under F = K^-T [t]x R K^-1 with the camera matrix K, skipped for |t| <= t_Th) of all matches; a
 /// sigmoid for each from the keypoints outside all boxes; second_stage_probability for those inside. M is that of
-/// before this frame, negative where there is no map point. With WeightRule::posterior a keypoint that neither
-/// constraint judges, for want of a match, a depth or a translation, gets 1/2: its weight is what was known before.
-/// When neither sigmoid has enough samples, the coarse K stays; a pose that is not finite has that effect.
-/// O(keypoints).
+/// before this frame, negative where there is no map point; empty for a host that keeps none. With
+/// WeightRule::posterior a keypoint that neither constraint judges, for want of a match, a depth or a translation, gets
+/// 1/2: its weight is what was known before. When neither sigmoid has enough samples, the coarse K stays; a pose that
+/// is not finite has that effect. O(keypoints).
 template <typename Scalar, typename Camera>
 void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar>> map_point_probability,
                          const Camera& camera, const FrameOptions& options, FrameState<Scalar>& state) {
-  CFP_ASSERT(map_point_probability.size() == state.size());
+  CFP_ASSERT(detail::fits(state.size(), map_point_probability));
   const std::size_t n = state.size();
   FrameScratch<Scalar>& scratch = state.scratch;
   state.report.stage = Stage::fine;
@@ -138,7 +139,7 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
   for (std::size_t i = 0; i < n; ++i) {
     if (state.box[i] == no_box) continue;
     const std::size_t b = static_cast<std::size_t>(state.box[i]);
-    const Scalar m = map_point_probability[i];
+    const Scalar m = map_point_probability.empty() ? Scalar(-1) : map_point_probability[i];
     SecondStageKeypoint<Scalar>& keypoint = state.evidence[i] = {};
     keypoint.projection = {static_probability(projection, scratch.projection[i]), ct,
                            has_projection && scratch.projection[i] >= Scalar(0)};

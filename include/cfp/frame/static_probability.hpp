@@ -15,8 +15,6 @@
 /// `extern template class cfp::StaticProbability<Camera>;` in its own header, `template class` without extern there.
 #pragma once
 
-#include <vector>
-
 #include "cfp/core/span.hpp"
 #include "cfp/detection/box_tracker.hpp"
 #include "cfp/frame/constrain_keypoints.hpp"
@@ -109,13 +107,6 @@ class StaticProbability {
   [[nodiscard]] const FrameState<Scalar>& state() const noexcept { return state_; }
 
  private:
-  /// M of every keypoint; for a host that keeps none the one that changes no weight.
-  span<const Scalar> or_unknown(span<const Scalar> map_point_probability) {
-    if (!map_point_probability.empty()) return map_point_probability;
-    unknown_.resize(state_.size());
-    for (std::size_t i = 0; i < state_.size(); ++i) unknown_[i] = unknown_map_point(i, options_, state_);
-    return unknown_;
-  }
   StageResult<Scalar> result(span<const Scalar> map_point_probability) {
     weigh_keypoints(map_point_probability, options_, state_);
     return {state_.weight, state_.static_probability, state_.report};
@@ -125,7 +116,6 @@ class StaticProbability {
   FrameOptions options_;
   BoxTracker<Scalar> tracker_;
   FrameState<Scalar> state_;
-  std::vector<Scalar> unknown_;
 };
 
 // Outside of the class, so that `extern template class` keeps the engines behind them out of a unit.
@@ -146,7 +136,7 @@ StageResult<typename Camera::ScalarType> StaticProbability<Camera>::fine(const P
                                                                          span<const Scalar> map_point_probability) {
   match_in_boxes(pose.T_cur_prev, match, camera_, options_, state_);
   if (state_.previous.known && !(match.empty() && state_.current.descriptors.empty()))
-    constrain_keypoints(pose, or_unknown(map_point_probability), camera_, options_, state_);
+    constrain_keypoints(pose, map_point_probability, camera_, options_, state_);
   return result(map_point_probability);
 }
 
