@@ -82,12 +82,10 @@ class DetectorHealth {
     last_.assign(detections->begin(), detections->end());
     bool absurd = false, seen = false, staying = false;
     for (const Detection<Scalar>& d : *detections) {
-      if (is_absurd(d, options_)) {
-        absurd = true;
-      } else {
-        seen = true;
-        staying = staying || !leaves(d.box);
-      }
+      const bool credible = !is_absurd(d, options_);
+      absurd = absurd || !credible;
+      seen = seen || credible;
+      staying = staying || (credible && !leaves(d.box));
     }
     if (seen) {
       // Single misses do not interrupt.

@@ -128,7 +128,7 @@ template <typename Scalar>
     // A lens may put what its edge shows outside the image without distortion.
     if (!sized || !(w > 0.1) || !is_finite(x) || !is_finite(y)) continue;
     const auto cell = [](double at, double size, int cells) {
-      return at <= 0 ? 0 : at >= size * cells ? cells - 1 : static_cast<int>(at / size);
+      return static_cast<int>(std::clamp(at / size, 0.0, cells - 1.0));
     };
     occupied[static_cast<std::size_t>(cell(y, options.image_height, rows) * columns +
                                       cell(x, options.image_width, columns))] = true;
@@ -170,12 +170,10 @@ class FrameInterval {
     last_s_ = time_s;
     refused_s_ = std::numeric_limits<double>::infinity();
     if (!known) return false;
-    if (!(usual_s_ > 0)) {
-      usual_s_ = dt < shortest_s ? dt : shortest_s;
-      return dt > factor * usual_s_;
-    }
+    const bool second = !(usual_s_ > 0);
+    if (second) usual_s_ = (std::min)(dt, shortest_s);
     const bool gap = dt > factor * usual_s_ && dt > shortest_s;
-    usual_s_ += 0.2 * ((dt < 2 * usual_s_ ? dt : 2 * usual_s_) - usual_s_);
+    if (!second) usual_s_ += 0.2 * ((std::min)(dt, 2 * usual_s_) - usual_s_);
     return gap;
   }
   [[nodiscard]] double usual_s() const noexcept { return usual_s_; }  ///< 0: not known yet

@@ -80,16 +80,11 @@ template <typename Scalar>
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar second_stage_probability(const SecondStageKeypoint<Scalar>& keypoint,
                                                         Scalar object_threshold) noexcept {
-  switch (second_stage_rule(keypoint, object_threshold)) {
-    case SecondStageRule::unmatched_background:
-      return clamp_probability(keypoint.map_point_probability);
-    case SecondStageRule::high_dynamic:
-      return fuse_high_dynamic(keypoint.projection, keypoint.epipolar);
-    case SecondStageRule::low_dynamic:
-      return fuse_low_dynamic(keypoint.projection, keypoint.epipolar);
-    default:
-      return Scalar(0);
-  }
+  const SecondStageRule rule = second_stage_rule(keypoint, object_threshold);
+  if (rule == SecondStageRule::unmatched_background) return clamp_probability(keypoint.map_point_probability);
+  if (rule == SecondStageRule::high_dynamic) return fuse_high_dynamic(keypoint.projection, keypoint.epipolar);
+  if (rule == SecondStageRule::low_dynamic) return fuse_low_dynamic(keypoint.projection, keypoint.epipolar);
+  return Scalar(0);
 }
 
 /// What the constraints say of a keypoint whose map point's M is the prior: K by the rules above, and 1/2, nothing, of
