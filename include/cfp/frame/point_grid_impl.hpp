@@ -24,24 +24,25 @@ struct PointGrid {
   };
   std::vector<Point> points, unsorted;  // by cell, row by row; of one cell by index
   std::vector<std::uint32_t> first;     // of each cell
-  Scalar left = 0, top = 0, per_side = 1, reach = 0;
-  std::size_t columns = 1, rows = 1;
+  Scalar left = 0, top = 0, columns_per_px = 0, rows_per_px = 0, reach = 0;
+
+  static constexpr std::size_t side = 32;  // columns, and rows, over the extent of the points
 };
 
 inline namespace CFP_ISA {
 
-/// Which of so many columns or rows a place lies in; the outermost ones hold all beyond.
+/// Which column or row a place lies in; the outermost ones hold all beyond.
 template <typename Scalar>
-[[nodiscard]] std::size_t cell_at(Scalar offset, Scalar per_side, std::size_t count) noexcept {
-  return static_cast<std::uint32_t>(
-      (std::min)((std::max)(Scalar(0), offset * per_side), static_cast<Scalar>(count - 1)));
+[[nodiscard]] std::size_t cell_at(Scalar offset, Scalar per_px) noexcept {
+  constexpr Scalar last = PointGrid<Scalar>::side - 1;
+  return static_cast<std::uint32_t>((std::min)((std::max)(Scalar(0), offset * per_px), last));
 }
 
 /// Puts those of the points for which `keep(index)` holds, all finite, into cells. Later `reach` is how near is near.
 template <typename Scalar, typename Keep>
 void fill_grid(const PointSpan<Scalar, 2>& points, const Keep& keep, Scalar reach, PointGrid<Scalar>& grid) {
   const std::size_t most = points.size();
-  grid.points.reserve(most), grid.unsorted.reserve(most), grid.first.reserve(12 * most + 8);
+  grid.points.reserve(most), grid.unsorted.reserve(most);
   grid.unsorted.clear();
   const Scalar huge = std::numeric_limits<Scalar>::infinity();
   Vector2<Scalar> low(huge, huge), high = -low;
@@ -50,21 +51,14 @@ void fill_grid(const PointSpan<Scalar, 2>& points, const Keep& keep, Scalar reac
     grid.unsorted.push_back({points(i, 0), points(i, 1), static_cast<std::uint32_t>(i)});
     low = low.cwiseMin(points[i]), high = high.cwiseMax(points[i]);
   }
-  // A cell of what is near, but no more than a dozen cells per point.
-  const Vector2<Scalar> size = high - low;
-  const Scalar n = static_cast<Scalar>(4 * grid.unsorted.size());
+  constexpr std::size_t side = PointGrid<Scalar>::side;
+  const Vector2<Scalar> per_px = Scalar(side) * (high - low).cwiseInverse();
   grid.left = low.x(), grid.top = low.y(), grid.reach = reach;
-  grid.per_side = 1 / (std::max)({reach, std::sqrt(size.prod() / n), size.maxCoeff() / n});
-  const auto count = [&](Scalar extent) {
-    const Scalar cells = extent * grid.per_side;
-    return cells <= n ? static_cast<std::size_t>(cells) + 1 : std::size_t(1);
-  };
-  grid.columns = count(size.x()), grid.rows = count(size.y());
+  grid.columns_per_px = per_px.x(), grid.rows_per_px = per_px.y();
   const auto cell = [&](const auto& p) {
-    return cell_at(p.y - grid.top, grid.per_side, grid.rows) * grid.columns +
-           cell_at(p.x - grid.left, grid.per_side, grid.columns);
+    return cell_at(p.y - grid.top, grid.rows_per_px) * side + cell_at(p.x - grid.left, grid.columns_per_px);
   };
-  grid.first.assign(grid.columns * grid.rows + 2, 0);
+  grid.first.assign(side * side + 2, 0);
   for (const auto& p : grid.unsorted) ++grid.first[cell(p) + 2];
   std::partial_sum(grid.first.begin(), grid.first.end(), grid.first.begin());
   grid.points.resize(grid.unsorted.size());
@@ -75,12 +69,12 @@ void fill_grid(const PointSpan<Scalar, 2>& points, const Keep& keep, Scalar reac
 template <typename Scalar, typename Visit>
 void visit_near(const PointGrid<Scalar>& grid, Scalar x, Scalar y, const Visit& visit) {
   const Scalar from_left = x - grid.left, from_top = y - grid.top;
-  const auto column = [&](Scalar offset) { return cell_at(from_left + offset, grid.per_side, grid.columns); };
-  const auto row = [&](Scalar offset) { return cell_at(from_top + offset, grid.per_side, grid.rows); };
+  const auto column = [&](Scalar offset) { return cell_at(from_left + offset, grid.columns_per_px); };
+  const auto row = [&](Scalar offset) { return cell_at(from_top + offset, grid.rows_per_px); };
   const std::size_t left = column(-grid.reach), right = column(grid.reach), bottom = row(grid.reach);
   for (std::size_t r = row(-grid.reach); r <= bottom; ++r) {
-    const std::size_t end = grid.first[r * grid.columns + right + 1];
-    for (std::size_t k = grid.first[r * grid.columns + left]; k < end; ++k) {
+    const std::size_t end = grid.first[r * grid.side + right + 1];
+    for (std::size_t k = grid.first[r * grid.side + left]; k < end; ++k) {
       const auto& p = grid.points[k];
       if (std::abs(p.x - x) <= grid.reach && std::abs(p.y - y) <= grid.reach && visit(p)) return;
     }
