@@ -45,10 +45,10 @@ struct MapPointOptions {
 namespace detail {
 inline namespace CFP_ISA {
 
-/// The odds against p, (1 - p) / p, of p kept in [limit, 1 - limit].
+/// The odds against p, (1 - p) / p, of p kept in [limit, 1 - limit]; NaN counts as 0.
 template <typename Scalar>
 [[nodiscard]] Scalar odds_against(Scalar p, Scalar limit) noexcept {
-  const Scalar bounded = (std::min)((std::max)(p, limit), Scalar(1) - limit);
+  const Scalar bounded = std::clamp(clamp_probability(p), limit, Scalar(1) - limit);
   return (Scalar(1) - bounded) / bounded;
 }
 
@@ -82,7 +82,7 @@ template <typename Scalar>
   // A point that was never in doubt keeps the weight 1 that it has without this library.
   if (m > most && k > most) return m;
   const Scalar odds = detail::odds_against(m, limit) * pow(detail::odds_against(k, limit), rate);
-  return (std::min)((std::max)(Scalar(1) / (Scalar(1) + odds), limit), most);
+  return std::clamp(Scalar(1) / (Scalar(1) + odds), limit, most);
 }
 
 /// Bayes' rule with M of before as the prior of a keypoint: odds = odds(M) odds(E) odds(K)^constraint_power, where E is
@@ -93,9 +93,7 @@ template <typename Scalar>
 [[nodiscard]] Scalar posterior_probability(Scalar keypoint_probability, Scalar object_evidence,
                                            Scalar map_point_probability, const MapPointOptions& options) noexcept {
   using std::pow;
-  const auto against = [limit = Scalar(options.evidence_limit)](Scalar p) {
-    return detail::odds_against(clamp_probability(p), limit);
-  };
+  const auto against = [&](Scalar p) { return detail::odds_against(p, Scalar(options.evidence_limit)); };
   Scalar odds = against(map_point_probability) * against(object_evidence);
   if (keypoint_probability != Scalar(0.5)) odds *= pow(against(keypoint_probability), Scalar(options.constraint_power));
   return Scalar(1) / (Scalar(1) + odds);

@@ -142,7 +142,7 @@ template <typename Range, typename Scalar = range_value_t<Range>>
 [[nodiscard]] inline double object_evidence(double object_probability, double object_threshold, double limit) noexcept {
   const double o = clamp_probability(object_probability);
   const double odds = o * (1 - object_threshold) / ((1 - o) * object_threshold);
-  return (std::min)((std::max)(std::log(odds), -limit), limit);
+  return std::clamp(std::log(odds), -limit, limit);
 }
 
 /// O with the memory of frames before, dt_s after the last: evidence <- exp(-dt / tau) evidence + that of this frame,
@@ -156,7 +156,7 @@ inline ObjectProbability remember_object(const ObjectProbability& object, double
   if (object.status == Status::ok) {
     const double limit = options.evidence_limit;
     const double now = object_evidence(object.static_probability, object_threshold, limit);
-    memory.evidence = (std::min)((std::max)(memory.evidence + now, -limit), limit);
+    memory.evidence = std::clamp(memory.evidence + now, -limit, limit);
     memory.known = true;
   } else if (!(std::abs(memory.evidence) > 0.05 * options.evidence_limit)) {
     memory = {};
