@@ -84,7 +84,7 @@ void collect_candidates(const PointSpan<Scalar, 2>& predicted, span<const std::i
 }
 
 struct NearestDescriptor {
-  std::int32_t index = -1;  // -1: none within the radius and the distance
+  std::int32_t index = -1;  // -1: none within the radius
   int distance, second;     // of the nearest and the next
 };
 
@@ -92,21 +92,15 @@ struct NearestDescriptor {
 template <typename Scalar>
 [[nodiscard]] NearestDescriptor nearest_descriptor(Scalar x, Scalar y, const std::uint8_t* descriptor,
                                                    const DescriptorSpan& previous,
-                                                   const DescriptorMatchOptions& options,
-                                                   const DescriptorMatchWorkspace<Scalar>& workspace) noexcept {
-  const Scalar radius = static_cast<Scalar>(options.radius_px);
+                                                   const PointGrid<Scalar>& candidates) noexcept {
   const int bits = static_cast<int>(8 * previous.bytes);
-  NearestDescriptor nearest{-1, (std::min)(options.max_distance, bits) + 1, bits};
-  visit_near(workspace.candidates, x, y, [&](const auto& candidate) {
+  NearestDescriptor nearest{-1, bits + 1, bits};
+  visit_near(candidates, x, y, [&](const auto& candidate) {
     const Scalar dx = candidate.x - x, dy = candidate.y - y;
-    if (!(dx * dx + dy * dy <= radius * radius)) return false;
+    if (!(dx * dx + dy * dy <= candidates.reach * candidates.reach)) return false;
     const int distance = hamming_distance(previous.row(candidate.index), descriptor, previous.bytes);
-    if (distance < nearest.distance) {
-      const int second = nearest.index >= 0 ? nearest.distance : nearest.second;
-      nearest = {static_cast<std::int32_t>(candidate.index), distance, second};
-    } else {
-      nearest.second = (std::min)(nearest.second, distance);
-    }
+    nearest.second = (std::min)(nearest.second, (std::max)(nearest.distance, distance));
+    if (distance < nearest.distance) nearest = {static_cast<std::int32_t>(candidate.index), distance, nearest.second};
     return false;
   });
   return nearest;
@@ -137,8 +131,8 @@ std::size_t match_descriptors(const PointSpan<Scalar, 2>& predicted, const Descr
   for (const std::int32_t query : queries) {
     const std::size_t i = static_cast<std::size_t>(query);
     const detail::NearestDescriptor nearest =
-        detail::nearest_descriptor(keypoints(i, 0), keypoints(i, 1), current.row(i), previous, options, workspace);
-    if (nearest.index < 0) continue;
+        detail::nearest_descriptor(keypoints(i, 0), keypoints(i, 1), current.row(i), previous, workspace.candidates);
+    if (nearest.index < 0 || nearest.distance > options.max_distance) continue;
     if (options.max_ratio < 1 && !(nearest.distance < options.max_ratio * nearest.second)) continue;
     auto& holder = workspace.holders[static_cast<std::size_t>(nearest.index)];
     if (holder.keypoint < 0 || nearest.distance < holder.distance) holder = {query, nearest.distance};
