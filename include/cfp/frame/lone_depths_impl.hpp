@@ -10,7 +10,6 @@
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
-#include "cfp/core/types.hpp"
 #include "cfp/frame/point_grid_impl.hpp"
 
 namespace cfp::detail {
@@ -30,27 +29,24 @@ template <typename Scalar>
 [[nodiscard]] std::size_t leave_out_lone_depths(const PointSpan<Scalar, 2>& pixels, Scalar ratio,
                                                 span<std::array<Scalar, 3>> points,
                                                 LoneDepthsWorkspace<Scalar>& workspace) {
-  const Scalar huge = std::numeric_limits<Scalar>::infinity();
+  PointGrid<Scalar>& grid = workspace.grid;
   const auto takes_part = [&](std::size_t i) { return is_finite(points[i][0]); };
-  Vector2<Scalar> least(huge, huge), most = -least;
-  Scalar nearest = huge, farthest = 0;
-  std::size_t taken = 0;
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    if (!takes_part(i)) continue;
-    ++taken;
-    least = least.cwiseMin(pixels[i]), most = most.cwiseMax(pixels[i]);
-    nearest = (std::min)(nearest, points[i][2]), farthest = (std::max)(farthest, points[i][2]);
+  fill_grid(pixels, takes_part, Scalar(0), grid);  // the reach follows from their extent
+  const std::size_t taken = grid.points.size();
+  Scalar nearest = std::numeric_limits<Scalar>::infinity(), farthest = 0;
+  for (const auto& point : grid.points) {
+    const Scalar depth = points[point.index][2];
+    nearest = (std::min)(nearest, depth), farthest = (std::max)(farthest, depth);
   }
   const bool all_alike = farthest - nearest <= ratio * nearest;  // as all are where the motion is up to scale
-  const Scalar reach = std::sqrt(Scalar(7) / 4 * (most - least).prod() / static_cast<Scalar>(taken));
+  grid.reach = std::sqrt(Scalar(7) / 4 * (grid.width * grid.height) / static_cast<Scalar>(taken));
   workspace.alone.reserve(pixels.size());
   workspace.alone.clear();
-  if (taken == 0 || ratio <= 0 || all_alike || !(reach > 0) || !is_finite(reach)) return taken;
-  fill_grid(pixels, takes_part, reach, workspace.grid);
-  for (const auto& point : workspace.grid.points) {
+  if (taken == 0 || ratio <= 0 || all_alike || !(grid.reach > 0) || !is_finite(grid.reach)) return taken;
+  for (const auto& point : grid.points) {
     const Scalar depth = points[point.index][2];
     int neighbours = -1, alike = -1;  // itself is none
-    visit_near(workspace.grid, point.x, point.y, [&](const auto& other) {
+    visit_near(grid, point.x, point.y, [&](const auto& other) {
       const Scalar its = points[other.index][2];
       ++neighbours;
       alike += std::abs(depth - its) <= ratio * (std::min)(depth, its) ? 1 : 0;
