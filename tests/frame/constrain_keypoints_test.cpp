@@ -115,6 +115,24 @@ TEST_CASE("Every K, M and weight equals the scalar formulas applied one keypoint
   }
 }
 
+TEST_CASE("No M at all is the same as none for every keypoint, in scenes of few keypoints outside of boxes, too",
+          "[frame]") {
+  DynamicSceneOptions scene;
+  scene.wall_points = GENERATE(std::size_t(700), std::size_t(60));
+  cfp::FrameOptions options;
+  options.map_point.weight = GENERATE(cfp::WeightRule::posterior, cfp::WeightRule::product);
+  options.fine.projection.min_samples = options.fine.epipolar.min_samples = 60;
+  FineRun<double> run(make_dynamic_scene<double>(scene, 13)), of_none(run);
+  std::fill(run.m.begin(), run.m.end(), -1.0);
+  of_none.m.clear();
+  for (FineRun<double>* each : {&run, &of_none}) {
+    cfp::match_in_boxes(each->pose.T_cur_prev, each->scene.match, each->scene.camera, options, each->state);
+    cfp::constrain_keypoints(each->pose, each->m, each->scene.camera, options, each->state);
+  }
+  CHECK(run.state.report.projection.threshold_px == of_none.state.report.projection.threshold_px);
+  CHECK(run.state.static_probability == of_none.state.static_probability);
+}
+
 TEST_CASE("Too little translation leaves the projection constraint alone", "[frame]") {
   DynamicSceneOptions scene;
   scene.translation_m = 0.004;
