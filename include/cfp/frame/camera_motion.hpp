@@ -178,7 +178,7 @@ template <typename Scalar>
       if (!is_finite(workspace.points[i][0])) workspace.distances[i] = Scalar(no_distance<double>);
     }
     const Scalar sigma = robust_sigma(span<Scalar>(workspace.distances), 2);
-    motion.sigma_px = (std::min)((std::max)(sigma, Scalar(options.min_sigma_px)), Scalar(options.max_sigma_px));
+    motion.sigma_px = std::clamp(sigma, Scalar(options.min_sigma_px), Scalar(options.max_sigma_px));
   };
   const auto refine = [&](SE3<double>& T, const PoseOptions& rounds) {
     workspace.sigmas.clear();
