@@ -62,12 +62,13 @@ struct Figures {
 /// Indices of the boxes that belong to each truth box at IoU >= 0.5.
 template <typename Boxes>
 std::vector<int> match(const std::vector<Truth>& truth, const Boxes& boxes) {
-  std::vector<cfp::Detection<double>> left, right;
-  for (const Truth& t : truth) left.push_back({t.box, 0, 1});
-  for (const auto& b : boxes) right.push_back({b.box, 0, 1});
-  std::vector<int> partner(left.size());
-  cfp::BoxAssociationWorkspace workspace;
-  cfp::associate_boxes(left, right, 0.4999999, workspace, partner);
+  std::vector<double> costs;
+  for (const Truth& t : truth) {
+    for (const auto& b : boxes) costs.push_back(1 - cfp::iou(t.box, b.box));
+  }
+  std::vector<int> partner(truth.size());
+  cfp::AssignmentWorkspace workspace;
+  cfp::solve_assignment(cfp::CostMatrix(costs, truth.size(), boxes.size()), 1 - 0.4999999, workspace, partner);
   return partner;
 }
 

@@ -17,7 +17,6 @@
 #include "cfp/core/status.hpp"
 #include "cfp/core/types.hpp"
 #include "cfp/detection/assignment.hpp"
-#include "cfp/detection/box_association.hpp"
 #include "cfp/detection/box_motion.hpp"
 #include "cfp/detection/box_tracker.hpp"
 #include "cfp/detection/box_tracker_types.hpp"

@@ -103,8 +103,7 @@ template class cfp::BoxTracker<float>;
 template class cfp::BoxTracker<double>;
 template <typename Scalar>
 static void instantiate_detection() noexcept {
-  using Detections = cfp::span<const cfp::Detection<Scalar>>;
-  use(&cfp::associate_boxes<Detections, Detections>);
+  use(&cfp::is_trackable<Scalar>);
 }
 
 // ---- clustering ----
@@ -232,8 +231,8 @@ static void instantiate() noexcept {
   instantiate_evaluation<Scalar>();
   instantiate_optimization<Scalar>();
   instantiate_probability<Scalar>();
-  instantiate_clustering<Scalar>();
   instantiate_detection<Scalar>();
+  instantiate_clustering<Scalar>();
   instantiate_core<Scalar>();
   instantiate_math<Scalar>();
   instantiate_geometry<Scalar>();

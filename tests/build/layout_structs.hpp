@@ -35,7 +35,6 @@
   CFP_LAYOUT(cfp::CostMatrix<double>, cols)                              \
   CFP_LAYOUT(cfp::AssignmentResult, cost)                                \
   CFP_LAYOUT(cfp::AssignmentWorkspace, visits)                           \
-  CFP_LAYOUT(cfp::BoxAssociationWorkspace, assignment)                   \
   CFP_LAYOUT(cfp::BoxMotionOptions, initial_size_rate) \
   CFP_LAYOUT(cfp::RateFilter<float>, var_rate)                           \
   CFP_LAYOUT(cfp::RateFilter<double>, var_rate)                          \

@@ -10,8 +10,7 @@
 #include <tuple>
 #include <vector>
 
-#include "cfp/core/types.hpp"
-#include "cfp/detection/box_association.hpp"
+#include "cfp/detection/assignment.hpp"
 #include "cfp/detection/box_motion.hpp"
 #include "cfp/detection/box_tracker_types.hpp"
 
@@ -38,10 +37,10 @@ class BoxTracker {
                                  const Matrix3<Scalar>* image_motion = nullptr) {
     BoxTrackerResult<Scalar> result = advance(dt_s, image_motion);
     select(detections, result);
-    partner_.resize(tracks_.size());
-    const std::size_t pairs = associate_boxes(tracks_, candidates_, options_.min_iou, workspace_, partner_).pairs;
-    take_partners(
-        [&](Track& track, const Candidate& candidate) { correct_box(track.filter, candidate.box, options_.motion); });
+    const auto distance = [](const Track& a, const Candidate& b) { return 1 - static_cast<double>(iou(a.box, b.box)); };
+    const std::size_t pairs = associate(1 - options_.min_iou, distance, [this](Track& track, const Candidate& seen) {
+      correct_box(track.filter, seen.box, options_.motion);
+    });
     if (pairs < (std::min)(tracks_.size(), candidates_.size())) restart_tracks();
     start_tracks(result);
     output(result, true);
@@ -62,7 +61,6 @@ class BoxTracker {
     tracks_.clear();
     next_id_ = 1;
   }
-  [[nodiscard]] const BoxTrackerOptions& options() const noexcept { return options_; }
 
  private:
   // The box is the predicted one, until a detection replaces it.
@@ -73,6 +71,7 @@ class BoxTracker {
   };
   struct Candidate : Detection<Scalar> {
     int index = -1;
+    bool may_start = false;
     bool free = true;
   };
 
@@ -97,18 +96,16 @@ class BoxTracker {
   // Keeps what can be used of the detections, with where it came from, in an order of its own: that of the detections
   // must not matter.
   void select(span<const Detection<Scalar>> detections, BoxTrackerResult<Scalar>& result) {
-    const Scalar far = Scalar(1e6);
     candidates_.clear();
     for (std::size_t i = 0; i < detections.size(); ++i) {
       const Detection<Scalar>& d = detections[i];
-      const bool usable = is_proper(d.box) && d.score == d.score && d.box.x1 >= -far && d.box.y1 >= -far &&
-                          d.box.x2 <= far && d.box.y2 <= far;
-      if (!usable) {
+      const auto score = static_cast<double>(d.score);
+      if (!is_trackable(d)) {
         ++result.skipped;
-      } else if (!(static_cast<double>(d.score) >= options_.min_score)) {
+      } else if (!(score >= options_.min_score)) {
         ++result.ignored;
       } else {
-        candidates_.push_back({d, static_cast<int>(i), true});
+        candidates_.push_back({d, static_cast<int>(i), score >= options_.birth_threshold});
       }
     }
     const auto key = [](const Candidate& c) {
@@ -126,8 +123,17 @@ class BoxTracker {
     track.hits = next_count(track.hits);
   }
 
-  template <typename Take>
-  void take_partners(const Take& take) {
+  // Finds the best pairs of one class; each track takes its candidate and shows it. Returns how many do.
+  template <typename Cost, typename Take>
+  std::size_t associate(double max_cost, const Cost& cost, const Take& take) {
+    costs_.clear();
+    for (const Track& track : tracks_) {
+      for (const Candidate& candidate : candidates_)
+        costs_.push_back(track.class_id == candidate.class_id ? cost(track, candidate) : detail::infinity);
+    }
+    partner_.resize(tracks_.size());
+    const CostMatrix costs(costs_, tracks_.size(), candidates_.size());
+    const std::size_t pairs = solve_assignment(costs, max_cost, assignment_, partner_).pairs;
     for (std::size_t i = 0; i < tracks_.size(); ++i) {
       if (partner_[i] == unassigned) continue;
       Candidate& candidate = candidates_[static_cast<std::size_t>(partner_[i])];
@@ -135,34 +141,27 @@ class BoxTracker {
       show(candidate, tracks_[i]);
       candidate.free = false;
     }
+    return pairs;
   }
 
   // Who turned is not where he is predicted: to go on with the prediction would put a box beside him. The object is the
   // same; its motion is not, and has to be seen again before it is compensated.
   void restart_tracks() {
     const auto distance_sq = [this](const Track& track, const Candidate& candidate) {
-      const bool open = track.compensated() && candidate.free && starts(candidate);
+      const bool open = track.compensated() && candidate.free && candidate.may_start;
       return open ? static_cast<double>(box_distance_sq(track.filter, candidate.box, options_.motion))
                   : detail::infinity;
     };
-    associate(tracks_, candidates_, distance_sq, options_.restart_gate * options_.restart_gate, workspace_, partner_);
-    take_partners([this](Track& track, const Candidate& candidate) {
-      track.filter = make_box_filter(candidate.box, options_.motion);
+    associate(options_.restart_gate * options_.restart_gate, distance_sq, [this](Track& track, const Candidate& seen) {
+      track.filter = make_box_filter(seen.box, options_.motion);
       track.hits = track.age = 0;
     });
   }
 
-  [[nodiscard]] bool starts(const Candidate& candidate) const noexcept {
-    return static_cast<double>(candidate.score) >= options_.birth_threshold;
-  }
-
   void start_tracks(BoxTrackerResult<Scalar>& result) {
     for (const Candidate& candidate : candidates_) {
-      if (!candidate.free) continue;
-      if (!starts(candidate)) {
-        ++result.ignored;
-        continue;
-      }
+      result.ignored += candidate.free && !candidate.may_start ? 1U : 0U;
+      if (!candidate.free || !candidate.may_start) continue;
       Track track;
       track.filter = make_box_filter(candidate.box, options_.motion);
       track.class_id = candidate.class_id;
@@ -212,8 +211,9 @@ class BoxTracker {
   std::vector<Track> tracks_;
   std::vector<TrackedBox<Scalar>> output_;
   std::vector<Candidate> candidates_;
+  std::vector<double> costs_;
   std::vector<int> partner_;
-  BoxAssociationWorkspace workspace_;
+  AssignmentWorkspace assignment_;
 };
 
 }  // namespace CFP_ISA

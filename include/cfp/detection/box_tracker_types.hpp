@@ -61,6 +61,14 @@ struct BoxTrackerOptions {
 
 inline namespace CFP_ISA {
 
+/// Whether a detection can be tracked: a proper box, no edge beyond 1e6 px, and a score.
+template <typename Scalar>
+[[nodiscard]] bool is_trackable(const Detection<Scalar>& d) noexcept {
+  const Scalar far = Scalar(detail::box_farthest_px);
+  return is_proper(d.box) && d.box.x1 >= -far && d.box.y1 >= -far && d.box.x2 <= far && d.box.y2 <= far &&
+         d.score == d.score;
+}
+
 [[nodiscard]] inline OptionPath invalid_field(const BoxTrackerOptions& o) noexcept {
   if (const OptionPath field = nested("motion", invalid_field(o.motion))) return field;
   if (!(o.min_iou >= 0 && o.min_iou < 1)) return "min_iou";
