@@ -124,8 +124,7 @@ struct BundleLeastSquares {
     const BundleIndex& index = workspace.index;
     run([&](int part) {
       for (std::size_t k = index.pose_part[to_index(part)]; k < index.pose_part[to_index(part) + 1]; ++k)
-        linearize_pose(index, k, camera_of(problem.cameras, index.caller_pose[k]), problem.baseline_fx, mono, stereo,
-                       state, linear);
+        linearize_pose(problem, index, k, mono, stereo, state, linear);
     });
     linearize_points(index, linear);
     double cost = 0;

@@ -120,50 +120,42 @@ inline void store_pose(const BundlePoseSums& sums, double* target) noexcept {
   for (int r = 0; r < 6; ++r) target[36 + r] = s[21 + r];
 }
 
-/// One range of observations of one pose: fills its slots, adds to the pose's sums, which a fixed one has not, and
-/// returns the cost.
-template <bool Stereo, typename Camera, typename Loss>
-double linearize_range(span<const BundleMeasurement> range, const Camera& camera, double baseline_fx, const Loss& loss,
-                       const BundlePose& pose, const std::vector<Vector3<double>>& points, std::vector<double>& slots,
-                       BundlePoseSums* sums) noexcept {
+/// All observations of pose k, the mono ones first: fills their slots, the pose's cost and, unless it is fixed, its
+/// normal equations.
+template <typename Camera, typename Scalar, typename Loss>
+void linearize_pose(const BundleProblem<Camera, Scalar>& problem, const BundleIndex& index, std::size_t k,
+                    const Loss& mono, const Loss& stereo, const BundleState& state, BundleLinearization& out) noexcept {
+  const Camera& camera = camera_of(problem.cameras, index.caller_pose[k]);
+  const BundlePose& pose = state.poses[k];
+  const bool is_free = k < index.free_poses;
   BundleChunk chunk;
-  double cost = 0;
-  for (std::size_t first = 0; first < range.size(); first += BundleChunk::size) {
-    const int count = static_cast<int>((std::min)(range.size() - first, to_index(BundleChunk::size)));
-    const int padded = (count + BundleChunk::lanes - 1) / BundleChunk::lanes * BundleChunk::lanes;
-    for (int i = 0; i < padded; ++i) {
-      const BundleMeasurement& m = range[first + to_index((std::min)(i, count - 1))];
-      for (int c = 0; c < 3; ++c) chunk.d[c][i] = points[to_index(m.point)][c] - pose.center[c];
-      chunk.u[i] = m.u, chunk.v[i] = m.v, chunk.disparity[i] = m.disparity;
-      chunk.weight[i] = i < count ? m.weight : 0, chunk.information[i] = m.information;
-    }
-    project_chunk(camera, pose, padded, chunk);
-    cost += weigh_chunk<Stereo>(padded, baseline_fx, loss, pose.rotation, chunk);
-    for (int i = 0; i < count; ++i) {
-      double* const slot = slots.data() + BundleLinearization::slot_doubles * range[first + to_index(i)].slot;
-      for (int e = 0; e < 6; ++e) slot[e] = chunk.N[e][i];
-      for (int e = 0; e < 3; ++e) slot[6 + e] = chunk.n[e][i];
-    }
-    if (sums != nullptr) add_to_pose(chunk, padded, *sums);
-  }
-  return cost;
-}
-
-/// All observations of pose k.
-template <typename Camera, typename Loss>
-void linearize_pose(const BundleIndex& index, std::size_t k, const Camera& camera, double baseline_fx, const Loss& mono,
-                    const Loss& stereo, const BundleState& state, BundleLinearization& out) noexcept {
   BundlePoseSums sums = {};
-  BundlePoseSums* const used = k < index.free_poses ? &sums : nullptr;
-  const auto range = [&](std::size_t r) {
-    return span<const BundleMeasurement>(index.observations.data() + index.range_begin[r],
-                                         index.range_begin[r + 1] - index.range_begin[r]);
-  };
-  out.costs[k] =
-      linearize_range<false>(range(2 * k), camera, baseline_fx, mono, state.poses[k], state.points, out.slots, used) +
-      linearize_range<true>(range(2 * k + 1), camera, baseline_fx, stereo, state.poses[k], state.points, out.slots,
-                            used);
-  if (used != nullptr) store_pose(sums, out.poses.data() + k * BundleLinearization::pose_doubles);
+  double cost[2] = {};
+  for (const std::size_t kind : {0U, 1U}) {  // pixels; pixels with u_right
+    const std::size_t end = index.range_begin[2 * k + kind + 1];
+    for (std::size_t first = index.range_begin[2 * k + kind]; first < end; first += BundleChunk::size) {
+      const int count = static_cast<int>((std::min)(end - first, to_index(BundleChunk::size)));
+      const int padded = (count + BundleChunk::lanes - 1) / BundleChunk::lanes * BundleChunk::lanes;
+      for (int i = 0; i < padded; ++i) {
+        const BundleMeasurement& m = index.observations[first + to_index((std::min)(i, count - 1))];
+        for (int c = 0; c < 3; ++c) chunk.d[c][i] = state.points[to_index(m.point)][c] - pose.center[c];
+        chunk.u[i] = m.u, chunk.v[i] = m.v, chunk.disparity[i] = m.disparity;
+        chunk.weight[i] = i < count ? m.weight : 0, chunk.information[i] = m.information;
+      }
+      project_chunk(camera, pose, padded, chunk);
+      cost[kind] += kind == 0 ? weigh_chunk<false>(padded, 0, mono, pose.rotation, chunk)
+                              : weigh_chunk<true>(padded, problem.baseline_fx, stereo, pose.rotation, chunk);
+      for (int i = 0; i < count; ++i) {
+        double* const slot =
+            out.slots.data() + BundleLinearization::slot_doubles * index.observations[first + to_index(i)].slot;
+        for (int e = 0; e < 6; ++e) slot[e] = chunk.N[e][i];
+        for (int e = 0; e < 3; ++e) slot[6 + e] = chunk.n[e][i];
+      }
+      if (is_free) add_to_pose(chunk, padded, sums);
+    }
+  }
+  out.costs[k] = cost[0] + cost[1];
+  if (is_free) store_pose(sums, out.poses.data() + k * BundleLinearization::pose_doubles);
 }
 
 /// The points' own blocks, from their slots.
