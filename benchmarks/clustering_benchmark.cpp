@@ -149,7 +149,7 @@ void nanoflann_dbscan(benchmark::State& state) {
 
 template <typename Scalar>
 void sort_values(benchmark::State& state) {
-  cfp::SortWorkspace<Scalar> workspace;
+  cfp::DbscanWorkspace<Scalar> workspace;
   run<Scalar>(state, [&](const std::vector<Scalar>& values, std::vector<int>&) {
     const auto keep = [](Scalar value) { return cfp::is_finite(value); };
     return Outcome{cfp::sort_values(values, keep, workspace).values.size(), 0};

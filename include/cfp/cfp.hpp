@@ -9,7 +9,6 @@
 #include "cfp/clustering/dbscan.hpp"
 #include "cfp/clustering/depth_foreground.hpp"
 #include "cfp/clustering/depth_foreground_types.hpp"
-#include "cfp/clustering/sorted_values.hpp"
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/core/random.hpp"

@@ -109,8 +109,6 @@ static void instantiate_detection() noexcept {
 // ---- clustering ----
 template struct cfp::SortedValues<float>;
 template struct cfp::SortedValues<double>;
-template struct cfp::SortWorkspace<float>;
-template struct cfp::SortWorkspace<double>;
 template struct cfp::DbscanWorkspace<float>;
 template struct cfp::DbscanWorkspace<double>;
 template struct cfp::ForegroundWorkspace<float>;

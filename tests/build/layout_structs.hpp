@@ -10,9 +10,7 @@
   CFP_LAYOUT(cfp::DepthNoise, nearest_m)                                 \
   CFP_LAYOUT(cfp::AdaptiveOptions, density)                              \
   CFP_LAYOUT(cfp::SortedValues<double>, index)                           \
-  CFP_LAYOUT(cfp::SortWorkspace<double>, values)                         \
   CFP_LAYOUT(cfp::SortedValues<float>, index)                            \
-  CFP_LAYOUT(cfp::SortWorkspace<float>, values)                          \
   CFP_LAYOUT(cfp::DbscanOptions, min_pts)                                \
   CFP_LAYOUT(cfp::DbscanResult, invalid)                                 \
   CFP_LAYOUT(cfp::DbscanWorkspace<float>, labels)                        \

@@ -1,4 +1,4 @@
-#include "cfp/clustering/sorted_values.hpp"
+#include "cfp/clustering/dbscan.hpp"
 
 #include <algorithm>
 #include <cstdint>
@@ -18,7 +18,7 @@ TEMPLATE_TEST_CASE("Values are sorted as std::stable_sort sorts their indices", 
                                        TestType(1e30F),       TestType(1),        TestType(2)};
   const auto keep = [](TestType value) { return cfp::is_finite(value); };
   cfp::Random random(41, "sorting");
-  cfp::SortWorkspace<TestType> workspace;
+  cfp::DbscanWorkspace<TestType> workspace;
   for (int round = 0; round < 600; ++round) {
     std::vector<TestType> values(random.index(round % 10 == 0 ? 2000 : 60));
     const std::uint32_t kind = random.index(4);  // spread; on a grid; one wild outlier; hostile
@@ -46,7 +46,7 @@ TEMPLATE_TEST_CASE("Values are sorted as std::stable_sort sorts their indices", 
 TEST_CASE("Values that are spread are sorted by a few comparisons each", "[clustering]") {
   using cfp_test::Counted;
   cfp::Random random(42, "counted");
-  cfp::SortWorkspace<Counted> workspace;
+  cfp::DbscanWorkspace<Counted> workspace;
   for (const std::size_t n : {100U, 1000U, 20000U}) {
     std::vector<Counted> values(n);
     for (Counted& value : values) value = Counted(random.uniform(-3, 8));

@@ -11,7 +11,6 @@
 #include "cfp/clustering/adaptive.hpp"
 #include "cfp/clustering/dbscan.hpp"
 #include "cfp/clustering/depth_foreground_types.hpp"
-#include "cfp/clustering/sorted_values.hpp"
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/geometry/box.hpp"
@@ -154,7 +153,7 @@ ForegroundResult depth_foreground(const ForegroundInput<non_deduced<Scalar>>& in
   CFP_ASSERT(mask.size() == in.depths_m.size());
   CFP_ASSERT(in.pixels.empty() || in.pixels.size() == in.depths_m.size());
   const SortedValues<Scalar> sorted = sort_values(
-      in.depths_m, [](Scalar depth) { return is_valid_depth(depth); }, workspace.sort);
+      in.depths_m, [](Scalar depth) { return is_valid_depth(depth); }, workspace);
   const span<const Scalar> depths = sorted.values;
   const std::size_t n = depths.size();
   ForegroundResult result;
