@@ -141,7 +141,7 @@ DbscanResult dbscan_sorted(span<const non_deduced<Scalar>> values, const DbscanO
   CFP_ASSERT(std::is_sorted(values.begin(), values.end()));
   std::vector<std::uint32_t>& neighbours = workspace.neighbours;
   DbscanResult result;
-  const std::size_t n = values.size(), none = n;
+  const std::size_t n = values.size();
   if (invalid_field(options)) {
     std::fill(labels.begin(), labels.end(), dbscan_noise);
     result.status = Status::invalid_input;
@@ -150,29 +150,26 @@ DbscanResult dbscan_sorted(span<const non_deduced<Scalar>> values, const DbscanO
   }
   const Scalar eps = detail::radius<Scalar>(options.eps);
   detail::count_neighbours<Scalar>(values, eps, neighbours);
-  std::size_t left = none;  // the last core point seen
-  int label = -1;           // and its cluster
-  for (std::size_t begin = 0; begin < n;) {
-    // [begin, right) are not core points; right is the next one, or the end.
-    std::size_t right = begin;
-    while (right < n && neighbours[right] < options.min_pts) ++right;
-    const bool new_cluster = left == none || (right < n && !(values[right] - values[left] <= eps));
-    const int right_label = new_cluster ? label + 1 : label;
-    for (std::size_t i = begin; i < right; ++i) {
-      const bool near_left = left != none && values[i] - values[left] <= eps;
-      const bool near_right = right < n && values[right] - values[i] <= eps;
-      const bool take_left = near_left && (!near_right || values[i] - values[left] <= values[right] - values[i]);
-      result.noise += near_left || near_right ? 0U : 1U;
-      labels[i] = take_left ? label : near_right ? right_label : dbscan_noise;
-    }
-    if (right == n) break;
-    labels[right] = right_label;
+  const auto is_core = [&](std::size_t i) { return neighbours[i] >= options.min_pts; };
+  // A core point within eps of the one before is of its cluster.
+  for (std::size_t i = 0, before = n; i < n; ++i) {
+    if (!is_core(i)) continue;
+    if (before == n || !(values[i] - values[before] <= eps)) ++result.clusters;
+    labels[i] = static_cast<int>(result.clusters) - 1;
     ++result.core_points;
-    label = right_label;
-    left = right;
-    begin = right + 1;
+    before = i;
   }
-  result.clusters = static_cast<std::size_t>(label + 1);
+  // Every value takes the label of the nearest core point, its own where it is one.
+  constexpr Scalar none = std::numeric_limits<Scalar>::infinity();
+  for (std::size_t i = 0, left = n, right = 0; i < n; ++i) {
+    while (right < n && (right < i || !is_core(right))) ++right;
+    if (right == i) left = i;
+    const Scalar below = left < n ? values[i] - values[left] : none;
+    const Scalar above = right < n ? values[right] - values[i] : none;
+    const bool near = (std::min)(below, above) <= eps;
+    labels[i] = near ? labels[below <= above ? left : right] : dbscan_noise;
+    result.noise += near ? 0U : 1U;
+  }
   return result;
 }
 
