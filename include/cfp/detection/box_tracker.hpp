@@ -177,12 +177,10 @@ class BoxTracker {
     std::size_t kept = 0;
     const int longest = detector_ran ? options_.max_coast : (std::max)(options_.max_coast, options_.max_idle);
     for (Track& track : tracks_) {
-      const bool confirmed = track.hits >= options_.confirm_hits;
-      if (track.compensated()) {
-        const bool trusted = confirmed && track.missed <= options_.coast_per_hit * track.hits;
-        if ((detector_ran && (track.missed > longest || !trusted)) || !clip_to_image(track.box)) continue;
-      }
-      const bool shown = !track.compensated() || ((confirmed || !detector_ran) && track.missed <= longest);
+      const bool shown = track.missed <= longest;
+      const bool trusted =
+          shown && track.hits >= options_.confirm_hits && track.missed <= options_.coast_per_hit * track.hits;
+      if (track.compensated() && ((detector_ran && !trusted) || !clip_to_image(track.box))) continue;
       if (shown) {
         track.associated = track.shown;
         track.rate_x = track.filter.u.rate;
