@@ -6,12 +6,19 @@
 // out, as nothing but depth tells. Depth noise as of structured light. Per share (UnreportedOptions::min_known_depths),
 // means over cameras and walks: keypoints with a weight above 0.5 on who walks / on who stands / below it on the rest.
 //
+// One camera before a wall 4 m away, straight or slanted, has no F: what stands there, 0.8 m away in a tenth of the
+// view, and what moves are one. What is said of either (nearer_than_room, max_parallax), the camera at rest, turning,
+// or moving with 0.05, 0.15 and 0.5 m/s: keypoints above 0.5 on who walks / below 0.5 on what stands / below 0.5 on the
+// wall.
+//
 //   cfp_unreported_study [frames, default 50] [seed, default 7] | --smoke
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <utility>
 #include <vector>
 
 #include "cfp/core/random.hpp"
@@ -24,8 +31,10 @@ using V3 = cfp::Vector3<double>;
 
 enum class Path { rests, across, along, turns };
 
+enum class Place { hall, holes, wall, slanted_wall };
+
 struct Scene {
-  bool hall = true;
+  Place place = Place::hall;
   double near = 0, walker = 0.1, noise_px = 0.2, camera_m = 0.5 / 30;
   Path camera = Path::rests, person = Path::across;
 };
@@ -34,9 +43,11 @@ struct Counts {
   double right = 0, all = 0;
 };
 
+enum class Part : std::uint8_t { room, thing, person };
+
 // Keypoints that have the weight asked for: on the person above 0.5, elsewhere below.
 struct Judged {
-  Counts person, room;
+  Counts person, thing, room;
 };
 
 class Frames {
@@ -44,21 +55,25 @@ class Frames {
   Frames(const Scene& scene, cfp::Random& random) : scene_(scene), random_(random) {}
 
   void make() {
-    previous.clear(), current.clear(), keypoints.clear(), flow_depths.clear(), depths.clear(), on_person.clear();
+    previous.clear(), current.clear(), keypoints.clear(), flow_depths.clear(), depths.clear(), part.clear();
     const cfp::SE3<double> T_cur_prev = motion();
     const double step = (random_.uniform() < 0.5 ? 0.8 : -0.8) / 30;
     const V3 shift(scene_.person == Path::across ? step : 0, 0, scene_.person == Path::along ? step : 0);
     person_ = V3(random_.uniform(-0.6, 0.6), 0, random_.uniform(1.5, 2.5));
+    thing_ = random_.uniform(-0.3, 0.3);
     for (int i = 0; i < 800; ++i) {
-      bool person = false;
-      const V3 point = sample(person), moved = T_cur_prev * V3(point + (person ? shift : V3(0, 0, 0)));
-      V2 from, to;
+      Part of = Part::room;
+      const V3 point = sample(of);
+      const bool person = of == Part::person;
+      const V3 moved = T_cur_prev * V3(point + (person ? shift : V3(0, 0, 0)));
+      V2 from = V2::Zero(), to = from;
       if (!camera.project(point, from) || !camera.project(moved, to) || !in_image(to)) continue;
-      if (!person && point.z() > person_.z() && (is_covered(from) || is_covered(to))) continue;
+      const bool behind = !person && scene_.walker > 0 && point.z() > person_.z();
+      if (behind && (is_covered(from) || is_covered(to))) continue;
       if (i % 2 == 0) {
         keypoints.push_back({to.x(), to.y()});
         depths.push_back(measured(moved.z()));
-        on_person.push_back(person ? 1 : 0);
+        part.push_back(of);
       } else {
         const double s = scene_.noise_px;
         previous.push_back({from.x() + s * random_.normal(), from.y() + s * random_.normal()});
@@ -71,7 +86,7 @@ class Frames {
   cfp::PinholeCamera<double> camera{525, 525, 320, 240};
   std::vector<std::array<double, 2>> previous, current, keypoints;
   std::vector<double> flow_depths, depths;
-  std::vector<char> on_person;
+  std::vector<Part> part;
 
  private:
   cfp::SE3<double> motion() {
@@ -82,14 +97,25 @@ class Frames {
     for (int k = 0; k < 6; ++k) xi[k] += (k < 3 ? 0.001 : 0.002) * random_.normal();
     return cfp::se3_exp(xi);
   }
-  V3 sample(bool& person) {
+  V3 sample(Part& of) {
     const double share = random_.uniform();
-    person = share < scene_.walker;
-    if (person)
+    if (share < scene_.walker) {
+      of = Part::person;
       return person_ + V3(random_.uniform(-0.25, 0.25), random_.uniform(-0.8, 0.8), random_.uniform(-0.1, 0.1));
-    const bool near = share < scene_.walker + scene_.near;
-    const double z = near ? random_.uniform(2.2, 4.4) : scene_.hall ? random_.uniform(6, 25) : random_.uniform(2.5, 6);
-    return {z * random_.uniform(-0.6, 0.6), z * random_.uniform(near ? 0.1 : -0.45, 0.45), z};
+    }
+    const double u = random_.uniform(-0.6, 0.6), v = random_.uniform(-0.45, 0.45);
+    if (scene_.place == Place::wall || scene_.place == Place::slanted_wall) {
+      const double z = scene_.place == Place::wall ? 4 : 4 / (1 + u);
+      const bool thing = scene_.near > 0 && std::abs(u - thing_) < 0.2 && std::abs(v - 0.1) < 0.2;
+      of = thing ? Part::thing : Part::room;
+      return (thing ? 0.2 : 1) * V3(u * z, v * z, z);
+    }
+    if (share < scene_.walker + scene_.near) {
+      const double z = random_.uniform(2.2, 4.4);
+      return {u * z, random_.uniform(0.1, 0.45) * z, z};
+    }
+    const double z = scene_.place == Place::hall ? random_.uniform(6, 25) : random_.uniform(2.5, 6);
+    return {u * z, v * z, z};
   }
   bool is_covered(const V2& pixel) const {
     return std::abs((pixel.x() - 320) / 525 * person_.z() - person_.x()) < 0.3 &&
@@ -97,20 +123,22 @@ class Frames {
   }
   static bool in_image(const V2& p) { return p.x() >= 0 && p.x() < 640 && p.y() >= 0 && p.y() < 480; }
   double measured(double z) {
-    const bool missing = scene_.hall ? z > 4.5 : random_.uniform() < 0.6;
+    const bool missing =
+        scene_.place == Place::hall ? z > 4.5 : scene_.place != Place::holes || random_.uniform() < 0.6;
     return missing ? 0 : z + 0.0016 * z * z * random_.normal();
   }
 
   Scene scene_;
   cfp::Random& random_;
   V3 person_;
+  double thing_ = 0;
 };
 
-Judged judge(const Scene& scene, double min_known_depths, int frames, std::uint64_t seed) {
+Judged judge(const Scene& scene, const cfp::UnreportedOptions& unreported, int frames, std::uint64_t seed) {
   cfp::Random random(seed, "unreported study");
   Frames made(scene, random);
   cfp::FrameOptions options;
-  options.coarse.unreported.min_known_depths = min_known_depths;
+  options.coarse.unreported = unreported;
   cfp::StaticProbability probability(made.camera, options);
   const std::vector<cfp::Detection<double>> nobody;
   Judged judged;
@@ -124,8 +152,8 @@ Judged judge(const Scene& scene, double min_known_depths, int frames, std::uint6
     frame.flow = {made.previous, made.current, made.flow_depths};
     const auto weight = probability.coarse(frame).weight;
     for (std::size_t i = 0; k >= 3 && i < weight.size(); ++i) {
-      const bool person = made.on_person[i] != 0;
-      Counts& counts = person ? judged.person : judged.room;
+      const bool person = made.part[i] == Part::person;
+      Counts& counts = person ? judged.person : made.part[i] == Part::thing ? judged.thing : judged.room;
       counts.right += (weight[i] > 0.5) == person ? 1 : 0;
       ++counts.all;
     }
@@ -135,19 +163,42 @@ Judged judge(const Scene& scene, double min_known_depths, int frames, std::uint6
 
 double percent(const Counts& counts) { return counts.all > 0 ? 100 * counts.right / counts.all : 0; }
 
-void print_cell(Scene scene, double min_known_depths, int frames, std::uint64_t seed) {
-  Counts walking, standing, room;  // means of per cents
-  const auto add = [](Counts& mean, const Counts& counts) { mean.right += percent(counts) / 100, ++mean.all; };
+// To a mean of shares.
+void add(const Counts& counts, Counts& mean) {
+  if (counts.all > 0) mean.right += counts.right / counts.all, ++mean.all;
+}
+
+void print_depths(Scene scene, const cfp::UnreportedOptions& options, int frames, std::uint64_t seed) {
+  Counts walking, standing, room;
   for (const Path camera : {Path::rests, Path::across, Path::along, Path::turns}) {
     for (const Path person : {Path::rests, Path::across, Path::along}) {
       scene.camera = camera, scene.person = person;
       if (camera == Path::across && person == Path::across) continue;
-      const Judged judged = judge(scene, min_known_depths, frames, seed);
-      add(person == Path::rests ? standing : walking, judged.person);
-      add(room, judged.room);
+      const Judged judged = judge(scene, options, frames, seed);
+      add(judged.person, person == Path::rests ? standing : walking);
+      add(judged.room, room);
     }
   }
   std::printf(" %.0f / %.0f / %.1f |", percent(walking), percent(standing), percent(room));
+}
+
+void print_one_camera(Scene scene, const cfp::UnreportedOptions& options, int frames, std::uint64_t seed) {
+  Counts walking, thing, room;
+  const bool moves = scene.camera == Path::across || scene.camera == Path::along;
+  for (const double speed : {0.05, 0.15, 0.5}) {
+    scene.camera_m = speed / 30;
+    if (!moves && speed > 0.05) continue;
+    scene.near = 0, scene.walker = 0.1;
+    for (const Path person : {Path::across, Path::along}) {
+      scene.person = person;
+      if (person != scene.camera) add(judge(scene, options, frames, seed).person, walking);
+    }
+    scene.near = 0.1, scene.walker = 0;
+    const Judged judged = judge(scene, options, frames, seed);
+    add(judged.thing, thing);
+    add(judged.room, room);
+  }
+  std::printf(" %.0f / %.1f / %.1f |", percent(walking), percent(thing), percent(room));
 }
 
 }  // namespace
@@ -160,24 +211,50 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: cfp_unreported_study [frames >= 1] [seed >= 0] | --smoke\n");
     return 2;
   }
-  constexpr std::array<double, 4> shares = {0, 0.25, 0.5, 0.75};
+  const auto stream = static_cast<std::uint64_t>(seed);
   std::printf("%d frames a cell, seed %d: %% above 0.5 of who walks / who stands / below 0.5 of the room\n\n", frames,
               seed);
   std::printf("| room | near | walker | noise px | camera m/s | depths always | a quarter | half | three quarters |\n");
   std::printf("|---|--:|--:|--:|--:|--:|--:|--:|--:|\n");
-  for (const bool hall : {true, false}) {
+  for (const Place place : {Place::hall, Place::holes}) {
     for (const double near : {0.0, 0.1, 0.2, 0.3}) {
       for (const double walker : {0.05, 0.1, 0.2}) {
         for (const double noise_px : {0.2, 0.4}) {
           for (const double speed : {0.1, 0.5}) {
             if (smoke && (near > 0 || walker > 0.1 || noise_px > 0.2)) continue;
+            const bool hall = place == Place::hall;
             if (!hall && near != 0.1) continue;  // the room is as near
             std::printf("| %s | %.1f | %.2f | %.1f | %.1f |", hall ? "hall" : "holes", near, walker, noise_px, speed);
-            for (const double share : shares)
-              print_cell({hall, near, walker, noise_px, speed / 30}, share, frames, static_cast<std::uint64_t>(seed));
+            for (const double share : {0.0, 0.25, 0.5, 0.75}) {
+              cfp::UnreportedOptions options;
+              options.min_known_depths = share;
+              print_depths({place, near, walker, noise_px, speed / 30}, options, frames, stream);
+            }
             std::printf("\n");
           }
         }
+      }
+    }
+  }
+
+  std::printf("\none camera: %% above 0.5 of who walks / below 0.5 of what stands / of the wall\n\n");
+  std::printf(
+      "| wall | noise px | camera | as in boxes, no limit | inverse 1 +- 2.5, no limit | 1 +- 10 | 5 | 3 | 1.5 |\n");
+  std::printf("|---|--:|---|--:|--:|--:|--:|--:|--:|\n");
+  constexpr std::array<const char*, 4> cameras = {"rests", "across", "along", "turns"};
+  for (const Place place : {Place::wall, Place::slanted_wall}) {
+    for (const double noise_px : {0.2, 0.4}) {
+      for (const Path camera : {Path::rests, Path::across, Path::along, Path::turns}) {
+        if (smoke && (noise_px > 0.2 || camera == Path::turns)) continue;
+        std::printf("| %s | %.1f | %s |", place == Place::wall ? "straight" : "slanted", noise_px,
+                    cameras[static_cast<std::size_t>(camera)]);
+        for (const auto& [nearer, limit] : std::array<std::pair<cfp::UnknownDepth, double>, 6>{
+                 {{{2.5, 1}, 1e6}, {{1, 2.5}, 1e6}, {{1, 10}, 1e6}, {{1, 2.5}, 5}, {{1, 2.5}, 3}, {{1, 2.5}, 1.5}}}) {
+          cfp::UnreportedOptions options;
+          options.nearer_than_room = nearer, options.max_parallax = limit;
+          print_one_camera({place, 0, 0, noise_px, 0, camera}, options, frames, stream);
+        }
+        std::printf("\n");
       }
     }
   }

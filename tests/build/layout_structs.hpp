@@ -159,7 +159,7 @@
   CFP_LAYOUT(cfp::DescriptorMatchWorkspace<float>, holders) \
   CFP_LAYOUT(cfp::DescriptorMatchWorkspace<double>, holders) \
   CFP_LAYOUT(cfp::CoarseOptions, foreground) \
-  CFP_LAYOUT(cfp::UnreportedOptions, min_known_depths) \
+  CFP_LAYOUT(cfp::UnreportedOptions, max_parallax) \
   CFP_LAYOUT(cfp::FineOptions, matching) \
   CFP_LAYOUT(cfp::FrameOptions, min_inlier_weight) \
   CFP_LAYOUT(cfp::ConstraintReport, confidence) \

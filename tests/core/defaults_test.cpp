@@ -33,6 +33,8 @@ TEST_CASE("The defaults of the flow and of objects", "[core]") {
   CHECK((o.use_object_probability && o.use_depth_foreground && o.soft_background && o.flow_radius_px == 10));
   CHECK((o.unreported.radius_px == 60 && o.unreported.depth_share == 0.1));
   CHECK((o.unreported.pairs == 3 && o.unreported.max_share == 0.4 && o.unreported.min_known_depths == 0.5));
+  const cfp::UnknownDepth& room = o.unreported.nearer_than_room;
+  CHECK((room.inverse_mean == 1 && room.inverse_sigma == 2.5 && o.unreported.max_parallax == 3));
   const cfp::FlowModelOptions& flow = o.flow;
   CHECK((flow.min_outside_pairs == 30 && flow.margin == 0.1 && flow.use_motion_up_to_scale && flow.use_depth));
   CHECK(flow.camera_acceleration_m_s2 == 3);

@@ -20,6 +20,9 @@ TEST_CASE("Frame options outside their range are named by their whole path", "[f
   CHECK(named([](auto& o) { o.coarse.unreported.pairs = 0; }) == "coarse.unreported.pairs");
   CHECK(named([](auto& o) { o.coarse.unreported.max_share = 1.1; }) == "coarse.unreported.max_share");
   CHECK(named([](auto& o) { o.coarse.unreported.min_known_depths = -1; }) == "coarse.unreported.min_known_depths");
+  CHECK(named([](auto& o) { o.coarse.unreported.max_parallax = -1; }) == "coarse.unreported.max_parallax");
+  CHECK(named([](auto& o) { o.coarse.unreported.nearer_than_room.inverse_mean = 0; }) ==
+        "coarse.unreported.nearer_than_room.inverse_mean");
   CHECK(named([](auto& o) { o.coarse.flow.motion.search_above_px = 0; }) == "coarse.flow.motion.search_above_px");
   CHECK(named([](auto& o) { o.coarse.flow.motion.shared_depth_ratio = -1; }) ==
         "coarse.flow.motion.shared_depth_ratio");

@@ -416,6 +416,56 @@ TEST_CASE("In a hall beyond the depths somebody near whom nobody reports is not 
   }
 }
 
+TEST_CASE("With one camera what stands before a plane is no mover, and who walks before a camera at rest is one",
+          "[frame]") {
+  // One camera before a wall 4 m away; in the middle of the image something 0.8 m away that rests, or walks.
+  const auto marked = [](double camera_m, double walk_m, std::uint64_t seed, const cfp::FrameOptions& options) {
+    cfp::Random random(seed, "before a plane");
+    DynamicScene<double> scene;
+    scene.T_cur_prev.translation = {camera_m, 0, 0};
+    for (int i = 0; i < 900; ++i) {
+      const double u = random.uniform(-0.6, 0.6), v = random.uniform(-0.45, 0.45);
+      const bool near = std::abs(u) < 0.15 && std::abs(v) < 0.2;
+      const double z = near ? 0.8 : 4;
+      const cfp::Vector3<double> before(u * z, v * z, z);
+      const cfp::Vector3<double> walk(0, near ? walk_m : 0, 0);
+      const cfp::Vector3<double> after = scene.T_cur_prev * cfp::Vector3<double>(before + walk);
+      cfp::Vector2<double> from = cfp::Vector2<double>::Zero(), to = from;
+      REQUIRE((scene.camera.project(before, from) && scene.camera.project(after, to)));
+      scene.previous_keypoints.push_back({from.x() + 0.2 * random.normal(), from.y() + 0.2 * random.normal()});
+      scene.keypoints.push_back({to.x() + 0.2 * random.normal(), to.y() + 0.2 * random.normal()});
+      scene.is_person.push_back(near ? 1 : 0);
+    }
+    FrameRun<double> run(scene);
+    cfp::Frame<double> frame;
+    frame.timestamp_s = 1.0 / 30;
+    frame.keypoints = run.scene.keypoints;
+    frame.flow = {run.scene.previous_keypoints, run.scene.keypoints};
+    run.coarse(options, frame, run.scene.camera);
+    CHECK(run.state.report.flow_model == cfp::FlowModelKind::motion_up_to_scale);
+    double said = 0, near = 0;
+    for (std::size_t i = 0; i < run.scene.is_person.size(); ++i) {
+      near += run.scene.is_person[i];
+      said += run.scene.is_person[i] != 0 && run.state.flow_probability[i] >= 0 ? 1 : 0;
+    }
+    return said / near;
+  };
+  cfp::FrameOptions as_in_boxes;
+  as_in_boxes.coarse.unreported.nearer_than_room = as_in_boxes.coarse.flow.nearer_than_room;
+  as_in_boxes.coarse.unreported.max_parallax = 1000;
+  double rests = 0, walks = 0, rests_as_in_boxes = 0;
+  for (const std::uint64_t seed : {1U, 2U, 3U, 4U, 5U, 6U}) {
+    for (const double camera_m : {0.003, 0.017, 0.05}) {
+      rests += marked(camera_m, 0, seed, {}) / 18;
+      rests_as_in_boxes += marked(camera_m, 0, seed, as_in_boxes) / 18;
+    }
+    walks += marked(0, 0.02, seed, {}) / 6;
+  }
+  CHECK(rests < 0.05);
+  CHECK(walks > 0.9);
+  CHECK(rests_as_in_boxes > 0.2);
+}
+
 TEST_CASE("Where most keypoints would move, or the room behind them, nothing is said of what nobody reports",
           "[frame]") {
   for (const std::uint64_t seed : {96U, 97U, 98U}) {

@@ -59,6 +59,7 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
                        &options.coarse.unreported.depth_share,
                        &options.coarse.unreported.max_share,
                        &options.coarse.unreported.min_known_depths,
+                       &options.coarse.unreported.max_parallax,
                        &flow.camera_acceleration_m_s2,
                        &flow.motion.search_above_px,
                        &flow.motion.shared_depth_ratio,

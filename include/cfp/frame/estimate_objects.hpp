@@ -10,6 +10,7 @@
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
 #include "cfp/frame/object_members_impl.hpp"
+#include "cfp/frame/unreported_impl.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/probability/object.hpp"
 
@@ -17,12 +18,6 @@ namespace cfp {
 
 namespace detail {
 inline namespace CFP_ISA {
-
-/// The options on the scale of the noise of this frame's flow.
-[[nodiscard]] inline ObjectProbabilityOptions scaled_to_flow(const ObjectProbabilityOptions& options,
-                                                             const FrameReport& report) noexcept {
-  return scaled_to_noise(options, report.flow_sigma_px, coordinates_of(report.flow_model));
-}
 
 /// The motion of the flow's depths joined with what else is known of it: the host's or, without, what the frame before
 /// lets expect if the two agree, for a camera that is pushed keeps no velocity.
@@ -166,6 +161,8 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   state.flow_distances.resize(n);
   scratch.scratch.resize(n);
   flow_distances(model, flow, pinhole, coarse.flow, span<Scalar>(state.flow_distances));
+  if (model.kind == FlowModelKind::motion_up_to_scale)
+    detail::measure_room(model, flow, pinhole, coarse, scratch.room_distances);
   const ObjectProbabilityOptions scored = detail::scaled_to_flow(coarse.object, report);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     // What lies behind an object says nothing of it, and a pair on its silhouette may have either depth.

@@ -38,6 +38,11 @@ struct UnreportedOptions {
   /// in one with boxes, where it is less than half of that, nothing is said. In [0, 1]; 0: depths always count
   /// (cfp_unreported_study).
   double min_known_depths = 0.5;
+  /// Where the motion is known up to scale only, what is at rest may stand as near, as of nearer_than_room for people
+  /// in boxes, and where it shifts the room by more than max_parallax times the flow's noise, nothing is said: without
+  /// an F what stands before a plane and what moves are one (cfp_unreported_study). >= 0.
+  UnknownDepth nearer_than_room{1, 2.5};
+  double max_parallax = 3;
 };
 
 /// The paper's first stage: objects and depth (sections IV-B and IV-C).
@@ -100,7 +105,9 @@ inline namespace CFP_ISA {
   if (!detail::non_negative(o.depth_share)) return "depth_share";
   if (o.pairs < 1) return "pairs";
   if (!(o.max_share >= 0 && o.max_share <= 1)) return "max_share";
-  return o.min_known_depths >= 0 && o.min_known_depths <= 1 ? OptionPath() : "min_known_depths";
+  if (!(o.min_known_depths >= 0 && o.min_known_depths <= 1)) return "min_known_depths";
+  if (!detail::non_negative(o.max_parallax)) return "max_parallax";
+  return nested("nearer_than_room", invalid_field(o.nearer_than_room));
 }
 
 [[nodiscard]] inline OptionPath invalid_field(const CoarseOptions& o) noexcept {

@@ -92,7 +92,7 @@ struct FrameScratch {
   DescriptorMatchWorkspace<Scalar> matching;
   detail::PointGrid<Scalar> grid, resting;
   std::vector<std::array<Scalar, 2>> points, undistorted_previous, undistorted_current;
-  std::vector<Scalar> depths, projection, epipolar, samples, scratch;
+  std::vector<Scalar> depths, projection, epipolar, samples, scratch, room_distances;
   std::vector<std::int32_t> members;
   std::vector<char> mask, outside;
   std::vector<KeypointLabel> pair_label;
@@ -129,6 +129,12 @@ inline namespace CFP_ISA {
 template <typename Scalar>
 [[nodiscard]] double elapsed_s(const FrameState<Scalar>& state) noexcept {
   return state.previous.known ? state.current.timestamp_s - state.previous.timestamp_s : 0;
+}
+
+/// The options on the scale of the noise of this frame's flow.
+[[nodiscard]] inline ObjectProbabilityOptions scaled_to_flow(const ObjectProbabilityOptions& options,
+                                                             const FrameReport& report) noexcept {
+  return scaled_to_noise(options, report.flow_sigma_px, coordinates_of(report.flow_model));
 }
 
 }  // namespace CFP_ISA

@@ -9,15 +9,29 @@
 #include <vector>
 
 #include "cfp/core/numeric.hpp"
-#include "cfp/frame/estimate_objects.hpp"
+#include "cfp/frame/flow_model.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
+#include "cfp/frame/object_members_impl.hpp"
 #include "cfp/frame/point_grid_impl.hpp"
 #include "cfp/math/order_statistic.hpp"
 #include "cfp/probability/object.hpp"
 
 namespace cfp::detail {
 inline namespace CFP_ISA {
+
+/// Sets scratch.room_distances of a motion up to scale: those of pairs that may be anywhere in the room, and none where
+/// the room shifts too much, see UnreportedOptions::max_parallax.
+template <typename Scalar>
+void measure_room(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow, const PinholeCamera<Scalar>& camera,
+                  const CoarseOptions& coarse, std::vector<Scalar>& room_distances) {
+  room_distances.assign(flow.current.size(), Scalar(no_distance<double>));
+  FlowModelOptions options = coarse.flow;
+  options.nearer_than_room = coarse.unreported.nearer_than_room;
+  const Scalar shift_px = model.motion.T_cur_prev.translation.norm() * camera.fx;
+  if (shift_px <= static_cast<Scalar>(coarse.unreported.max_parallax) * model.sigma_px)
+    flow_distances(model, flow, camera, options, span<Scalar>(room_distances));
+}
 
 /// Puts the flow pairs on no object into scratch.grid where they move, into scratch.resting where they do not, and
 /// their scores into scratch.samples. Whether few enough move that this is not the camera, whose motion must rest on
@@ -29,12 +43,14 @@ template <typename Scalar>
   const ObjectProbabilityOptions scored = scaled_to_flow(options.coarse.object, state.report);
   const Scalar threshold = static_cast<Scalar>(options.object_threshold);
   FrameScratch<Scalar>& scratch = state.scratch;
+  const std::vector<Scalar>& distances =
+      state.report.flow_model == FlowModelKind::motion_up_to_scale ? scratch.room_distances : state.flow_distances;
   const std::size_t n = flow.current.size();
   scratch.samples.assign(n, Scalar(-1));  // of pairs without a score
   std::size_t moving = 0, all = 0;
   for (std::size_t p = 0; p < n; ++p) {
-    if (scratch.outside[p] == 0 || !has_distance(state.flow_distances[p])) continue;
-    scratch.samples[p] = object_score(state.flow_distances[p], scored);
+    if (scratch.outside[p] == 0 || !has_distance(distances[p])) continue;
+    scratch.samples[p] = object_score(distances[p], scored);
     moving += scratch.samples[p] < threshold ? 1U : 0U;
     ++all;
   }
