@@ -38,10 +38,11 @@ struct UnreportedOptions {
   /// in one with boxes, where it is less than half of that, nothing is said. In [0, 1]; 0: depths always count
   /// (cfp_unreported_study).
   double min_known_depths = 0.5;
-  /// Where the motion is known up to scale only, what is at rest may stand as near, as of nearer_than_room for people
-  /// in boxes, and where it shifts the room by more than max_parallax times the flow's noise, nothing is said: without
-  /// an F what stands before a plane and what moves are one (cfp_unreported_study). >= 0.
+  /// Where the motion is known up to scale only: how much nearer than the room what is at rest may be, as
+  /// FlowModelOptions::nearer_than_room of what is in boxes.
   UnknownDepth nearer_than_room{1, 2.5};
+  /// There, too: of the flow's noise. Where the motion shifts the room by more, nothing is said, since what stands
+  /// before a plane, which has no F, and what moves are one (cfp_unreported_study). >= 0.
   double max_parallax = 3;
 };
 
