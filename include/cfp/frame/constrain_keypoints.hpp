@@ -62,9 +62,8 @@ template <typename Scalar>
   const auto fit = [&](bool inside) {
     scratch.samples.clear();
     for (std::size_t i = 0; i < distances.size(); ++i) {
-      const Scalar m = map_point_probability.empty() ? Scalar(-1) : map_point_probability[i];
       if ((state.label[i] == KeypointLabel::outside && !is_unreported(i, state)) ||
-          (inside && model_weight(i, m, options, state) >= Scalar(0.5)))
+          (inside && model_weight(i, map_point_at(map_point_probability, i), options, state) >= Scalar(0.5)))
         scratch.samples.push_back(distances[i]);
     }
     return fit_constraint(scratch.samples, constraint, scratch.scratch);
@@ -139,7 +138,7 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
   for (std::size_t i = 0; i < n; ++i) {
     if (state.box[i] == no_box) continue;
     const std::size_t b = static_cast<std::size_t>(state.box[i]);
-    const Scalar m = map_point_probability.empty() ? Scalar(-1) : map_point_probability[i];
+    const Scalar m = detail::map_point_at(map_point_probability, i);
     SecondStageKeypoint<Scalar>& keypoint = state.evidence[i] = {};
     keypoint.projection = {static_probability(projection, scratch.projection[i]), ct,
                            has_projection && scratch.projection[i] >= Scalar(0)};

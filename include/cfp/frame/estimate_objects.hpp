@@ -161,7 +161,7 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   state.flow_distances.resize(n);
   scratch.scratch.resize(n);
   flow_distances(model, flow, pinhole, coarse.flow, span<Scalar>(state.flow_distances));
-  if (model.kind == FlowModelKind::motion_up_to_scale)
+  if (model.kind == FlowModelKind::motion_up_to_scale && looks_for_unreported(options))
     detail::measure_room(model, flow, pinhole, coarse, scratch.room_distances);
   const ObjectProbabilityOptions scored = detail::scaled_to_flow(coarse.object, report);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {

@@ -131,6 +131,12 @@ template <typename Scalar>
   return state.previous.known ? state.current.timestamp_s - state.previous.timestamp_s : 0;
 }
 
+/// M of keypoint i; -1, as of one without a map point, for a host that keeps none.
+template <typename Scalar>
+[[nodiscard]] Scalar map_point_at(span<const Scalar> map_point_probability, std::size_t i) noexcept {
+  return map_point_probability.empty() ? Scalar(-1) : map_point_probability[i];
+}
+
 /// The options on the scale of the noise of this frame's flow.
 [[nodiscard]] inline ObjectProbabilityOptions scaled_to_flow(const ObjectProbabilityOptions& options,
                                                              const FrameReport& report) noexcept {

@@ -3,8 +3,6 @@
 /// label_keypoints.hpp, not an interface.
 #pragma once
 
-#include <algorithm>
-
 #include "cfp/clustering/depth_foreground.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
@@ -54,18 +52,6 @@ ForegroundResult separate_members(const TrackedBox<Scalar>& box, const PointSpan
   ForegroundInput<Scalar> in{scratch.depths, scratch.points, box.box};
   if (state.previous.known) in.previous_depth_m = object_depth(state.previous, box.id);
   return depth_foreground(in, options.coarse.foreground, scratch.foreground, scratch.mask);
-}
-
-/// Share of the pairs on no object that have a depth; 0 without such pairs. Where it is small, as beyond the range of a
-/// depth camera, all of them may be on one thing that is near.
-template <typename Scalar>
-[[nodiscard]] double share_with_depth(const FlowPairs<Scalar>& flow, span<const char> outside) noexcept {
-  double all = 0, known = 0;
-  for (std::size_t i = 0; i < outside.size(); ++i) {
-    all += outside[i] != 0 ? 1 : 0;
-    known += outside[i] != 0 && i < flow.previous_depths.size() && is_valid_depth(flow.previous_depths[i]) ? 1 : 0;
-  }
-  return known / (std::max)(all, 1.0);
 }
 
 }  // namespace CFP_ISA

@@ -12,13 +12,24 @@
 #include "cfp/frame/flow_model.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
-#include "cfp/frame/object_members_impl.hpp"
 #include "cfp/frame/point_grid_impl.hpp"
 #include "cfp/math/order_statistic.hpp"
 #include "cfp/probability/object.hpp"
 
 namespace cfp::detail {
 inline namespace CFP_ISA {
+
+/// Share of the pairs on no object that have a depth; 0 without such pairs. Where it is small, as beyond the range of a
+/// depth camera, all of them may be on one thing that is near.
+template <typename Scalar>
+[[nodiscard]] double share_with_depth(const FlowPairs<Scalar>& flow, span<const char> outside) noexcept {
+  double all = 0, known = 0;
+  for (std::size_t i = 0; i < outside.size(); ++i) {
+    all += outside[i] != 0 ? 1 : 0;
+    known += outside[i] != 0 && i < flow.previous_depths.size() && is_valid_depth(flow.previous_depths[i]) ? 1 : 0;
+  }
+  return known / (std::max)(all, 1.0);
+}
 
 /// Sets scratch.room_distances of a motion up to scale: those of pairs that may be anywhere in the room, and none where
 /// the room shifts too much, see UnreportedOptions::max_parallax.

@@ -159,7 +159,7 @@ void weigh_keypoints(span<const non_deduced<Scalar>> map_point_probability, cons
   CFP_ASSERT(detail::fits(state.size(), map_point_probability));
   state.report.mismatched = 0;
   for (std::size_t i = 0; i < state.size(); ++i) {
-    const Scalar m = map_point_probability.empty() ? Scalar(-1) : map_point_probability[i];
+    const Scalar m = detail::map_point_at(map_point_probability, i);
     state.weight[i] = model_weight(i, m, options, state);
     if (is_mismatched(i, m, options, state)) ++state.report.mismatched;
   }
