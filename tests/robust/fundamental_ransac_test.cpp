@@ -1,6 +1,7 @@
 #include "cfp/robust/fundamental_ransac.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <limits>
 #include <numeric>
@@ -335,6 +336,32 @@ TEST_CASE("Absent pairs change nothing, weights guide the search", "[robust]") {
     iterations += double(guided.iterations) / 10;
   }
   CHECK(iterations < 400);
+}
+
+TEST_CASE("A few heavy pairs beside many light ones are few pairs", "[robust]") {
+  FundamentalRansacWorkspace workspace;
+  cfp::Random random(53, "heavy");
+  int wrong = 0, right = 0;
+  for (int trial = 0; trial < 30; ++trial) {
+    const auto scene = make_two_view_scene<double>(random, noisy(300, 0.3));
+    std::vector<double> weights(300);
+    const auto run = [&] {
+      const auto result =
+          fundamental_ransac(PointPairs{scene.prev, scene.cur, weights}, FundamentalRansacOptions{}, workspace);
+      const bool good = result.found() && cfp_test::median_sampson_of_truth<double>(scene, result.F) < 0.6;
+      right += good ? 1 : 0;
+      wrong += result.found() && !good ? 1 : 0;
+    };
+    for (const std::size_t heavy : {3U, 5U, 8U}) {
+      for (std::size_t i = 0; i < 300; ++i) weights[i] = i < heavy ? 1.0 : 1e-3;
+      run();
+    }
+    CHECK(right == trial);
+    for (double& w : weights) w = std::pow(10.0, random.uniform(-3, 0));
+    run();
+  }
+  CHECK(wrong == 0);
+  CHECK(right == 30);
 }
 
 TEST_CASE("Too little, coincident or unstructured input is reported and never crashes", "[robust]") {

@@ -103,7 +103,7 @@ struct DegeneracyCheck {
   // no motion and against H. least: distinct pairs it has to explain.
   [[nodiscard]] bool has_parallax(double least) noexcept {
     FundamentalEvidence<T> evidence{search, scratch};
-    if (!evidence.stands_out()) return false;
+    if (!evidence.stands_out(least)) return false;
     evidence.stride = (std::max)(pairs.size / PairArrays::enough, std::size_t(1));
     typename FundamentalEvidence<T>::Verdict with_H = evidence.judge(H);
     const bool broad_possible = with_H.broad.evidence < with_H.person.evidence && find_homography_beside(with_H.broad);

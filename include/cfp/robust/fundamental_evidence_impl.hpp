@@ -75,17 +75,21 @@ struct FundamentalEvidence {
 
   // Whether more pairs lie near their lines than the pairs up to three times as far let chance put there: the binomial
   // tail of that has to outdo the number of seven-point samples, C(n, 7), as the best of all their F fits some
-  // mismatches, too. Source: Moisan and Stival, "A probabilistic criterion to detect rigid point matches between two
-  // images and estimate the fundamental matrix", IJCV 2004.
-  [[nodiscard]] bool stands_out() const noexcept {
+  // mismatches, too. Weights count as Kish's number of equal ones, of which at least `least` must lie near. Source:
+  // Moisan and Stival, "A probabilistic criterion to detect rigid point matches between two images and estimate the
+  // fundamental matrix", IJCV 2004.
+  [[nodiscard]] bool stands_out(T least) const noexcept {
     const T limit = search.wide_limit();
-    T near = 0, all = 0, n = 0;
+    T near = 0, all = 0, n = 0, squares = 0;
     for (std::size_t i = 0; i < pairs.size; ++i) {
       n += pairs.row(5)[i];
+      squares += pairs.row(5)[i] * pairs.row(5)[i];
       near += search.distances_sq[i] <= limit ? pairs.row(5)[i] : T(0);
       all += search.distances_sq[i] <= 9 * limit ? pairs.row(5)[i] : T(0);
     }
-    return 3 * near > all && binomial_nats(near, all, T(1) / 3) > 7 * std::log((n - 3) / T(3.38));
+    const T per_weight = n / squares;
+    near *= per_weight, all *= per_weight, n *= per_weight;
+    return near >= least && 3 * near > all && binomial_nats(near, all, T(1) / 3) > 7 * std::log((n - 3) / T(3.38));
   }
 
   // Of the F whose distances were measured last against H. Some F = [e']x H goes through any two pairs, the loudest if
