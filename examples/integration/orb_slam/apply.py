@@ -1,162 +1,14 @@
 #!/usr/bin/env python3
-"""Applies the recipe of README.md to a checkout of ORB-SLAM2, by function names.
+"""Applies the recipe of README.md to a checkout of ORB-SLAM2 or ORB-SLAM3, by function names.
 
-Changes nothing unless every place is found exactly as often as expected. The numbers are those of the steps in
-README.md.
+Changes nothing unless every place of steps.py is found exactly as often as expected.
 """
 import argparse
 import re
 import sys
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parent
-GUARD = "if(mpStaticWeights) "
-NEW_FRAME = (r"if(mpStaticWeights)\n    {\n        mpStaticWeights->NewFrame(mCurrentFrame,mDetections,mFlow.Next("
-             r"mImGray,%s,mCurrentFrame.mvKeys,mpStaticWeights->Probability().state()));\n"
-             r"        mDetections.reset();\n    }\n\n    \1")
-
-# Step, file, function ("" for the whole file), a regular expression, what takes its place, how many times it is found.
-STEPS = [
-    # 0: how it is built
-    (0, "CMakeLists.txt", "", r"find_package\(OpenCV 3\.0 QUIET\)", "find_package(OpenCV QUIET)", 1),
-    (0, "CMakeLists.txt", "", r"# Check C\+\+11[\s\S]*?\nendif\(\)\n",
-     "set(CMAKE_CXX_STANDARD 17)\nadd_definitions(-DCOMPILEDWITHC11)\n", 1),
-    (0, "CMakeLists.txt", "", r"(\ninclude_directories\(\n)",
-     lambda found: f"{found[1]}{HERE.parents[2]}/include\n{HERE.parents[1]}\n{HERE}\n", 1),
-    (0, "CMakeLists.txt", "", r"(src/System\.cc\n)", lambda found: f"{found[1]}{HERE}/engines.cc\n", 1),
-    (0, "Thirdparty/DBoW2/CMakeLists.txt", "", r"find_package\(OpenCV 3\.0 QUIET\)", "find_package(OpenCV QUIET)", 1),
-    # 0: what C++17, OpenCV 4 and a newer C library want of the code of 2017, nothing where a fork has done it
-    (0, "include/ORBextractor.h", "", r"#include\s*<(?:opencv/cv\.h|opencv2/opencv\.hpp)>",
-     "#include <unistd.h>\n#include <opencv2/core/core_c.h>\n#include <opencv2/imgproc/types_c.h>\n"
-     "#include <opencv2/opencv.hpp>\n#if __has_include(<opencv2/imgcodecs/legacy/constants_c.h>)\n"
-     "#include <opencv2/imgcodecs/legacy/constants_c.h>\n#endif", 1),
-    (0, "include/LoopClosing.h", "", r"std::pair<(?:const KeyFrame\*|KeyFrame\* ?const), ?g2o::Sim3>",
-     "std::pair<KeyFrame* const, g2o::Sim3>", 1),
-    (0, "include/LoopClosing.h", "", r"(?:bool|int) mnFullBAIdx;", "int mnFullBAIdx;", 1),
-    # 1: what a frame, a keyframe and a map point hold, and their copies
-    (1, "include/Frame.h", "", r"(std::vector<bool> mvbOutlier;)",
-     r"\1\n    std::vector<float> mvStaticProbability, mvWeight;  // cfp: K, and the weights of the last optimisation", 1),
-    (1, "src/Frame.cc", "Frame::Frame(const Frame &frame)", r"(if\(!frame\.mTcw\.empty\(\)\))",
-     r"mvStaticProbability = frame.mvStaticProbability;\n    mvWeight = frame.mvWeight;\n\n    \1", 1),
-    (1, "include/KeyFrame.h", "", r"(const std::vector<float> mvDepth;[^\n]*)",
-     r"\1\n    std::vector<float> mvStaticProbability;  // cfp: K, never changed", 1),
-    (1, "src/KeyFrame.cc", "KeyFrame::KeyFrame(Frame &F", r"(SetPose\(F\.mTcw\);)",
-     r"mvStaticProbability = F.mvStaticProbability;\n    \1", 1),
-    (1, "include/MapPoint.h", "", r"(#include\s*<mutex>)", r"#include<atomic>\n\1", 1),
-    (1, "include/MapPoint.h", "", r"(int nObs;)",
-     r"\1\n    std::atomic<float> mStaticProbability{1.0f};  // cfp: M, read by the mapping thread", 1),
-    # 2: the adapter beside Tracking, and the door for the host's program
-    (2, "include/Tracking.h", "", r"(#include\s*<mutex>)",
-     r'#include<iostream>\n#include<memory>\n#include<optional>\n'
-     r'#include"orb_slam2.hpp"  // of cfp, examples/integration/orb_slam\n\n\1', 1),
-    (2, "include/Tracking.h", "", r"(\nclass Tracking\s*\n\{\s*\n\s*public:)",
-     r"\ntypedef cfp_integration::StaticWeights<cfp_integration::OrbSlam2<Frame> > StaticWeights;\n\1"
-     r"\n    // cfp\n    void UseStaticWeights(const cfp::FrameOptions &options)\n    {\n"
-     r"        cfp::RadialTangentialCamera<float> camera;\n"
-     r"        if(cfp::to_camera(mK,mDistCoef,camera)==cfp::Status::ok)\n"
-     r"            mpStaticWeights.reset(new StaticWeights(camera,options));\n        else\n"
-     r'            std::cerr << "cfp: this camera is not supported, static weights are off" << std::endl;' r"\n    }\n"
-     r"    std::optional<std::vector<cfp::Detection<float> > > mDetections;  // of the next image\n"
-     r"    std::unique_ptr<StaticWeights> mpStaticWeights;\n    cfp_integration::FrameFlow mFlow;\n"
-     r"    int PoseOptimization();\n"
-     r"    bool MayCreate(int i) const { return !mpStaticWeights || "
-     r"mpStaticWeights->MayCreate(mCurrentFrame.mvStaticProbability[i]); }\n"
-     r"    float InitialM(const Frame &F, int i) const { return mpStaticWeights ? F.mvStaticProbability[i] : 1.0f; }\n"
-     r"    bool Counts(int i) const { return !mpStaticWeights || mpStaticWeights->CountsAsInlier(mCurrentFrame,i); }\n", 1),
-    (2, "include/System.h", "", r"(#include\s*<string>)", r'#include"cfp/frame/frame_options.hpp"\n\1', 1),
-    (2, "include/System.h", "", r"(\n    // Proccess the given monocular frame\n)",
-     r"\n    // cfp: once, and the detections of every image before it is tracked (not at all: the detector did not run)"
-     r"\n    void UseStaticWeights(const cfp::FrameOptions &options);"
-     r"\n    void SetDetections(const std::vector<cfp::Detection<float> > &detections);\n\1", 1),
-    (2, "src/System.cc", "", r"(\ncv::Mat System::TrackRGBD\()",
-     r"\nvoid System::UseStaticWeights(const cfp::FrameOptions &options)\n{\n"
-     r"    mpTracker->UseStaticWeights(options);\n}\n"
-     r"\nvoid System::SetDetections(const std::vector<cfp::Detection<float> > &detections)\n{\n"
-     r"    mpTracker->mDetections = detections;\n}\n\1", 1),
-    (2, "src/Tracking.cc", "Tracking::Reset()", r"(mlRelativeFramePoses\.clear\(\);)",
-     r"if(mpStaticWeights)\n    {\n        mpStaticWeights->Reset();\n        mFlow.Reset();\n    }\n\n    \1", 1),
-    # 3: a new frame
-    (3, "src/Tracking.cc", "Tracking::GrabImageStereo", r"(Track\(\);)", NEW_FRAME % "cv::Mat()", 1),
-    (3, "src/Tracking.cc", "Tracking::GrabImageMonocular", r"(Track\(\);)", NEW_FRAME % "cv::Mat()", 1),
-    (3, "src/Tracking.cc", "Tracking::GrabImageRGBD", r"(Track\(\);)", NEW_FRAME % "imDepth", 1),
-    # 4: initialisation
-    (4, "src/Tracking.cc", "Tracking::StereoInitialization()", r"if\(z>0\)", "if(z>0 && MayCreate(i))", 1),
-    (4, "src/Tracking.cc", "Tracking::StereoInitialization()", r"(new MapPoint\(x3D,pKFini,mpMap\);)",
-     r"\1\n                pNewMP->mStaticProbability = InitialM(mCurrentFrame,i);", 1),
-    (4, "src/Tracking.cc", "Tracking::MonocularInitialization()", r"(// Check if there are enough correspondences)",
-     r"for(size_t i=0; mpStaticWeights && i<mvIniMatches.size(); i++)\n        {\n"
-     r"            if(mvIniMatches[i]>=0 && !(MayCreate(mvIniMatches[i]) &&"
-     r" mpStaticWeights->MayCreate(mInitialFrame.mvStaticProbability[i])))\n            {\n"
-     r"                mvIniMatches[i]=-1;\n                nmatches--;\n            }\n        }\n\n        \1", 1),
-    (4, "src/Tracking.cc", "Tracking::CreateInitialMapMonocular()", r"(new MapPoint\(worldPos,pKFcur,mpMap\);)",
-     r"\1\n        pMP->mStaticProbability = InitialM(mCurrentFrame,mvIniMatches[i]);", 1),
-    # 5: weights of every pose optimisation
-    (5, "src/Tracking.cc", "", r"Optimizer::PoseOptimization\(&mCurrentFrame\)", "PoseOptimization()", 6),
-    (5, "src/Tracking.cc", "", r"(\nbool Tracking::TrackReferenceKeyFrame\(\)\n)",
-     r"\nint Tracking::PoseOptimization()\n{\n    " + GUARD + r"mpStaticWeights->Weigh(mCurrentFrame);\n"
-     r"    return Optimizer::PoseOptimization(&mCurrentFrame);\n}\n\1", 1),
-    (5, "src/Optimizer.cc", "", r"(\nint Optimizer::PoseOptimization\(Frame \*pFrame\)\n)",
-     r"\nstatic float Weight(const Frame *pFrame, size_t i)\n{\n"
-     r"    return pFrame->mvWeight.empty() ? 1.0f : pFrame->mvWeight[i];\n}\n\1", 1),
-    (5, "src/Optimizer.cc", "Optimizer::PoseOptimization(", r"(\n        if\(pMP\)\n        \{)",
-     r"\1\n            const float w = Weight(pFrame,i);\n            if(!(w>0))\n            {\n"
-     r"                pFrame->mvbOutlier[i] = false;\n                continue;\n            }\n", 1),
-    (5, "src/Optimizer.cc", "Optimizer::PoseOptimization(", r"Identity\(\)\*invSigma2", r"Identity()*(w*invSigma2)", 2),
-    (5, "src/Optimizer.cc", "Optimizer::PoseOptimization(", r"setDelta\((delta\w+)\)", r"setDelta(\1*sqrt(w))", 2),
-    (5, "src/Optimizer.cc", "Optimizer::PoseOptimization(", r"if\(chi2>(chi2\w+\[it\])\)",
-     r"if(chi2>\1*Weight(pFrame,idx))", 2),
-    # 6: after the first pose
-    (6, "src/Tracking.cc", "Tracking::Track()", r"(mCurrentFrame\.mpReferenceKF = mpReferenceKF;\n\n\s*// If we have)",
-     r"if(bOK && mpStaticWeights && mLastProcessedState==OK)\n"
-     r"            mpStaticWeights->FirstPose(mCurrentFrame,mLastFrame);\n\n        \1", 1),
-    (6, "src/Tracking.cc", "Tracking::TrackReferenceKeyFrame()", r"Observations\(\)>0\)", "Observations()>0 && Counts(i))", 1),
-    (6, "src/Tracking.cc", "Tracking::TrackWithMotionModel()", r"Observations\(\)>0\)", "Observations()>0 && Counts(i))", 1),
-    (6, "src/Tracking.cc", "Tracking::UpdateLastFrame()", r"(new MapPoint\(x3D,mpMap,&mLastFrame,i\);)",
-     r"\1\n            pNewMP->mStaticProbability = InitialM(mLastFrame,i);", 1),
-    # 7: relocalisation
-    (7, "src/Tracking.cc", "Tracking::Relocalization()", r"(if\(nmatches<15\))",
-     r"for(size_t j=0; mpStaticWeights && j<vvpMapPointMatches[i].size(); j++)\n            {\n"
-     r"                MapPoint* &pMP = vvpMapPointMatches[i][j];\n"
-     r"                if(pMP && !mpStaticWeights->Trusts(j,pMP->mStaticProbability))\n                {\n"
-     r"                    pMP = static_cast<MapPoint*>(NULL);\n                    nmatches--;\n"
-     r"                }\n            }\n            \1", 1),
-    # 8: the local map
-    (8, "src/Tracking.cc", "Tracking::TrackLocalMap()", r"(PoseOptimization\(\);)",
-     r"\1\n    " + GUARD + r"mpStaticWeights->Learn(mCurrentFrame);", 1),
-    (8, "src/Tracking.cc", "Tracking::TrackLocalMap()", r"Observations\(\)>0\)", "Observations()>0 && Counts(i))", 1),
-    # 9: keyframes and their points
-    (9, "src/Tracking.cc", "Tracking::NeedNewKeyFrame()", r"mvDepth\[i\]<mThDepth\)", "mvDepth[i]<mThDepth && MayCreate(i))", 1),
-    (9, "src/Tracking.cc", "Tracking::CreateNewKeyFrame()", r"(KeyFrame\* pKF = new KeyFrame)",
-     r"for(int i=0; mpStaticWeights && i<mCurrentFrame.N; i++)\n    {\n"
-     r"        if(mCurrentFrame.mvpMapPoints[i] && !Counts(i))\n"
-     r"            mCurrentFrame.mvpMapPoints[i] = static_cast<MapPoint*>(NULL);\n    }\n\n    \1", 1),
-    (9, "src/Tracking.cc", "Tracking::CreateNewKeyFrame()", r"if\(z>0\)", "if(z>0 && MayCreate(i))", 1),
-    (9, "src/Tracking.cc", "Tracking::CreateNewKeyFrame()", r"(new MapPoint\(x3D,pKF,mpMap\);)",
-     r"\1\n                    pNewMP->mStaticProbability = InitialM(mCurrentFrame,i);", 1),
-    # 10: the mapping thread
-    (10, "src/LocalMapping.cc", "LocalMapping::CreateNewMapPoints()", r"(\n[ \t]*)(const cv::KeyPoint &kp1 = [^\n]*)",
-     r"\1const float K = mpCurrentKeyFrame->mvStaticProbability.empty() ? 1.0f :"
-     r" min(mpCurrentKeyFrame->mvStaticProbability[idx1],pKF2->mvStaticProbability[idx2]);"
-     r"\1if(K<0.3f)  // cfp::FrameOptions::min_creation_probability\1    continue;\n\1\2", 1),
-    (10, "src/LocalMapping.cc", "LocalMapping::CreateNewMapPoints()", r"(new MapPoint\(x3D,mpCurrentKeyFrame,mpMap\);)",
-     r"\1\n            pMP->mStaticProbability = K;", 1),
-    (10, "src/MapPoint.cc", "MapPoint::Replace(", r"(pMP->IncreaseFound\(nfound\);)",
-     r"const float found = pMP->GetFound();\n    pMP->mStaticProbability ="
-     r" (found*pMP->mStaticProbability+nfound*mStaticProbability)/(found+nfound);\n    \1", 1),
-    # 11: local bundle adjustment
-    (11, "src/Optimizer.cc", "Optimizer::LocalBundleAdjustment(", r"(if\(!pMP->isBad\(\)\))(\n\s*if\(pMP->mnBALocalForKF)",
-     r"if(!pMP->isBad() && pMP->mStaticProbability>0)\2", 1),
-    (11, "src/Optimizer.cc", "Optimizer::LocalBundleAdjustment(", r"(\n    vector<MapPoint\*> vpMapPointEdgeMono;)",
-     r"\n    vector<float> vWeightMono, vWeightStereo;\1", 1),
-    (11, "src/Optimizer.cc", "Optimizer::LocalBundleAdjustment(", r"(\n[ \t]*)(g2o::VertexSBAPointXYZ\* vPoint = new)",
-     r"\1const float w = max(pMP->mStaticProbability.load(),0.01f);  // read once: tracking goes on learning\1\2", 1),
-    (11, "src/Optimizer.cc", "Optimizer::LocalBundleAdjustment(", r"Identity\(\)\*invSigma2", r"Identity()*(w*invSigma2)", 2),
-    (11, "src/Optimizer.cc", "Optimizer::LocalBundleAdjustment(", r"setDelta\((thHuber\w+)\)", r"setDelta(\1*sqrt(w))", 2),
-    (11, "src/Optimizer.cc", "Optimizer::LocalBundleAdjustment(", r"(\n[ \t]*)(vpEdges(Mono|Stereo)\.push_back\(e\);)",
-     r"\1\2\1vWeight\3.push_back(w);", 2),
-    (11, "src/Optimizer.cc", "Optimizer::LocalBundleAdjustment(", r"e->chi2\(\)>5\.991", "e->chi2()>5.991*vWeightMono[i]", 2),
-    (11, "src/Optimizer.cc", "Optimizer::LocalBundleAdjustment(", r"e->chi2\(\)>7\.815", "e->chi2()>7.815*vWeightStereo[i]", 2),
-]
+from steps import BOTH, ORB_SLAM2, ORB_SLAM3
 
 
 def scope(text, function):
@@ -172,15 +24,16 @@ def scope(text, function):
 
 def main():
     arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    arguments.add_argument("folder", type=Path, help="of ORB-SLAM2")
+    arguments.add_argument("folder", type=Path, help="of ORB-SLAM2 or ORB-SLAM3")
     arguments.add_argument("--check", action="store_true", help="only look")
     options = arguments.parse_args()
     root, texts, failures = options.folder, {}, 0
-    for step, name, function, pattern, replacement, times in STEPS:
+    system, own = ("ORB-SLAM3", ORB_SLAM3) if (root / "include/Atlas.h").is_file() else ("ORB-SLAM2", ORB_SLAM2)
+    for step, name, function, pattern, replacement, times in own + BOTH:
         path = root / name
         if path not in texts:
             if not path.is_file():
-                sys.exit(f"{path} is not there: {root} is no checkout of ORB-SLAM2")
+                sys.exit(f"{path} is not there: {root} is no checkout of {system}")
             texts[path] = path.read_text(encoding="utf-8", errors="surrogateescape").replace("\r\n", "\n")
             if any(mark in texts[path] for mark in ("engines.cc", "mpStaticWeights", "mStaticProbability")):
                 sys.exit(f"{path} has been changed already: take a fresh checkout")
@@ -192,12 +45,12 @@ def main():
             print(f"step {step}: {name}, {function or 'file'}: {pattern} found {found} times, expected {times}")
         texts[path] = texts[path][:begin] + part + texts[path][end:]
     if failures:
-        sys.exit(f"{failures} places differ from ORB-SLAM2 as it was published; nothing was changed")
+        sys.exit(f"{failures} places differ from {system} as it was published; nothing was changed")
     if not options.check:
         for path, text in texts.items():
             path.write_text(text, encoding="utf-8", errors="surrogateescape")
     done = "found, nothing was changed" if options.check else "changed"
-    print(f"{len(STEPS)} places in {len(texts)} files {done}")
+    print(f"{system}: {len(own + BOTH)} places in {len(texts)} files {done}")
 
 
 if __name__ == "__main__":

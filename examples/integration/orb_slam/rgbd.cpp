@@ -1,5 +1,5 @@
-// Feeds a recording to ORB-SLAM2 in real time and writes the trajectory, as its rgbd_tum does, with the detections of
-// the recording's detections.txt:
+// Feeds a recording to ORB-SLAM2 or ORB-SLAM3 in real time and writes the trajectory, as its rgbd_tum does, with the
+// detections of the recording's detections.txt:
 //   rgbd VOCABULARY.txt RECORDING TRAJECTORY.txt VARIANT [mono]
 // Built by their CMakeLists.txt, with cfp/include and cfp/examples among the include directories.
 // VARIANT: plain (cfp is not called), cfp or another of cfp::Variant's names. mono: without the depths. SPEED=0.2 in
@@ -20,6 +20,12 @@
 #include "support/sequence.hpp"
 #include "support/variant.hpp"
 
+#if __has_include("Atlas.h")
+namespace host = ORB_SLAM3;
+#else
+namespace host = ORB_SLAM2;
+#endif
+
 namespace {
 
 // Of the recording's time.
@@ -30,13 +36,15 @@ double speed() {
   return value;
 }
 
-// What ORB-SLAM2 reads: the recording's camera, and the values of its own RGB-D examples.
+// What both read: the recording's camera, and the values of its own RGB-D examples.
 std::string settings_of(const cfp_examples::TumCamera& c, const std::string& file) {
   std::ofstream out(file);
-  out << "%YAML:1.0\n"
-      << "Camera.fx: " << c.fx << "\nCamera.fy: " << c.fy << "\nCamera.cx: " << c.cx << "\nCamera.cy: " << c.cy
-      << "\nCamera.k1: " << c.k1 << "\nCamera.k2: " << c.k2 << "\nCamera.p1: " << c.p1 << "\nCamera.p2: " << c.p2
-      << "\nCamera.k3: " << c.k3 << "\nCamera.fps: 30.0\nCamera.bf: 40.0\nCamera.RGB: 0\nThDepth: 40.0\n"
+  out << std::showpoint  // ORB-SLAM3 takes 0 for no real number
+      << "%YAML:1.0\n"
+      << "Camera.type: PinHole\nCamera.fx: " << c.fx << "\nCamera.fy: " << c.fy << "\nCamera.cx: " << c.cx
+      << "\nCamera.cy: " << c.cy << "\nCamera.k1: " << c.k1 << "\nCamera.k2: " << c.k2 << "\nCamera.p1: " << c.p1
+      << "\nCamera.p2: " << c.p2 << "\nCamera.k3: " << c.k3
+      << "\nCamera.fps: 30.0\nCamera.bf: 40.0\nCamera.RGB: 0\nThDepth: 40.0\n"
       << "DepthMapFactor: " << c.depth_units_per_metre << "\nORBextractor.nFeatures: 1000\n"
       << "ORBextractor.scaleFactor: 1.2\nORBextractor.nLevels: 8\nORBextractor.iniThFAST: 20\n"
       << "ORBextractor.minThFAST: 7\n";
@@ -49,8 +57,8 @@ void run(const char* vocabulary, const char* folder, const std::string& trajecto
   const cfp_examples::Sequence recording(folder);
   cfp_examples::FileDetector detector(std::string(folder) + "/detections.txt", {});
   const auto& camera = recording.calibration();
-  ORB_SLAM2::System slam(vocabulary, settings_of(camera, trajectory + ".yaml"),
-                         mono ? ORB_SLAM2::System::MONOCULAR : ORB_SLAM2::System::RGBD, false);
+  host::System slam(vocabulary, settings_of(camera, trajectory + ".yaml"),
+                    mono ? host::System::MONOCULAR : host::System::RGBD, false);
   const bool plain = variant == cfp::Variant::plain;
   if (!plain)
     slam.UseStaticWeights(cfp::variant_options(

@@ -35,7 +35,8 @@ class StaticWeights {
     frame.descriptors = Host::Descriptors(F);
     frame.flow = flow;
     if (detections) frame.detections = *detections;
-    mProbability.coarse(frame);
+    const auto weight = mProbability.coarse(frame).weight;
+    F.mvWeight.assign(weight.begin(), weight.end());
     Remember(F);
   }
 
