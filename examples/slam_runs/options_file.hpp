@@ -41,7 +41,6 @@ void for_each_option(Options& o, const Visit& visit) {
   visit("probability.coarse.object.noise_factor", p.coarse.object.noise_factor);
   visit("probability.coarse.object.shift_pairs", p.coarse.object.shift_pairs);
   visit("probability.fine.min_translation_m", p.fine.min_translation_m);
-  visit("probability.fine.min_parallax", p.fine.min_parallax);
   visit("probability.fine.projection.quantile", p.fine.projection.quantile);
   visit("probability.fine.projection.steepness", p.fine.projection.steepness);
   visit("probability.fine.epipolar.quantile", p.fine.epipolar.quantile);

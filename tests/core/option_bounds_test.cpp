@@ -135,7 +135,6 @@ TEST_CASE("The ends of the ranges of a frame's options", "[core]") {
       CFP_FIELD(O, coarse.foreground.half_body_m, not_negative),
       CFP_FIELD(O, fine.min_pose_inliers, not_negative),
       CFP_FIELD(O, fine.min_translation_m, not_negative),
-      CFP_FIELD(O, fine.min_parallax, not_negative),
       CFP_FIELD(O, fine.projection.quantile, above_zero),
       CFP_FIELD(O, fine.projection.steepness, positive),
       CFP_FIELD(O, fine.epipolar.quantile, above_zero),

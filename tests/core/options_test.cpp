@@ -118,7 +118,6 @@ TEST_CASE("Every option of a frame is refused by its full, unique name", "[core]
       {"coarse.foreground.min_points", [](auto& o) { o.coarse.foreground.min_points = 0; }},
       {"fine.min_pose_inliers", [&](auto& o) { o.fine.min_pose_inliers = nan; }},
       {"fine.min_translation_m", [&](auto& o) { o.fine.min_translation_m = nan; }},
-      {"fine.min_parallax", [&](auto& o) { o.fine.min_parallax = nan; }},
       {"fine.projection.quantile", [&](auto& o) { o.fine.projection.quantile = nan; }},
       {"fine.projection.steepness", [&](auto& o) { o.fine.projection.steepness = nan; }},
       {"fine.projection.min_samples", [](auto& o) { o.fine.projection.min_samples = 0; }},

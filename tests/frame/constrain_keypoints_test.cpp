@@ -141,13 +141,10 @@ TEST_CASE("Too little translation leaves the projection constraint alone", "[fra
   CHECK(result.epipolar.status == cfp::Status::degenerate);
   CHECK(result.projection.status == cfp::Status::ok);
   CHECK(result.epipolar.confidence == 0);
-  cfp::FrameOptions by_parallax;
-  by_parallax.fine.min_translation_m = 0;
-  by_parallax.fine.min_parallax = 0.01;
+  cfp::FrameOptions any_translation;
+  any_translation.fine.min_translation_m = 0;
   FineRun<double> again(make_dynamic_scene<double>(scene, 12));
-  CHECK(again.fine(by_parallax).epipolar.status == cfp::Status::degenerate);
-  by_parallax.fine.min_parallax = 1e-5;
-  CHECK(again.fine(by_parallax).epipolar.status == cfp::Status::ok);
+  CHECK(again.fine(any_translation).epipolar.status == cfp::Status::ok);
 }
 
 TEST_CASE("Without enough keypoints outside the boxes the first stage's K stays", "[frame]") {

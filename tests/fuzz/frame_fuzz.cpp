@@ -80,7 +80,6 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
                        &object.unknown_object_probability,
                        &fine.min_pose_inliers,
                        &fine.min_translation_m,
-                       &fine.min_parallax,
                        &fine.projection.quantile,
                        &fine.projection.steepness,
                        &fine.epipolar.quantile,

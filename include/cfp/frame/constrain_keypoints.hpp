@@ -3,9 +3,9 @@
 /// epipolar constraint, each fitted to the matches outside all boxes.
 #pragma once
 
-#include <algorithm>
 #include <array>
-#include <iterator>
+#include <limits>
+#include <vector>
 
 #include "cfp/core/span.hpp"
 #include "cfp/frame/frame_options.hpp"
@@ -73,21 +73,6 @@ template <typename Scalar>
   return enough ? outside : fit(true);
 }
 
-/// Whether |t| is above t_Th, in metres and, where asked, as a share of the median depth of the matches (0: none has).
-template <typename Scalar>
-[[nodiscard]] bool has_enough_translation(const SE3<double>& T_cur_prev, const FineOptions& options,
-                                          FrameScratch<Scalar>& scratch) {
-  const double t = T_cur_prev.translation.norm();
-  if (!(t > options.min_translation_m)) return false;
-  if (options.min_parallax <= 0) return true;
-  std::vector<Scalar>& depths = scratch.scratch;
-  depths.clear();
-  std::copy_if(scratch.depths.begin(), scratch.depths.end(), std::back_inserter(depths),
-               [](Scalar z) { return is_valid_depth(z); });
-  const Scalar median = quantile(span<Scalar>(depths), 0.5);
-  return t > options.min_parallax * static_cast<double>(median);
-}
-
 }  // namespace CFP_ISA
 }  // namespace detail
 
@@ -119,7 +104,7 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
   const ConstraintModel<Scalar> projection =
       detail::fit_to_static(scratch.projection, map_point_probability, options.fine.projection, options, state);
   ConstraintModel<Scalar> epipolar;
-  const bool moved = detail::has_enough_translation(pose.T_cur_prev, options.fine, scratch);
+  const bool moved = pose.T_cur_prev.translation.norm() > options.fine.min_translation_m;
   if (moved) {
     detail::pose_epipolar_distances(pose.T_cur_prev, camera, state);
     epipolar = detail::fit_to_static(scratch.epipolar, map_point_probability, options.fine.epipolar, options, state);
