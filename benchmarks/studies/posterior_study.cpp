@@ -317,7 +317,6 @@ std::vector<Rule> rules() {
   const auto nothing = [](cfp::FrameOptions&) {};
   add("posterior", nothing);
   add("product", [](auto& o) { o.map_point.weight = cfp::WeightRule::product; });
-  add("minimum", [](auto& o) { o.map_point.weight = cfp::WeightRule::minimum; });
   add("mean of K and M", [](auto& o) { o.map_point.weight = cfp::WeightRule::product; }).mean = true;
   add("posterior, K beside E", nothing).independent = true;
   add("boxes left out", [](auto& o) { o = cfp::variant_options(cfp::Variant::only_boxes, o); });

@@ -80,7 +80,7 @@ void formulas(FuzzInput& in) {
     m = cfp::updated_map_point(number(0, 1), m, options);
     CFP_PROMISE(is_probability(m));
     CFP_PROMISE(is_probability(cfp::posterior_probability(number(0, 1), number(0, 1), m, options)));
-    CFP_PROMISE(is_probability(cfp::observation_weight(number(0, 1), m, options.weight)));
+    CFP_PROMISE(is_probability(cfp::observation_weight(number(0, 1), m)));
   }
 }
 

@@ -50,9 +50,8 @@ TEST_CASE("Deletion and mismatch happen at the paper's and our thresholds", "[pr
   CHECK(cfp::is_deletable(std::numeric_limits<double>::quiet_NaN(), options));
 }
 
-TEST_CASE("The weight rules are what they are called", "[probability]") {
-  CHECK_THAT(cfp::observation_weight(0.5, 0.8, cfp::WeightRule::product), WithinAbs(0.4, 1e-15));
-  CHECK(cfp::observation_weight(0.5, 0.8, cfp::WeightRule::minimum) == 0.5);
+TEST_CASE("The printed weight is a product", "[probability]") {
+  CHECK_THAT(cfp::observation_weight(0.5, 0.8), WithinAbs(0.4, 1e-15));
 }
 
 TEMPLATE_TEST_CASE("Map points and weights keep their range for hostile input", "[probability]", float, double) {
@@ -67,10 +66,8 @@ TEMPLATE_TEST_CASE("Map points and weights keep their range for hostile input", 
         const TestType updated = cfp::updated_map_point(k, m, with(policy));
         CHECK((updated >= 0 && updated <= 1));
       }
-      for (const auto rule : {cfp::WeightRule::product, cfp::WeightRule::minimum}) {
-        const TestType w = cfp::observation_weight(k, m, rule);
-        CHECK((w >= 0 && w <= 1));
-      }
+      const TestType w = cfp::observation_weight(k, m);
+      CHECK((w >= 0 && w <= 1));
     }
   }
 }

@@ -99,12 +99,12 @@ template <typename Scalar>
 [[nodiscard]] Scalar model_weight(std::size_t i, non_deduced<Scalar> map_point_probability, const FrameOptions& options,
                                   const FrameState<Scalar>& state) noexcept {
   CFP_ASSERT(i < state.size());
-  const MapPointOptions& o = options.map_point;
-  if (o.weight == WeightRule::posterior) return posterior_weight(i, map_point_probability, options, state);
+  if (options.map_point.weight == WeightRule::posterior)
+    return posterior_weight(i, map_point_probability, options, state);
   const Scalar k = state.static_probability[i];
   if (!(map_point_probability >= Scalar(0))) return k;
   if (is_mismatched(i, map_point_probability, options, state)) return Scalar(0);
-  return observation_weight(k, map_point_probability, o.weight);
+  return observation_weight(k, map_point_probability);
 }
 
 /// The weight of keypoint i for a map point of probability M, the frame's fallback included.

@@ -19,8 +19,7 @@ enum class MapPointPolicy : std::uint8_t {
 /// What makes the weight of an observation.
 enum class WeightRule : std::uint8_t {
   posterior,  ///< Bayes' rule: M of before, with what this frame says of object and keypoint. Not in the paper
-  product,    ///< K M, and 0 where the two are mismatched (paper: "as weights")
-  minimum     ///< min(K, M), else the same
+  product     ///< K M, and 0 where the two are mismatched (paper: "as weights")
 };
 
 struct MapPointOptions {
@@ -113,14 +112,11 @@ template <typename Scalar>
   return !(difference <= Scalar(options.mismatch_threshold) && -difference <= Scalar(options.mismatch_threshold));
 }
 
-/// The weight that K and M give an observation by the printed rules: K M, or min(K, M); in [0, 1], NaN counts as 0. The
-/// mismatch rule is not part of it: in the first stage K is coarse, a foreground point's 0 says nothing of its match.
+/// The weight that K and M give an observation by WeightRule::product: K M, in [0, 1], NaN counts as 0. The mismatch
+/// rule is not part of it: in the first stage K is coarse, a foreground point's 0 says nothing of its match.
 template <typename Scalar>
-[[nodiscard]] constexpr Scalar observation_weight(Scalar keypoint_probability, Scalar map_point_probability,
-                                                  WeightRule rule) noexcept {
-  const Scalar k = clamp_probability(keypoint_probability);
-  const Scalar m = clamp_probability(map_point_probability);
-  return rule == WeightRule::minimum ? (k < m ? k : m) : k * m;
+[[nodiscard]] constexpr Scalar observation_weight(Scalar keypoint_probability, Scalar map_point_probability) noexcept {
+  return clamp_probability(keypoint_probability) * clamp_probability(map_point_probability);
 }
 
 }  // namespace CFP_ISA
