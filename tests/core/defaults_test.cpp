@@ -63,7 +63,7 @@ TEST_CASE("The defaults of constraints, map points and frames", "[core]") {
   CHECK((m.policy == cfp::MapPointPolicy::log_odds && m.weight == cfp::WeightRule::posterior && m.rate == 0.2));
   CHECK((m.evidence_limit == 0.02 && m.deletion_threshold == 0.3 && m.mismatch_threshold == 0.5));
   CHECK((m.constraint_power == 0.5 && m.foreground_prior == 0.02 && m.background_prior == 0.9));
-  CHECK((o.health.use_fallback && o.health.min_effective_points == 10));
+  CHECK(o.health.min_effective_points == 10);
 }
 
 TEST_CASE("The defaults of what judges poses and detectors", "[core]") {

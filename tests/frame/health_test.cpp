@@ -60,7 +60,7 @@ TEST_CASE("The fallback raises the background first and everything only when tha
   CHECK(too_few.weight.back() == 0);
   Frame off = too_few;
   off.weight.assign(off.weight.size(), 0);
-  CHECK(off.apply({false, 10}).fallback == WeightFallback::none);
+  CHECK(off.apply({0}).fallback == WeightFallback::none);
   CHECK(off.weight[20] == 0);
 }
 
@@ -69,7 +69,7 @@ TEST_CASE("Health of hostile and empty frames is finite", "[pipeline]") {
   frame.add(3, KeypointLabel::foreground, std::numeric_limits<double>::quiet_NaN())
       .add(3, KeypointLabel::outside, 1e300)
       .add(3, KeypointLabel::outside, std::numeric_limits<double>::denorm_min());
-  const cfp::FrameHealth health = frame.apply({false, 10});
+  const cfp::FrameHealth health = frame.apply({0});
   CHECK_THAT(health.effective_points, WithinAbs(3, 1e-9));
   CHECK(Frame{}.apply().effective_points == 0);
   Frame unmatched;  // nothing to raise

@@ -10,8 +10,7 @@
 namespace cfp {
 
 struct HealthOptions {
-  bool use_fallback = true;  ///< false: the figures are reported and the weights left alone
-  /// fewer effective observations than this are no base for a pose (ORB-SLAM2's 10), >= 0
+  /// fewer effective observations than this are no base for a pose (ORB-SLAM2's 10), >= 0; 0: no fallback
   double min_effective_points = 10;
 };
 
@@ -76,7 +75,7 @@ FrameHealth apply_fallback(span<const KeypointLabel> label, span<const Scalar> m
   FrameHealth health = frame_health(label, map_point_probability, span<const Scalar>(weight));
   double effective_points = health.effective_points;
   for (const WeightFallback fallback : {WeightFallback::background, WeightFallback::all}) {
-    if (!options.use_fallback || health.observations == 0 || effective_points >= options.min_effective_points) break;
+    if (health.observations == 0 || effective_points >= options.min_effective_points) break;
     health.fallback = fallback;
     for (std::size_t i = 0; i < weight.size(); ++i) {
       if (map_point_probability[i] >= Scalar(0) && is_raised(label[i], fallback)) weight[i] = Scalar(1);
