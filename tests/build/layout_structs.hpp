@@ -19,7 +19,7 @@
   CFP_LAYOUT(cfp::ForegroundInput<double>, previous_depth_m)             \
   CFP_LAYOUT(cfp::ObjectDepth<float>, depth_m)                           \
   CFP_LAYOUT(cfp::ObjectDepth<double>, depth_m)                          \
-  CFP_LAYOUT(cfp::ForegroundOptions, invalid_is_foreground)              \
+  CFP_LAYOUT(cfp::ForegroundOptions, min_points)                         \
   CFP_LAYOUT(cfp::ForegroundResult, dbscan)                              \
   CFP_LAYOUT(cfp::ForegroundWorkspace<float>, odds)                      \
   CFP_LAYOUT(cfp::ForegroundWorkspace<double>, odds)                     \

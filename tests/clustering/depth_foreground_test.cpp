@@ -267,14 +267,9 @@ TEMPLATE_TEST_CASE("Points without a valid depth follow the documented rule and 
   const Outcome without = run(depths);
   depths.insert(depths.end(), {nan, TestType(0), TestType(-0.0), TestType(-1), inf, -inf});
   const Outcome safe = run(depths);
-  cfp::ForegroundOptions options;
-  options.invalid_is_foreground = false;
-  const Outcome bold = run(depths, options);
   CHECK(safe.result.invalid == 6);
   CHECK(kept(safe.mask, 60, 6) == 6);
-  CHECK(kept(bold.mask, 60, 6) == 0);
   CHECK(std::equal(without.mask.begin(), without.mask.end(), safe.mask.begin()));
-  CHECK(std::equal(without.mask.begin(), without.mask.end(), bold.mask.begin()));
   CHECK(safe.result.foreground == without.result.foreground);
   CHECK(safe.result.background == without.result.background);
 }

@@ -20,7 +20,6 @@ TEST_CASE("The defaults of the depth foreground", "[core]") {
   CHECK((o.obstacle_m == 0.3 && o.before_m == 0.5 && o.behind_m == 0.4 && o.first_gap_m == 0.15));
   CHECK((o.last_gap_m == 0.6 && o.min_gap_m == 0.02 && o.half_body_m == 0.05 && o.min_points == 6));
   CHECK(o.short_m == 0.3);
-  CHECK(o.invalid_is_foreground);
   const cfp::AdaptiveOptions& a = o.adaptive;
   CHECK((a.rule == cfp::AdaptiveRule::foreground_density && a.noise_factor == 3 && a.min_eps_m == 0.1));
   CHECK((a.max_eps_m == 0.3 && a.spacing_factor == 3 && a.min_share == 0.15 && a.density == 0.3));

@@ -144,7 +144,7 @@ inline namespace CFP_ISA {
 /// has more than a fiftieth of the points behind it; without a gap that is clear of noise and of evenly spread points,
 /// `behind_m` behind it; or `short_m` behind it. Of these windows the one is taken whose points lie most where people
 /// do (sum_place_odds); without pixels the previous, else the nearest. Points without a valid depth take no part and
-/// get the label `invalid_is_foreground` says. O(n log n), in practice O(n); deterministic; permuting the points
+/// are foreground, the safe side. O(n log n), in practice O(n); deterministic; permuting the points
 /// permutes the mask; allocates only when the workspace grows. Departure from the paper, which clusters: a window is
 /// better on every kind of scene of foreground_study.
 template <typename Scalar>
@@ -158,7 +158,7 @@ ForegroundResult depth_foreground(const ForegroundInput<non_deduced<Scalar>>& in
   const std::size_t n = depths.size();
   ForegroundResult result;
   result.invalid = in.depths_m.size() - n;
-  std::fill(mask.begin(), mask.end(), options.invalid_is_foreground ? char(1) : char(0));
+  std::fill(mask.begin(), mask.end(), char(1));
 
   detail::DepthRange range{0, n};
   if (n > 0 && n >= options.min_points) {

@@ -40,7 +40,6 @@ struct ForegroundOptions {
   double short_m = 0.3;        ///< another end of the window, so far behind the front; >= 0
   double half_body_m = 0.05;   ///< the front stands so much before `previous_depth_m`; >= 0
   std::size_t min_points = 6;  ///< fewer valid depths: too_few_points; >= 1
-  bool invalid_is_foreground = true;  ///< label of points without a valid depth: true is the safe side
 };
 
 inline namespace CFP_ISA {
