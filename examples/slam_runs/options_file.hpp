@@ -41,10 +41,8 @@ void for_each_option(Options& o, const Visit& visit) {
   visit("probability.coarse.object.noise_factor", p.coarse.object.noise_factor);
   visit("probability.coarse.object.shift_pairs", p.coarse.object.shift_pairs);
   visit("probability.fine.min_translation_m", p.fine.min_translation_m);
-  visit("probability.fine.projection.quantile", p.fine.projection.quantile);
-  visit("probability.fine.projection.steepness", p.fine.projection.steepness);
-  visit("probability.fine.epipolar.quantile", p.fine.epipolar.quantile);
-  visit("probability.fine.epipolar.steepness", p.fine.epipolar.steepness);
+  visit("probability.fine.constraint.quantile", p.fine.constraint.quantile);
+  visit("probability.fine.constraint.steepness", p.fine.constraint.steepness);
   visit("probability.map_point.rate", p.map_point.rate);
   visit("probability.map_point.deletion_threshold", p.map_point.deletion_threshold);
   visit("probability.map_point.constraint_power", p.map_point.constraint_power);

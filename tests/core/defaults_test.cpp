@@ -55,8 +55,8 @@ TEST_CASE("The defaults of constraints, map points and frames", "[core]") {
   CHECK((o.use_boxes && o.classes.size() == 1 && o.classes[0].class_id == 0 && o.classes[0].non_rigid));
   CHECK((o.object_threshold == 0.9 && o.min_creation_probability == 0.3 && o.min_inlier_weight == 0.1));
   CHECK((o.fine.enabled && o.fine.min_pose_inliers == 10 && o.fine.min_translation_m == 0.005));
-  for (const cfp::ConstraintOptions& c : {o.fine.projection, o.fine.epipolar})
-    CHECK((c.quantile == 0.8 && c.steepness == 5 && c.min_samples == 10));
+  const cfp::ConstraintOptions& c = o.fine.constraint;
+  CHECK((c.quantile == 0.8 && c.steepness == 5 && c.min_samples == 10));
   CHECK((o.fine.matching.radius_px == 40 && o.fine.matching.max_distance == 50 && o.fine.matching.max_ratio == 0.9));
   const cfp::MapPointOptions& m = o.map_point;
   CHECK((m.policy == cfp::MapPointPolicy::log_odds && m.weight == cfp::WeightRule::posterior && m.rate == 0.2));

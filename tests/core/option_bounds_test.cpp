@@ -135,9 +135,8 @@ TEST_CASE("The ends of the ranges of a frame's options", "[core]") {
       CFP_FIELD(O, coarse.foreground.half_body_m, not_negative),
       CFP_FIELD(O, fine.min_pose_inliers, not_negative),
       CFP_FIELD(O, fine.min_translation_m, not_negative),
-      CFP_FIELD(O, fine.projection.quantile, above_zero),
-      CFP_FIELD(O, fine.projection.steepness, positive),
-      CFP_FIELD(O, fine.epipolar.quantile, above_zero),
+      CFP_FIELD(O, fine.constraint.quantile, above_zero),
+      CFP_FIELD(O, fine.constraint.steepness, positive),
       CFP_FIELD(O, fine.matching.radius_px, positive),
       CFP_FIELD(O, fine.matching.max_ratio, above_zero),
       CFP_FIELD(O, map_point.rate, above_zero),
@@ -163,8 +162,7 @@ TEST_CASE("The ends of the ranges of a frame's options", "[core]") {
       CFP_COUNT(O, coarse.object.min_pairs, 1),
       CFP_COUNT(O, coarse.foreground.adaptive.fixed.min_pts, 1),
       CFP_COUNT(O, coarse.foreground.min_points, 1),
-      CFP_COUNT(O, fine.projection.min_samples, 1),
-      CFP_COUNT(O, fine.epipolar.min_samples, 1),
+      CFP_COUNT(O, fine.constraint.min_samples, 1),
       CFP_COUNT(O, fine.matching.max_distance, 0),
   });
 }

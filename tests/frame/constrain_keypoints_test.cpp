@@ -83,8 +83,8 @@ TEST_CASE("Every K, M and weight equals the scalar formulas applied one keypoint
     outside_f.push_back(df[i]);
   }
   std::vector<double> scratch(n);
-  const auto projection = cfp::fit_constraint(outside_t, options.fine.projection, scratch);
-  const auto epipolar = cfp::fit_constraint(outside_f, options.fine.epipolar, scratch);
+  const auto projection = cfp::fit_constraint(outside_t, options.fine.constraint, scratch);
+  const auto epipolar = cfp::fit_constraint(outside_f, options.fine.constraint, scratch);
   const double cs = cfp::statistical_confidence<double>(run.pose.inliers, 10);
   CHECK_THAT(result.projection.threshold_px, WithinAbs(projection.threshold_px, 1e-9));
   CHECK_THAT(result.epipolar.confidence, WithinAbs(cs * epipolar.calculation_confidence, 1e-9));
@@ -121,7 +121,7 @@ TEST_CASE("No M at all is the same as none for every keypoint, in scenes of few 
   scene.wall_points = GENERATE(std::size_t(700), std::size_t(60));
   cfp::FrameOptions options;
   options.map_point.weight = GENERATE(cfp::WeightRule::posterior, cfp::WeightRule::product);
-  options.fine.projection.min_samples = options.fine.epipolar.min_samples = 60;
+  options.fine.constraint.min_samples = 60;
   FineRun<double> run(make_dynamic_scene<double>(scene, 13)), of_none(run);
   std::fill(run.m.begin(), run.m.end(), -1.0);
   of_none.m.clear();

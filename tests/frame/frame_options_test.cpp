@@ -26,7 +26,7 @@ TEST_CASE("Frame options outside their range are named by their whole path", "[f
   CHECK(named([](auto& o) { o.coarse.flow.motion.search_above_px = 0; }) == "coarse.flow.motion.search_above_px");
   CHECK(named([](auto& o) { o.coarse.flow.motion.shared_depth_ratio = -1; }) ==
         "coarse.flow.motion.shared_depth_ratio");
-  CHECK(named([](auto& o) { o.fine.epipolar.quantile = 2; }) == "fine.epipolar.quantile");
+  CHECK(named([](auto& o) { o.fine.constraint.quantile = 2; }) == "fine.constraint.quantile");
   CHECK(named([](auto& o) { o.fine.matching.max_ratio = 0; }) == "fine.matching.max_ratio");
   CHECK(named([](auto& o) { o.tracker.max_coast = -1; }) == "tracker.max_coast");
   CHECK(named([](auto& o) { o.map_point.rate = 0; }) == "map_point.rate");

@@ -55,8 +55,7 @@ void pose_epipolar_distances(const SE3<double>& T_cur_prev, const Camera& camera
 template <typename Scalar>
 [[nodiscard]] ConstraintModel<Scalar> fit_to_static(const std::vector<Scalar>& distances,
                                                     span<const Scalar> map_point_probability,
-                                                    const ConstraintOptions& constraint, const FrameOptions& options,
-                                                    FrameState<Scalar>& state) {
+                                                    const FrameOptions& options, FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
   scratch.scratch.resize(distances.size());
   const auto fit = [&](bool inside) {
@@ -66,7 +65,7 @@ template <typename Scalar>
           (inside && model_weight(i, map_point_at(map_point_probability, i), options, state) >= Scalar(0.5)))
         scratch.samples.push_back(distances[i]);
     }
-    return fit_constraint(scratch.samples, constraint, scratch.scratch);
+    return fit_constraint(scratch.samples, options.fine.constraint, scratch.scratch);
   };
   const ConstraintModel<Scalar> outside = fit(false);
   const bool enough = outside.status != Status::not_enough_data || options.map_point.weight != WeightRule::posterior;
@@ -102,12 +101,12 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
                          PointSpan<Scalar, 2>(state.current.keypoints), pose.T_cur_prev.template cast<Scalar>(), camera,
                          span<Scalar>(scratch.projection));
   const ConstraintModel<Scalar> projection =
-      detail::fit_to_static(scratch.projection, map_point_probability, options.fine.projection, options, state);
+      detail::fit_to_static(scratch.projection, map_point_probability, options, state);
   ConstraintModel<Scalar> epipolar;
   const bool moved = pose.T_cur_prev.translation.norm() > options.fine.min_translation_m;
   if (moved) {
     detail::pose_epipolar_distances(pose.T_cur_prev, camera, state);
-    epipolar = detail::fit_to_static(scratch.epipolar, map_point_probability, options.fine.epipolar, options, state);
+    epipolar = detail::fit_to_static(scratch.epipolar, map_point_probability, options, state);
   }
   const Scalar cs = statistical_confidence(pose.inliers, static_cast<Scalar>(options.fine.min_pose_inliers));
   const Scalar ct = cs * projection.calculation_confidence, cf = cs * epipolar.calculation_confidence;

@@ -67,8 +67,7 @@ struct FineOptions {
   double min_pose_inliers = 10;  ///< Th_BA: least inliers a pose may rest on (ORB-SLAM2's 10), >= 0
   /// t_Th in metres: |t| at or below it skips the epipolar constraint, >= 0. No source in the paper.
   double min_translation_m = 0.005;
-  ConstraintOptions projection;
-  ConstraintOptions epipolar;
+  ConstraintOptions constraint;     ///< of the projection and of the epipolar lines alike
   DescriptorMatchOptions matching;  ///< of the keypoints in boxes that the host left unmatched
 };
 
@@ -121,8 +120,7 @@ inline namespace CFP_ISA {
 [[nodiscard]] inline OptionPath invalid_field(const FineOptions& o) noexcept {
   if (!detail::non_negative(o.min_pose_inliers)) return "min_pose_inliers";
   if (!detail::non_negative(o.min_translation_m)) return "min_translation_m";
-  if (const OptionPath field = nested("projection", invalid_field(o.projection))) return field;
-  if (const OptionPath field = nested("epipolar", invalid_field(o.epipolar))) return field;
+  if (const OptionPath field = nested("constraint", invalid_field(o.constraint))) return field;
   return nested("matching", invalid_field(o.matching));
 }
 
