@@ -3,9 +3,9 @@
 ///
 /// The loop knows a *problem* by four functions. Costs are sums of w rho(s), s in units of sigma^2:
 ///   double linearize()              cost and normal equations at the start
-///   double propose(double damping)  solves (H + damping D) h = -g, keeps the trial it leads to and returns the
-///   decrease
-///                                   of the quadratic model, h^T (damping D h - g); NaN: not positive definite; 0 ends
+///   double propose(double damping)  solves (H + damping D) h = -g, keeps the trial it leads to, and returns what the
+///                                   quadratic model promises, h^T (damping D h - g); NaN: not positive definite; 0:
+///                                   ends
 ///   double linearize_trial()        cost and normal equations at the trial; NaN: the trial is refused
 ///   void accept()                   the trial is the solution from now on
 /// detail::DenseLeastSquares makes such a problem from two functions of a model. Nothing allocates but the problem.
@@ -66,7 +66,6 @@ struct LeastSquaresResult {
 
 inline namespace CFP_ISA {
 
-/// The first field outside its range, or nothing.
 [[nodiscard]] inline OptionPath invalid_field(const LevenbergMarquardtOptions& options) noexcept {
   if (!(options.max_iterations >= 0)) return "max_iterations";
   if (!detail::non_negative(options.initial_damping)) return "initial_damping";

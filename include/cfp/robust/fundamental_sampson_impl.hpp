@@ -80,11 +80,12 @@ void sampson_distances_sq(const PairColumns<T>& in, const Matrix3<T>& F, std::ve
   }
 }
 
-// Normal equations over the nine entries (row-major) of F of sum w rho(d^2 / scale), and that sum; rho(x) = x / (1 +
-// x), the loss of Geman and McClure: bounded, but smooth, so that pairs near the threshold count by
-// degrees. With d = e / n and k = e / n^2, d(d)/dF_ij = (q_i p_j - k (l_i p_j [i < 2] + m_j q_i [j < 2])) / n. The
-// gradient is exact; H leaves out the k terms, a thousandth of the others for pairs that count, and so is made of 36
-// moments.
+// Normal equations over the nine entries (row-major) of F of sum w rho(d^2 / scale), and that sum. The loss of Geman
+// and McClure, rho(x) = x / (1 + x), is bounded but smooth: pairs near the threshold count by degrees. With d = e / n
+// and k = e / n^2,
+//   d(d)/dF_ij = (q_i p_j - k (l_i p_j [i < 2] + m_j q_i [j < 2])) / n.
+// The gradient is exact. H leaves out the k terms, a thousandth of the others for pairs that count, and so is made of
+// 36 moments.
 template <typename T>
 double sampson_system(const PairColumns<T>& in, const Matrix3<double>& F, double scale,
                       NormalEquations<9>& out) noexcept {

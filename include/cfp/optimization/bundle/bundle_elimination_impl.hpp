@@ -22,9 +22,9 @@ struct BundleSchur {
   BlockEnvelope envelope;
   std::vector<double> blocks[bundle_parts], right_side[bundle_parts];
   std::vector<double> triangles;  // per eliminated: L^-1, y
-  std::vector<double>
-      couplings;  // 18 per slot: C, one for all slots of one pair, the first of each eliminated in front
-  std::vector<std::size_t> coupled, coupled_end;  // what it couples to; per eliminated, where its couplings end
+  // C, 18 numbers per slot. All slots of one pair share one C; those of each that is eliminated stand in front.
+  std::vector<double> couplings;
+  std::vector<std::size_t> coupled, coupled_end;  // per C: what it couples to; per eliminated: where its C end
   std::vector<double> pose_steps, point_steps;
 };
 

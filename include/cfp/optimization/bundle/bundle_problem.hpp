@@ -69,7 +69,6 @@ struct SingleThread {
   }
 };
 
-/// The first field outside its range, or nothing.
 [[nodiscard]] inline OptionPath invalid_field(const BundleOptions& options) noexcept {
   if (const OptionPath field = nested("levenberg_marquardt", invalid_field(options.levenberg_marquardt))) return field;
   if (!is_loss(options.loss)) return "loss";

@@ -86,7 +86,6 @@ inline namespace CFP_ISA {
   return options;
 }
 
-/// The first field outside its range, or nothing.
 [[nodiscard]] inline OptionPath invalid_field(const PoseRound& round) noexcept {
   if (!is_loss(round.loss)) return "loss";
   if (!detail::positive(round.scale)) return "scale";
