@@ -57,7 +57,7 @@ template <typename Scalar>
                                                     span<const Scalar> map_point_probability,
                                                     const FrameOptions& options, FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
-  scratch.scratch.resize(distances.size());
+  scratch.values.resize(distances.size());
   const auto fit = [&](bool inside) {
     scratch.samples.clear();
     for (std::size_t i = 0; i < distances.size(); ++i) {
@@ -65,7 +65,7 @@ template <typename Scalar>
           (inside && model_weight(i, map_point_at(map_point_probability, i), options, state) >= Scalar(0.5)))
         scratch.samples.push_back(distances[i]);
     }
-    return fit_constraint(scratch.samples, options.fine.constraint, scratch.scratch);
+    return fit_constraint(scratch.samples, options.fine.constraint, scratch.values);
   };
   const ConstraintModel<Scalar> outside = fit(false);
   const bool enough = outside.status != Status::not_enough_data || options.map_point.weight != WeightRule::posterior;

@@ -159,7 +159,7 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   if (model.kind == FlowModelKind::none) return;
 
   state.flow_distances.resize(n);
-  scratch.scratch.resize(n);
+  scratch.values.resize(n);
   flow_distances(model, flow, pinhole, coarse.flow, span<Scalar>(state.flow_distances));
   if (model.kind == FlowModelKind::motion_up_to_scale && looks_for_unreported(options))
     detail::measure_room(model, flow, pinhole, coarse, scratch.room_distances);
@@ -174,7 +174,7 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
       scratch.members.push_back(static_cast<std::int32_t>(i));
     }
     ObjectProbability& object = state.objects[b];
-    object = object_probability(scratch.samples, scored, scratch.scratch);
+    object = object_probability(scratch.samples, scored, scratch.values);
     if (object.status != Status::ok) continue;
     --report.unknown_objects;
     if (!(scored.shift_pairs > 0)) continue;

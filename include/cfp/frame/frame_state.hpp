@@ -92,7 +92,7 @@ struct FrameScratch {
   DescriptorMatchWorkspace<Scalar> matching;
   detail::PointGrid<Scalar> grid, resting;
   std::vector<std::array<Scalar, 2>> points, undistorted_previous, undistorted_current;
-  std::vector<Scalar> depths, projection, epipolar, samples, scratch, room_distances;
+  std::vector<Scalar> depths, projection, epipolar, samples, values, room_distances;
   std::vector<std::int32_t> members;
   std::vector<char> mask, outside;
   std::vector<KeypointLabel> pair_label;
@@ -201,7 +201,7 @@ void begin_frame(const Frame<Scalar>& frame, FrameState<Scalar>& state) {
   scratch.points.reserve(most);
   scratch.depths.reserve(most);
   scratch.samples.reserve(most);
-  scratch.scratch.reserve(most);
+  scratch.values.reserve(most);
   scratch.foreground.reserve(most);
   state.boxes.clear();
   state.objects.clear();

@@ -110,9 +110,9 @@ template <typename Scalar>
   std::size_t resting = 0;
   visit_here(scratch.resting, (*(last - 1))[0], [&](std::uint32_t, Scalar) { return ++resting == unreported.pairs; });
   if (resting == unreported.pairs) return Scalar(-1);
-  scratch.scratch.clear();
-  for (auto near = moving.begin(); near != last; ++near) scratch.scratch.push_back((*near)[1]);
-  return quantile(span<Scalar>(scratch.scratch), 0.5);
+  scratch.values.clear();
+  for (auto near = moving.begin(); near != last; ++near) scratch.values.push_back((*near)[1]);
+  return quantile(span<Scalar>(scratch.values), 0.5);
 }
 
 /// Median depth of the keypoints on no object of which the flow says that they move, or of the others; infinite where
