@@ -28,6 +28,7 @@
 #include "../../examples/support/sequence.hpp"
 #include "../../examples/synthetic/sequence.hpp"
 #include "cfp/evaluation/calibration.hpp"
+#include "cfp/frame/begin_frame.hpp"
 #include "cfp/frame/estimate_objects.hpp"
 #include "cfp/frame/label_image.hpp"
 #include "cfp/interop/opencv.hpp"

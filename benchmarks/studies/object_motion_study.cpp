@@ -35,6 +35,7 @@
 #include <vector>
 
 #include "cfp/core/random.hpp"
+#include "cfp/frame/begin_frame.hpp"
 #include "cfp/frame/estimate_objects.hpp"
 
 namespace {

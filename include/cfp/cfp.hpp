@@ -24,6 +24,7 @@
 #include "cfp/evaluation/error_statistics.hpp"
 #include "cfp/evaluation/trajectory.hpp"
 #include "cfp/evaluation/trajectory_error.hpp"
+#include "cfp/frame/begin_frame.hpp"
 #include "cfp/frame/camera_motion.hpp"
 #include "cfp/frame/constrain_keypoints.hpp"
 #include "cfp/frame/descriptor_matching.hpp"

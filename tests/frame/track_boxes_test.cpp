@@ -3,6 +3,7 @@
 #include <limits>
 #include <vector>
 
+#include "cfp/frame/begin_frame.hpp"
 #include "support/catch.hpp"
 
 namespace {

@@ -17,6 +17,7 @@
 
 #include "cfp/core/span.hpp"
 #include "cfp/detection/box_tracker.hpp"
+#include "cfp/frame/begin_frame.hpp"
 #include "cfp/frame/constrain_keypoints.hpp"
 #include "cfp/frame/estimate_objects.hpp"
 #include "cfp/frame/frame_options.hpp"
