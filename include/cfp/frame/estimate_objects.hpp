@@ -66,40 +66,40 @@ template <typename Scalar>
   return model;
 }
 
-/// Labels invalid the pairs just outside of a box that may be on its object all the same: those not behind it.
+/// Labels undecided the pairs just outside of a box, but for those behind its object.
 template <typename Scalar>
 void label_margin(const Box<Scalar>& box, const ForegroundResult& separated, const FlowPairs<Scalar>& flow,
-                  double margin, span<KeypointLabel> labels) noexcept {
+                  double margin, span<PairLabel> labels) noexcept {
   const Box<Scalar> wide = widened(box, Scalar(margin));
   for (std::size_t i = 0; i < labels.size(); ++i) {
-    if (labels[i] != KeypointLabel::outside || !contains(wide, flow.current(i, 0), flow.current(i, 1))) continue;
+    if (labels[i] != PairLabel::outside || !contains(wide, flow.current(i, 0), flow.current(i, 1))) continue;
     const Scalar z = flow.previous_depths[i];
     const bool behind = separated.status == ForegroundStatus::ok && z > Scalar(separated.far_m) && is_valid_depth(z);
-    if (!behind) labels[i] = KeypointLabel::invalid;
+    if (!behind) labels[i] = PairLabel::undecided;
   }
 }
 
 /// Sets scratch.pair_label: per box and flow pair, how the pair stands to the object of that box. Where the object is
-/// told from its background by depth, so are the pairs, and those just outside of the box may be invalid. So are those
-/// in its mask that are farther than it: masks spill over the silhouette, where depth and flow are of two surfaces.
+/// told from its background by depth, so are the pairs, and those just outside of the box may be undecided. Those in
+/// its mask that are farther than it are: masks spill over the silhouette, where depth and flow are of two surfaces.
 template <typename Scalar>
 void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
   const FlowPairs<Scalar>& flow = frame.flow;
   const std::size_t n = flow.current.size();
-  scratch.pair_label.assign(state.boxes.size() * n, KeypointLabel::outside);
+  scratch.pair_label.assign(state.boxes.size() * n, PairLabel::outside);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     const TrackedBox<Scalar>& box = state.boxes[b];
     const auto belongs = [&](std::size_t i) {
       return lies_on(box, frame.labels, flow.current(i, 0), flow.current(i, 1));
     };
     const bool segmented = has_label(box, frame.labels);
-    const KeypointLabel farther = segmented ? KeypointLabel::invalid : KeypointLabel::background;
+    const PairLabel farther = segmented ? PairLabel::undecided : PairLabel::background;
     const span<const Scalar> depths = is_told_by_depth(box, options) ? flow.previous_depths : span<const Scalar>();
     const ForegroundResult separated = separate_members(box, flow.current, depths, belongs, options, state);
     for (std::size_t m = 0; m < scratch.members.size(); ++m)
       scratch.pair_label[b * n + static_cast<std::size_t>(scratch.members[m])] =
-          scratch.mask[m] != 0 ? KeypointLabel::foreground : farther;
+          scratch.mask[m] != 0 ? PairLabel::foreground : farther;
     if (!depths.empty() && !segmented)
       label_margin(box.box, separated, flow, options.coarse.flow.margin, {scratch.pair_label.data() + b * n, n});
   }
@@ -114,9 +114,9 @@ template <typename Scalar>
   for (std::size_t i = 0; i < pairs; ++i) {
     bool outside = true;
     for (std::size_t of_box = i; of_box < scratch.pair_label.size(); of_box += pairs) {
-      const KeypointLabel label = scratch.pair_label[of_box];
-      outside = outside && label == KeypointLabel::outside;
-      if (label == KeypointLabel::foreground || label == KeypointLabel::invalid) scratch.outside[i] = char(0);
+      const PairLabel label = scratch.pair_label[of_box];
+      outside = outside && label == PairLabel::outside;
+      if (label == PairLabel::foreground || label == PairLabel::undecided) scratch.outside[i] = char(0);
     }
     outside_boxes += outside ? 1U : 0U;
   }
@@ -169,7 +169,7 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
     scratch.samples.clear();
     scratch.members.clear();
     for (std::size_t i = 0; i < n; ++i) {
-      if (scratch.pair_label[b * n + i] != KeypointLabel::foreground) continue;
+      if (scratch.pair_label[b * n + i] != detail::PairLabel::foreground) continue;
       scratch.samples.push_back(state.flow_distances[i]);
       scratch.members.push_back(static_cast<std::int32_t>(i));
     }

@@ -76,6 +76,15 @@ struct FlowModelWorkspace {
 };
 
 namespace detail {
+
+/// How a flow pair stands to the object of a box.
+enum class PairLabel : std::uint8_t {
+  outside,     // not in its box
+  foreground,  // on the object
+  background,  // behind it
+  undecided    // where box, mask or depth end: it may be on the object
+};
+
 inline namespace CFP_ISA {
 
 /// How many coordinates of a pixel the distances see: across a line one of two.

@@ -95,7 +95,7 @@ struct FrameScratch {
   std::vector<Scalar> depths, projection, epipolar, samples, values, room_distances;
   std::vector<std::int32_t> members;
   std::vector<char> mask, outside;
-  std::vector<KeypointLabel> pair_label;
+  std::vector<detail::PairLabel> pair_label;  // per box and flow pair
   std::vector<std::pair<std::int64_t, ObjectMemory>> memories;
 };
 
