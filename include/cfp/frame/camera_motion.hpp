@@ -87,6 +87,12 @@ template <typename Scalar>
 namespace detail {
 inline namespace CFP_ISA {
 
+/// The noise of the flow by robust_sigma, within the bounds of the options.
+template <typename Scalar>
+[[nodiscard]] Scalar flow_sigma(span<Scalar> distances, int coordinates, const CameraMotionOptions& options) noexcept {
+  return std::clamp(robust_sigma(distances, coordinates), Scalar(options.min_sigma_px), Scalar(options.max_sigma_px));
+}
+
 /// The pairs marked in `outside` whose depth is valid, as points of the previous camera; the others as NaN.
 template <typename Scalar>
 void place_points(const FlowPairs<Scalar>& flow, span<const char> outside, const PinholeCamera<Scalar>& camera,
@@ -177,8 +183,7 @@ template <typename Scalar>
     for (std::size_t i = 0; i < outside.size(); ++i) {
       if (!is_finite(workspace.points[i][0])) workspace.distances[i] = Scalar(no_distance<double>);
     }
-    const Scalar sigma = robust_sigma(span<Scalar>(workspace.distances), 2);
-    motion.sigma_px = std::clamp(sigma, Scalar(options.min_sigma_px), Scalar(options.max_sigma_px));
+    motion.sigma_px = detail::flow_sigma(span<Scalar>(workspace.distances), 2, options);
   };
   const auto refine = [&](SE3<double>& T, const PoseOptions& rounds) {
     workspace.sigmas.clear();

@@ -125,8 +125,7 @@ void measure_sigma(const FlowPairs<Scalar>& flow, span<const char> outside, cons
     if (outside[i] != 0 && has_distance(distances[i])) distances[kept++] = distances[i];
   }
   if (kept < options.min_outside_pairs) return;
-  const Scalar sigma = robust_sigma(span<Scalar>(distances.data(), kept), coordinates_of(model.kind));
-  model.sigma_px = std::clamp(sigma, Scalar(options.motion.min_sigma_px), Scalar(options.motion.max_sigma_px));
+  model.sigma_px = flow_sigma(span<Scalar>(distances.data(), kept), coordinates_of(model.kind), options.motion);
 }
 
 /// The fundamental matrix of the pairs marked in `outside` and their noise; none of too few, or if they have none.
