@@ -169,7 +169,7 @@ TEST_CASE("A homography moves centre, velocity, sizes and covariance of a box as
       return cfp::Vector2<double>((H * cfp::Vector3<double>(u, v, 1)).hnormalized());
     };
     const double u = filter.u.value, v = filter.v.value, w = filter.box().width(), h = filter.box().height();
-    cfp::Matrix2<double> J;
+    Eigen::Matrix2d J;
     J.col(0) = (map(u + 1e-3, v) - map(u - 1e-3, v)) / 2e-3;
     J.col(1) = (map(u, v + 1e-3) - map(u, v - 1e-3)) / 2e-3;
     cfp::BoxFilter<double> moved = filter;

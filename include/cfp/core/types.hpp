@@ -17,8 +17,6 @@ using Vector4 = Eigen::Matrix<Scalar, 4, 1>;
 template <typename Scalar>
 using Vector6 = Eigen::Matrix<Scalar, 6, 1>;
 template <typename Scalar>
-using Matrix2 = Eigen::Matrix<Scalar, 2, 2>;
-template <typename Scalar>
 using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
 template <typename Scalar>
 using Matrix4 = Eigen::Matrix<Scalar, 4, 4>;
