@@ -18,6 +18,10 @@ struct SVD3 {
 };
 
 namespace detail {
+
+// Where the element of a symmetric 3x3 matrix stands among the six numbers 00 01 02 11 12 22.
+inline constexpr int symmetric[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+
 inline namespace CFP_ISA {
 
 // Rotates the columns of A, and those of V with them, until they are orthogonal, longest first: A V is kept, so that

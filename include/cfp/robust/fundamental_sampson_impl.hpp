@@ -120,7 +120,6 @@ double sampson_system(const PairColumns<T>& in, const Matrix3<double>& F, double
       g[3 * r + 2] += a[r];
     }
   }
-  constexpr int symmetric[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
   for (int r = 0; r < 9; ++r) {
     out.g[r] = static_cast<double>(reduce_add(g[r])) / scale;
     for (int c = 0; c < 9; ++c)

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "cfp/core/types.hpp"
+#include "cfp/math/matrix3.hpp"
 #include "cfp/optimization/bundle/bundle_chunk_impl.hpp"
 #include "cfp/optimization/bundle/bundle_index_impl.hpp"
 #include "cfp/simd/packet.hpp"
@@ -37,9 +38,6 @@ struct BundleLinearization {
 /// Sums over the observations of one pose, one partial sum per lane: H's blocks N (6), hat(d) N (9), hat(d) N hat(d)^T
 /// (6), and the gradient n (3), d x n (3).
 using BundlePoseSums = double[27][BundleChunk::lanes];
-
-/// Where the element of a symmetric 3x3 matrix stands among the six numbers 00 01 02 11 12 22.
-inline constexpr int symmetric[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
 
 inline namespace CFP_ISA {
 
