@@ -72,6 +72,14 @@ template <typename Scalar>
   return enough ? outside : fit(true);
 }
 
+/// What a constraint says of a match at this distance.
+template <typename Scalar>
+[[nodiscard]] Evidence<Scalar> evidence_of(const ConstraintModel<Scalar>& model, Scalar distance_px,
+                                           Scalar confidence) noexcept {
+  const bool fitted = model.status != Status::not_enough_data;
+  return {static_probability(model, distance_px), confidence, fitted && distance_px >= Scalar(0)};
+}
+
 }  // namespace CFP_ISA
 }  // namespace detail
 
@@ -114,26 +122,22 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
   state.report.epipolar = {moved ? epipolar.status : Status::degenerate, static_cast<double>(epipolar.threshold_px),
                            static_cast<double>(cf)};
 
-  const bool has_projection = projection.status != Status::not_enough_data,
-             has_epipolar = epipolar.status != Status::not_enough_data;
-  if (!has_projection && !has_epipolar) return;
+  if (projection.status == Status::not_enough_data && epipolar.status == Status::not_enough_data) return;
   state.evidence.resize(n);
   const bool posterior = options.map_point.weight == WeightRule::posterior;
+  const Scalar threshold = static_cast<Scalar>(options.object_threshold);
   for (std::size_t i = 0; i < n; ++i) {
     if (state.box[i] == no_box) continue;
     const std::size_t b = static_cast<std::size_t>(state.box[i]);
     const Scalar m = detail::map_point_at(map_point_probability, i);
     SecondStageKeypoint<Scalar>& keypoint = state.evidence[i] = {};
-    keypoint.projection = {static_probability(projection, scratch.projection[i]), ct,
-                           has_projection && scratch.projection[i] >= Scalar(0)};
-    if (has_epipolar)
-      keypoint.epipolar = {static_probability(epipolar, scratch.epipolar[i]), cf, scratch.epipolar[i] >= Scalar(0)};
+    keypoint.projection = detail::evidence_of(projection, scratch.projection[i], ct);
+    keypoint.epipolar = detail::evidence_of(epipolar, scratch.epipolar[i], cf);
     keypoint.object_probability = static_cast<Scalar>(state.objects[b].static_probability);
     keypoint.map_point_probability = m >= Scalar(0) ? m : Scalar(1);
     keypoint.foreground = state.label[i] == KeypointLabel::foreground;
     keypoint.matched = is_finite(scratch.points[i][0]) && is_finite(scratch.points[i][1]);
     keypoint.box_associated = state.boxes[b].associated;
-    const Scalar threshold = static_cast<Scalar>(options.object_threshold);
     state.static_probability[i] =
         posterior ? second_stage_evidence(keypoint, threshold) : second_stage_probability(keypoint, threshold);
     ++state.report.constrained;
