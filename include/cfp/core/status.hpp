@@ -1,6 +1,6 @@
 /// @file status.hpp
 /// How a computation ended. Bad data never throws in cfp: the result carries a documented neutral value and one of
-/// these.
+/// these. This and every other enumeration of cfp that is reported has a `to_string`.
 #pragma once
 
 #include "cfp/version.hpp"
@@ -16,7 +16,6 @@ enum class Status : std::uint8_t {
   invalid_input     ///< a scalar argument was NaN, infinite or outside its range: neutral value
 };
 
-/// The enumerator's name, for reports.
 [[nodiscard]] constexpr const char* to_string(Status status) noexcept {
   constexpr const char* names[] = {"ok", "not enough data", "degenerate", "invalid input"};
   return status <= Status::invalid_input ? names[static_cast<int>(status)] : "unknown";

@@ -19,7 +19,6 @@ enum class AlignmentMode : std::uint8_t {
   similarity   ///< and scale, Sim(3): monocular
 };
 
-/// The enumerator's name, for reports.
 [[nodiscard]] constexpr const char* to_string(AlignmentMode mode) noexcept {
   constexpr const char* names[] = {"none", "first pose", "SE(3)", "Sim(3)"};
   return mode <= AlignmentMode::similarity ? names[static_cast<int>(mode)] : "unknown";

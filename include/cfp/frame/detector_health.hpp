@@ -36,7 +36,6 @@ enum class DetectorStatus : std::uint8_t {
 
 inline namespace CFP_ISA {
 
-/// The enumerator's name, for reports.
 [[nodiscard]] constexpr const char* to_string(DetectorStatus status) noexcept {
   constexpr const char* names[] = {"ok", "idle", "silent", "stuck", "absurd"};
   return status <= DetectorStatus::absurd ? names[static_cast<int>(status)] : "unknown";

@@ -63,7 +63,6 @@ struct PoseStep {
 
 inline namespace CFP_ISA {
 
-/// The enumerator's name, for reports.
 [[nodiscard]] constexpr const char* to_string(PoseHealth status) noexcept {
   constexpr const char* names[] = {"ok",        "no pose", "too few inliers", "few observations agree", "crowded",
                                    "uncertain", "jump"};

@@ -48,7 +48,6 @@ enum class SolverStatus : std::uint8_t {
 /// Whether there is a solution.
 [[nodiscard]] constexpr bool is_solved(SolverStatus status) noexcept { return status <= SolverStatus::iteration_limit; }
 
-/// The enumerator's name, for reports.
 [[nodiscard]] constexpr const char* to_string(SolverStatus status) noexcept {
   constexpr const char* names[] = {"converged",       "no decrease", "iteration limit",
                                    "not enough data", "no weight",   "not enough inliers",

@@ -41,7 +41,6 @@ enum class RansacStatus : std::uint8_t {
   homography        ///< F only: the same without intrinsics, where rotation and plane are not told apart
 };
 
-/// The enumerator's name, for reports.
 [[nodiscard]] constexpr const char* to_string(RansacStatus status) noexcept {
   constexpr const char* names[] = {"ok",        "iteration limit", "not enough data", "no consensus", "degenerate",
                                    "no motion", "pure rotation",   "planar",          "homography"};
@@ -64,7 +63,6 @@ struct RansacReport {
 
 inline namespace CFP_ISA {
 
-/// The first field outside its range.
 [[nodiscard]] inline OptionPath invalid_field(const RansacOptions& options, std::size_t least_inliers) noexcept {
   if (!(options.threshold_px > 0 && options.threshold_px < 1e4)) return "threshold_px";
   if (!(options.confidence > 0 && options.confidence < 1)) return "confidence";
