@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <vector>
 
 #include "cfp/frame/estimate_objects.hpp"
 #include "cfp/frame/frame_options.hpp"
@@ -44,6 +45,37 @@ void score_flow_at_keypoints(const Frame<Scalar>& frame, const FrameOptions& opt
   }
 }
 
+/// Gives the members of box b, foreground where scratch.mask marks them, to its object: see label_keypoints.
+template <typename Scalar>
+void label_members(std::size_t b, const FrameOptions& options, FrameState<Scalar>& state) noexcept {
+  const FrameScratch<Scalar>& scratch = state.scratch;
+  const Scalar threshold = static_cast<Scalar>(options.object_threshold);
+  const Scalar o = static_cast<Scalar>(state.objects[b].static_probability);
+  const Scalar k_foreground = first_stage_probability(o, true, threshold);
+  const Scalar k_background = options.coarse.soft_background ? first_stage_probability(o, false, threshold) : Scalar(1);
+  for (std::size_t j = 0; j < scratch.members.size(); ++j) {
+    const std::size_t i = static_cast<std::size_t>(scratch.members[j]);
+    const bool foreground = scratch.mask[j] != 0;
+    const Scalar k = foreground ? k_foreground : k_background;
+    const bool lower = k < state.static_probability[i] ||
+                       (k == state.static_probability[i] && foreground && state.label[i] == KeypointLabel::background);
+    if (state.box[i] != no_box && !lower) continue;
+    state.static_probability[i] = k;
+    state.label[i] = foreground ? KeypointLabel::foreground : KeypointLabel::background;
+    state.box[i] = static_cast<std::int32_t>(b);
+  }
+}
+
+inline void count_labels(const std::vector<KeypointLabel>& label, FrameReport& report) noexcept {
+  const auto count = [&](KeypointLabel wanted) {
+    return static_cast<std::size_t>(std::count(label.begin(), label.end(), wanted));
+  };
+  report.outside = count(KeypointLabel::outside);
+  report.foreground = count(KeypointLabel::foreground);
+  report.background = count(KeypointLabel::background);
+  report.invalid = count(KeypointLabel::invalid);
+}
+
 /// How many keypoints are said to lie on a detection that the frame has not.
 template <typename Scalar>
 [[nodiscard]] std::size_t stray_labels(const Frame<Scalar>& frame, const FrameState<Scalar>& state) noexcept {
@@ -72,10 +104,8 @@ template <typename Scalar>
 void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   CFP_ASSERT(state.objects.size() == state.boxes.size());
   CFP_ASSERT(detail::fits(state.size(), frame.object_of_keypoint));
-  FrameScratch<Scalar>& scratch = state.scratch;
   FrameReport& report = state.report;
   report.undecided_foregrounds = 0;
-  const Scalar threshold = static_cast<Scalar>(options.object_threshold);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     const TrackedBox<Scalar>& box = state.boxes[b];
     const bool by_index = !frame.object_of_keypoint.empty() && !box.compensated();
@@ -93,34 +123,13 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
       state.current.object_depths.push_back({box.id, static_cast<Scalar>(separated.depth_m)});
     else if (by_depth && !segmented)
       ++report.undecided_foregrounds;
-    if (segmented) std::fill(scratch.mask.begin(), scratch.mask.end(), char(1));
-
-    const Scalar o = static_cast<Scalar>(state.objects[b].static_probability);
-    const Scalar k_foreground = first_stage_probability(o, true, threshold);
-    const Scalar k_background =
-        options.coarse.soft_background ? first_stage_probability(o, false, threshold) : Scalar(1);
-    for (std::size_t j = 0; j < scratch.members.size(); ++j) {
-      const std::size_t i = static_cast<std::size_t>(scratch.members[j]);
-      const bool foreground = scratch.mask[j] != 0;
-      const Scalar k = foreground ? k_foreground : k_background;
-      const bool lower = k < state.static_probability[i] || (k == state.static_probability[i] && foreground &&
-                                                             state.label[i] == KeypointLabel::background);
-      if (state.box[i] != no_box && !lower) continue;
-      state.static_probability[i] = k;
-      state.label[i] = foreground ? KeypointLabel::foreground : KeypointLabel::background;
-      state.box[i] = static_cast<std::int32_t>(b);
-    }
+    if (segmented) std::fill(state.scratch.mask.begin(), state.scratch.mask.end(), char(1));
+    detail::label_members(b, options, state);
   }
   report.stray_labels = detail::stray_labels(frame, state);
   detail::score_flow_at_keypoints(frame, options, state);
   detail::score_flow_outside(frame.flow, options, state);
-  const auto count = [&](KeypointLabel label) {
-    return static_cast<std::size_t>(std::count(state.label.begin(), state.label.end(), label));
-  };
-  report.outside = count(KeypointLabel::outside);
-  report.foreground = count(KeypointLabel::foreground);
-  report.background = count(KeypointLabel::background);
-  report.invalid = count(KeypointLabel::invalid);
+  detail::count_labels(state.label, report);
 }
 
 }  // namespace CFP_ISA
