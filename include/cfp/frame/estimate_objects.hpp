@@ -123,6 +123,33 @@ template <typename Scalar>
   return outside_boxes >= options.min_outside_pairs ? FlowSupport::outside_pairs : FlowSupport::background_pairs;
 }
 
+/// Sets O of every box from the distances of the pairs on its object and, where depths are known, from what they share.
+template <typename Scalar>
+void score_objects(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow, const PinholeCamera<Scalar>& camera,
+                   const CoarseOptions& coarse, FrameState<Scalar>& state) {
+  FrameScratch<Scalar>& scratch = state.scratch;
+  const std::size_t n = flow.current.size();
+  const ObjectProbabilityOptions scored = scaled_to_flow(coarse.object, state.report);
+  scratch.values.resize(n);
+  for (std::size_t b = 0; b < state.boxes.size(); ++b) {
+    // What lies behind an object says nothing of it, and a pair on its silhouette may have either depth.
+    scratch.samples.clear();
+    scratch.members.clear();
+    for (std::size_t i = 0; i < n; ++i) {
+      if (scratch.pair_label[b * n + i] != PairLabel::foreground) continue;
+      scratch.samples.push_back(state.flow_distances[i]);
+      scratch.members.push_back(static_cast<std::int32_t>(i));
+    }
+    ObjectProbability& object = state.objects[b];
+    object = object_probability(scratch.samples, scored, scratch.values);
+    if (object.status != Status::ok) continue;
+    --state.report.unknown_objects;
+    if (!(scored.shift_pairs > 0)) continue;
+    const double shift = flow_shift(model, flow, scratch.members, camera, coarse.flow, scored.shift_pairs);
+    object.static_probability = (std::min)(object.static_probability, shift_probability(shift));
+  }
+}
+
 }  // namespace CFP_ISA
 }  // namespace detail
 
@@ -136,11 +163,11 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
                       FrameState<Scalar>& state) {
   const std::size_t n = frame.flow.current.size();
   CFP_ASSERT(frame.flow.previous.size() == n);
-  const ObjectProbabilityOptions& object_options = options.coarse.object;
-  state.objects.assign(state.boxes.size(), {object_options.unknown_object_probability, 0, Status::not_enough_data});
+  const CoarseOptions& coarse = options.coarse;
+  state.objects.assign(state.boxes.size(), {coarse.object.unknown_object_probability, 0, Status::not_enough_data});
   FrameReport& report = state.report;
   report.unknown_objects = state.boxes.size();
-  if (!options.coarse.use_object_probability || n == 0) return;
+  if (!coarse.use_object_probability || n == 0) return;
   if (state.boxes.empty() && !looks_for_unreported(options)) return;
 
   FrameScratch<Scalar>& scratch = state.scratch;
@@ -148,7 +175,6 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
                                undistorted(camera, frame.flow.current, scratch.undistorted_current),
                                frame.flow.previous_depths};
   const PinholeCamera<Scalar> pinhole = undistorted_camera(camera);
-  const CoarseOptions& coarse = options.coarse;
   detail::label_pairs(frame, options, state);
   const FlowSupport support = detail::mark_outside(n, coarse.flow, scratch);
   const FlowModel<Scalar> model = detail::flow_model(frame, flow, pinhole, coarse, state);
@@ -159,28 +185,10 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   if (model.kind == FlowModelKind::none) return;
 
   state.flow_distances.resize(n);
-  scratch.values.resize(n);
   flow_distances(model, flow, pinhole, coarse.flow, span<Scalar>(state.flow_distances));
   if (model.kind == FlowModelKind::motion_up_to_scale && looks_for_unreported(options))
     detail::measure_room(model, flow, pinhole, coarse, scratch.room_distances);
-  const ObjectProbabilityOptions scored = detail::scaled_to_flow(coarse.object, report);
-  for (std::size_t b = 0; b < state.boxes.size(); ++b) {
-    // What lies behind an object says nothing of it, and a pair on its silhouette may have either depth.
-    scratch.samples.clear();
-    scratch.members.clear();
-    for (std::size_t i = 0; i < n; ++i) {
-      if (scratch.pair_label[b * n + i] != detail::PairLabel::foreground) continue;
-      scratch.samples.push_back(state.flow_distances[i]);
-      scratch.members.push_back(static_cast<std::int32_t>(i));
-    }
-    ObjectProbability& object = state.objects[b];
-    object = object_probability(scratch.samples, scored, scratch.values);
-    if (object.status != Status::ok) continue;
-    --report.unknown_objects;
-    if (!(scored.shift_pairs > 0)) continue;
-    const double shift = flow_shift(model, flow, scratch.members, pinhole, coarse.flow, scored.shift_pairs);
-    object.static_probability = (std::min)(object.static_probability, shift_probability(shift));
-  }
+  detail::score_objects(model, flow, pinhole, coarse, state);
 }
 
 /// Adds what is remembered of every object from the frames before, by the id of its box, and remembers this frame.
