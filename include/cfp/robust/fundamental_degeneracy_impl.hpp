@@ -137,12 +137,12 @@ struct DegeneracyCheck {
   [[nodiscard]] bool find_homography_beside(const typename FundamentalEvidence<T>::Window& window) noexcept {
     if (search.list.size() < 4) return true;
     const Matrix3<T> before = H;
-    const auto inside = [&](std::size_t i) { return window.contains(pairs.row(0)[i], pairs.row(1)[i]); };
+    const auto inside = [&](std::size_t i) { return window.contains(pairs.row(prev_x)[i], pairs.row(prev_y)[i]); };
     PairColumns<float> columns = thinned_columns(pairs);
     std::array<float, PairArrays::enough> weights = {};
     for (std::size_t k = 0; k < columns.size; ++k)
-      weights[k] = inside(thinned_index(pairs, k)) ? 0.0F : columns.row[4][k];
-    columns.row[4] = weights.data();
+      weights[k] = inside(thinned_index(pairs, k)) ? 0.0F : columns.row[score_weight][k];
+    columns.row[score_weight] = weights.data();
     const auto drawn_outside = [&] {
       std::uint32_t i = drawn();
       for (int attempt = 0; attempt < 10 && inside(i); ++attempt) i = drawn();

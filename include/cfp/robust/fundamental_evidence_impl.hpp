@@ -82,10 +82,10 @@ struct FundamentalEvidence {
     const T limit = search.wide_limit();
     T near = 0, all = 0, n = 0, squares = 0;
     for (std::size_t i = 0; i < pairs.size; ++i) {
-      n += pairs.row(5)[i];
-      squares += pairs.row(5)[i] * pairs.row(5)[i];
-      near += search.distances_sq[i] <= limit ? pairs.row(5)[i] : T(0);
-      all += search.distances_sq[i] <= 9 * limit ? pairs.row(5)[i] : T(0);
+      n += pairs.row(evidence_weight)[i];
+      squares += pairs.row(evidence_weight)[i] * pairs.row(evidence_weight)[i];
+      near += search.distances_sq[i] <= limit ? pairs.row(evidence_weight)[i] : T(0);
+      all += search.distances_sq[i] <= 9 * limit ? pairs.row(evidence_weight)[i] : T(0);
     }
     const T per_weight = n / squares;
     near *= per_weight, all *= per_weight, n *= per_weight;
@@ -125,12 +125,12 @@ struct FundamentalEvidence {
       const T d2 = (std::min)(whitened_transfer_sq(pairs, H, i), T(100)) * per_s2;
       const T a2 = 1 + 2 * search.distances_sq[i] * per_s2;
       const T ratio = (1 + d2) * std::sqrt(1 + d2) / ((1 + d2 / 2) * a2 * a2);
-      x[count] = pairs.row(0)[i], y[count] = pairs.row(1)[i];
-      gain[count] = pairs.row(5)[i] * (ratio >= 0 ? ratio - 1 : T(-1));
+      x[count] = pairs.row(prev_x)[i], y[count] = pairs.row(prev_y)[i];
+      gain[count] = pairs.row(evidence_weight)[i] * (ratio >= 0 ? ratio - 1 : T(-1));
       range[count] = 0;
       T edge = 6;
       for (std::size_t r = 1; r < ranges; ++r, edge *= 4) range[count] += d2 > edge ? T(1) : T(0);
-      if (search.distances_sq[i] <= limit) distinct += pairs.row(5)[i] / pairs.weights()[i];
+      if (search.distances_sq[i] <= limit) distinct += pairs.row(evidence_weight)[i] / pairs.weights()[i];
     }
     std::fill(gain + count, gain + (count + pairs.block - 1) / pairs.block * pairs.block, T(0));
     return distinct * static_cast<T>(stride);

@@ -18,11 +18,12 @@ struct CellCounts {
   std::vector<std::uint32_t> counts, slots;  // per slot; the slot of every pair
 };
 
-// Previous x, y, current x, y, shared weights, weight of the pairs present, centred per image and scaled by one common
-// factor, so that distances are pixels times `factor`. Pairs that begin or end in one cell share weight: copies, or
-// mismatches that all end in one place, are no support. In the score they have the weight of three at most, as
-// evidence that of one.
-struct PairArrays : RansacColumns<7> {
+// Coordinates are centred per image and scaled by one common factor, so that distances are pixels times `factor`. Pairs
+// that begin or end in one cell share weight: copies, or mismatches that all end in one place, are no support. In the
+// score they have the weight of three at most, as evidence that of one.
+enum PairRow : std::size_t { prev_x, prev_y, cur_x, cur_y, score_weight, evidence_weight, own_weight, pair_rows };
+
+struct PairArrays : RansacColumns<pair_rows> {
   static constexpr std::size_t enough = 256;  // pairs, to refine a candidate
 
   PairScaling scaling;
@@ -34,7 +35,7 @@ struct PairArrays : RansacColumns<7> {
 
 inline namespace CFP_ISA {
 
-// The arrays in one precision.
+// The rows up to score_weight in one precision.
 template <typename T>
 struct PairColumns {
   const T* row[5];
@@ -62,11 +63,11 @@ template <typename T>
 
 template <typename T>
 [[nodiscard]] Vector3<T> previous_point(const PairArrays& pairs, std::size_t i) noexcept {
-  return {pairs.row(0)[i], pairs.row(1)[i], T(1)};
+  return {pairs.row(prev_x)[i], pairs.row(prev_y)[i], T(1)};
 }
 template <typename T>
 [[nodiscard]] Vector3<T> current_point(const PairArrays& pairs, std::size_t i) noexcept {
-  return {pairs.row(2)[i], pairs.row(3)[i], T(1)};
+  return {pairs.row(cur_x)[i], pairs.row(cur_y)[i], T(1)};
 }
 
 // Empties the cells and makes room for so many pairs.
@@ -99,11 +100,11 @@ inline void share_weights(PairArrays& pairs, double cell_size) noexcept {
   const CellCounts& current = pairs.cells[1];
   for (std::size_t image = 0; image < 2; ++image) count_cells(pairs, 2 * image, 1 / cell_size, pairs.cells[image]);
   pairs.total_shared = 0;
-  float* const fast = pairs.fast.data() + 4 * pairs.capacity;
+  float* const fast = pairs.fast.data() + score_weight * pairs.capacity;
   for (std::size_t i = 0; i < pairs.size; ++i) {
     const double n = (std::max)(previous.counts[previous.slots[i]], current.counts[current.slots[i]]);
     const double w = pairs.weights()[i], shared = w * (std::min)(3 / n, 1.0);
-    pairs.row(4)[i] = shared, fast[i] = static_cast<float>(shared), pairs.row(5)[i] = w / n;
+    pairs.row(score_weight)[i] = shared, fast[i] = static_cast<float>(shared), pairs.row(evidence_weight)[i] = w / n;
     pairs.total_shared += shared;
   }
 }

@@ -33,7 +33,10 @@ struct SampsonPacket {
   P p0, p1, q0, q1, l0, l1, m0, m1, e, n2;
 
   SampsonPacket(const PairColumns<T>& in, std::size_t i, const Matrix3<T>& F) noexcept
-      : p0(P::load(in.row[0] + i)), p1(P::load(in.row[1] + i)), q0(P::load(in.row[2] + i)), q1(P::load(in.row[3] + i)) {
+      : p0(P::load(in.row[prev_x] + i)),
+        p1(P::load(in.row[prev_y] + i)),
+        q0(P::load(in.row[cur_x] + i)),
+        q1(P::load(in.row[cur_y] + i)) {
     const auto line = [](const P& x, const P& y, T a, T b, T c) {
       return multiply_add(P(a), x, multiply_add(P(b), y, P(c)));
     };
@@ -60,7 +63,7 @@ template <typename T>
     for (std::size_t i = block; i < block + PairArrays::block; i += P::lanes) {
       const SampsonPacket<T> pair(in, i, f);
       const P e2 = pair.e * pair.e;
-      cost = multiply_add(P::load(in.row[4] + i), e2 / multiply_add(spread, pair.n2, e2 + tiny), cost);
+      cost = multiply_add(P::load(in.row[score_weight] + i), e2 / multiply_add(spread, pair.n2, e2 + tiny), cost);
     }
     sum += static_cast<double>(reduce_add(cost));
     if (!(sum < bound)) break;
@@ -103,7 +106,7 @@ double sampson_system(const PairColumns<T>& in, const Matrix3<double>& F, double
     const P k = pair.e * inverse_n2;
     const P x = pair.e * k * inverse_scale;
     const P s = one / (x + one);
-    const P ws = P::load(in.row[4] + i) * s;
+    const P ws = P::load(in.row[score_weight] + i) * s;
     cost = multiply_add(ws, x, cost);
     const P weight = ws * s * inverse_n2, we = weight * pair.e;
     const P p[2] = {pair.p0, pair.p1}, wq[2] = {weight * pair.q0, weight * pair.q1}, m[2] = {k * pair.m0, k * pair.m1};

@@ -53,7 +53,7 @@ struct FundamentalSearch {
   static constexpr T score_scale = T(1) / 4, inner_scale = T(1) / 16, final_scale = T(2.25 * 2.25);
 
   [[nodiscard]] std::size_t size() const noexcept { return pairs.size; }
-  [[nodiscard]] span<const double> weights() const noexcept { return {pairs.row(4), pairs.size}; }
+  [[nodiscard]] span<const double> weights() const noexcept { return {pairs.row(score_weight), pairs.size}; }
   [[nodiscard]] double total_weight() const noexcept { return pairs.total_shared; }
 
   // Of the pairs that `counts` accepts.
@@ -191,7 +191,7 @@ struct FundamentalSearch {
         const P farthest((std::min)(cut, T(6.25) * noise_variance));
         P sum = zero, weight = zero;
         for (std::size_t i = 0; i < pairs.size; i += P::lanes) {
-          const P d2 = P::load(distances_sq.data() + i), w = P::load(pairs.row(4) + i);
+          const P d2 = P::load(distances_sq.data() + i), w = P::load(pairs.row(score_weight) + i);
           const auto near = d2 <= farthest;
           sum += select(near, w * d2, zero);
           weight += select(near, w, zero);

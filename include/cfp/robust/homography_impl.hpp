@@ -16,7 +16,7 @@ inline namespace CFP_ISA {
 template <typename T>
 [[nodiscard]] T transfer_sq(const PairArrays& pairs, const Matrix3<T>& H, std::size_t i) noexcept {
   const Vector3<T> mapped = H * previous_point<T>(pairs, i);
-  const T dx = mapped.x() / mapped.z() - pairs.row(2)[i], dy = mapped.y() / mapped.z() - pairs.row(3)[i];
+  const T dx = mapped.x() / mapped.z() - pairs.row(cur_x)[i], dy = mapped.y() / mapped.z() - pairs.row(cur_y)[i];
   const T d2 = dx * dx + dy * dy;
   return d2 >= 0 ? d2 : std::numeric_limits<T>::infinity();
 }
@@ -27,7 +27,7 @@ template <typename T>
 [[nodiscard]] T whitened_transfer_sq(const PairArrays& pairs, const Matrix3<T>& H, std::size_t i) noexcept {
   const Vector3<T> mapped = H * previous_point<T>(pairs, i);
   const T inverse_z = 1 / mapped.z(), u = mapped.x() * inverse_z, v = mapped.y() * inverse_z;
-  const T dx = u - pairs.row(2)[i], dy = v - pairs.row(3)[i];
+  const T dx = u - pairs.row(cur_x)[i], dy = v - pairs.row(cur_y)[i];
   const T ux = (H(0, 0) - u * H(2, 0)) * inverse_z, uy = (H(0, 1) - u * H(2, 1)) * inverse_z;
   const T vx = (H(1, 0) - v * H(2, 0)) * inverse_z, vy = (H(1, 1) - v * H(2, 1)) * inverse_z;
   const T uu = 1 + ux * ux + uy * uy, uv = ux * vx + uy * vy, vv = 1 + vx * vx + vy * vy;
@@ -43,12 +43,12 @@ template <typename T>
   double sum = 0;
   for (std::size_t i = 0; i < in.size; i += 8) {
     const auto load = [&](std::size_t row) { return Eigen::Map<const Lane>(in.row[row] + i); };
-    const Lane x = load(0), y = load(1), z = h(2, 0) * x + h(2, 1) * y + h(2, 2);
+    const Lane x = load(prev_x), y = load(prev_y), z = h(2, 0) * x + h(2, 1) * y + h(2, 2);
     // Multiplied out by z, so that a point mapped to infinity is an outlier and not a NaN.
-    const Lane dx = h(0, 0) * x + h(0, 1) * y + h(0, 2) - load(2) * z;
-    const Lane dy = h(1, 0) * x + h(1, 1) * y + h(1, 2) - load(3) * z;
+    const Lane dx = h(0, 0) * x + h(0, 1) * y + h(0, 2) - load(cur_x) * z;
+    const Lane dy = h(1, 0) * x + h(1, 1) * y + h(1, 2) - load(cur_y) * z;
     const Lane d2 = (dx * dx + dy * dy) / (z * z + T(1e-30));
-    sum += static_cast<double>((load(4) * (d2.min)(static_cast<T>(limit))).sum());
+    sum += static_cast<double>((load(score_weight) * (d2.min)(static_cast<T>(limit))).sum());
   }
   return sum / limit;
 }
@@ -82,10 +82,10 @@ struct TransferModel {
     double cost = 0;
     for (std::size_t i = 0; i < pairs.size; ++i) {
       const auto of = [&](std::size_t row) { return static_cast<double>(pairs.row[row][i]); };
-      const double x = of(0), y = of(1), u = of(2), v = of(3);
+      const double x = of(prev_x), y = of(prev_y), u = of(cur_x), v = of(cur_y);
       const Vector3<double> mapped = H * Vector3<double>(x, y, 1);
       const double inverse_z = 1 / mapped.z(), dx = mapped.x() * inverse_z - u, dy = mapped.y() * inverse_z - v;
-      const double distance = (dx * dx + dy * dy) / scale, w = of(4), share = 1 / (1 + distance);
+      const double distance = (dx * dx + dy * dy) / scale, w = of(score_weight), share = 1 / (1 + distance);
       // Beyond 9 the weight is below a hundredth; a point at infinity has NaN there and is left out, too.
       cost += distance < 9 ? w * distance * share : 0.9 * w;
       if (!(distance < 9)) continue;
