@@ -150,8 +150,7 @@ inline namespace CFP_ISA {
 template <typename Scalar>
 ForegroundResult depth_foreground(const ForegroundInput<non_deduced<Scalar>>& in, const ForegroundOptions& options,
                                   ForegroundWorkspace<Scalar>& workspace, span<char> mask) {
-  CFP_ASSERT(mask.size() == in.depths_m.size());
-  CFP_ASSERT(in.pixels.empty() || in.pixels.size() == in.depths_m.size());
+  CFP_ASSERT(mask.size() == in.depths_m.size() && detail::fits(in.depths_m.size(), in.pixels));
   const SortedValues<Scalar> sorted = sort_values(
       in.depths_m, [](Scalar depth) { return is_valid_depth(depth); }, workspace);
   const span<const Scalar> depths = sorted.values;

@@ -70,8 +70,7 @@ template <typename T>
 // Calls visit(i, previous, current, weight) for every pair present, its pixels and weight in double.
 template <typename Scalar, typename Visit>
 void for_each_pair(const PointPairs<Scalar>& pairs, Visit&& visit) {
-  CFP_ASSERT(pairs.previous.size() == pairs.current.size() &&
-             (pairs.weights.empty() || pairs.weights.size() == pairs.previous.size()));
+  CFP_ASSERT(pairs.previous.size() == pairs.current.size() && fits(pairs.previous.size(), pairs.weights));
   for (std::size_t i = 0; i < pairs.previous.size(); ++i) {
     const Vector2<double> p = pairs.previous[i].template cast<double>(), q = pairs.current[i].template cast<double>();
     const double w = pairs.weights.empty() ? 1.0 : static_cast<double>(pairs.weights[i]);

@@ -45,7 +45,7 @@ template <typename Scalar>
                                                            const FundamentalRansacOptions& options,
                                                            FundamentalRansacWorkspace& workspace,
                                                            span<char> inlier_mask) {
-  CFP_ASSERT(inlier_mask.empty() || inlier_mask.size() == input.previous.size());
+  CFP_ASSERT(fits(input.previous.size(), inlier_mask));
   std::fill(inlier_mask.begin(), inlier_mask.end(), char(0));
   FundamentalResult<Scalar> result;
   PairArrays& pairs = workspace.pairs;

@@ -65,8 +65,7 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
                                                  span<const non_deduced<Scalar>> weights, const Camera& camera,
                                                  const PnpRansacOptions& options, PnpRansacWorkspace& workspace,
                                                  span<char> inlier_mask = {}) {
-  CFP_ASSERT(world.size() == pixels.size() && (weights.empty() || weights.size() == world.size()) &&
-             (inlier_mask.empty() || inlier_mask.size() == world.size()));
+  CFP_ASSERT(world.size() == pixels.size() && detail::fits(world.size(), weights, inlier_mask));
   std::fill(inlier_mask.begin(), inlier_mask.end(), char(0));
   PnpRansacResult<Scalar> result;
   detail::ObservationArrays& observations = workspace.observations;

@@ -83,7 +83,7 @@ struct PnpProblem {
     for (std::size_t k = 0; k < 3; ++k) {
       const std::size_t i = sample[k];
       problem.rays[k] = Vector3<T>(in.row(ray_x)[i], in.row(ray_y)[i], 1);
-      problem.world[k] = Vector3<T>(in.row(X)[i], in.row(Y)[i], in.row(Z)[i]);
+      problem.world[k] = in.point(i);
     }
     const P3PSolutions<T> solutions = p3p(problem);
     for (int k = 0; k < solutions.count; ++k) visit(solutions.T_cam_world[static_cast<std::size_t>(k)]);

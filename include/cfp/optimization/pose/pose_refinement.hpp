@@ -10,6 +10,8 @@
 /// xi = (rho, w) as in math/se3.hpp.
 #pragma once
 
+#include <algorithm>
+
 #include "cfp/geometry/camera.hpp"
 #include "cfp/optimization/pose/pose_problem.hpp"
 #include "cfp/optimization/pose/pose_refinement_impl.hpp"
@@ -36,7 +38,7 @@ template <typename Scalar, typename Input, typename Camera>
   CFP_ASSERT(!invalid_field(options));
   PoseResult result;
   result.T_cam_world = T_cam_world;
-  for (char& inlier : inliers) inlier = 0;
+  std::fill(inliers.begin(), inliers.end(), char(0));
   if (!detail::has_valid_shape(observations, inliers) || !is_rigid_motion(T_cam_world) ||
       !detail::is_usable_camera(camera)) {
     if (!is_finite(T_cam_world.rotation.sum() + T_cam_world.translation.sum())) result.T_cam_world = SE3<double>();
@@ -63,7 +65,7 @@ template <typename Scalar, typename Input, typename Camera>
     if (untested || result.inliers < options.min_observations) result.status = SolverStatus::not_enough_inliers;
   }
   if (!is_solved(result.status)) {
-    for (char& inlier : inliers) inlier = 0;
+    std::fill(inliers.begin(), inliers.end(), char(0));
     result.inliers = 0, result.cost = result.chi2 = 0;
     return result;
   }
