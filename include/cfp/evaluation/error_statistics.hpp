@@ -4,11 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 #include <vector>
 
-#include "cfp/core/numeric.hpp"
-#include "cfp/math/so3.hpp"
+#include "cfp/version.hpp"
 
 namespace cfp {
 
@@ -50,32 +48,4 @@ inline namespace CFP_ISA {
 }
 
 }  // namespace CFP_ISA
-
-namespace detail {
-inline namespace CFP_ISA {
-
-/// Median time between neighbours (numpy.median); 0 below two poses.
-template <typename Poses>
-double median_interval(const Poses& poses, const std::vector<std::size_t>& order) {
-  std::vector<double> intervals;
-  for (std::size_t i = 1; i < order.size(); ++i) {
-    intervals.push_back(
-        (std::min)(poses[order[i]].time_s - poses[order[i - 1]].time_s, (std::numeric_limits<double>::max)()));
-  }
-  return error_statistics(std::move(intervals)).median;
-}
-
-template <typename Matrix>  // so that an evaluation that is not called is not compiled
-double angle_deg(const Matrix& R) noexcept {
-  return so3_log<double>(R).norm() * 180 / pi<double>;
-}
-
-/// The length; the largest double where it overflows.
-inline double finite_norm(const Vector3<double>& v) noexcept {
-  const double length = std::hypot(v[0], v[1], v[2]);
-  return is_finite(length) ? length : (std::numeric_limits<double>::max)();
-}
-
-}  // namespace CFP_ISA
-}  // namespace detail
 }  // namespace cfp

@@ -7,9 +7,11 @@
 #include <algorithm>
 #include <cmath>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "cfp/core/options.hpp"
+#include "cfp/evaluation/error_statistics.hpp"
 #include "cfp/math/matrix3.hpp"
 #include "cfp/math/se3.hpp"
 
@@ -170,6 +172,28 @@ template <typename Scalar>
 SE3<double> double_pose(const StampedPose<Scalar>& pose) noexcept {
   const SE3<double> T = pose.T_world_cam.template cast<double>();
   return {normalized_rotation<double>(T.rotation), T.translation};
+}
+
+/// Median time between neighbours (numpy.median); 0 below two poses.
+template <typename Poses>
+double median_interval(const Poses& poses, const std::vector<std::size_t>& order) {
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < order.size(); ++i) {
+    intervals.push_back(
+        (std::min)(poses[order[i]].time_s - poses[order[i - 1]].time_s, (std::numeric_limits<double>::max)()));
+  }
+  return error_statistics(std::move(intervals)).median;
+}
+
+template <typename Matrix>  // so that an evaluation that is not called is not compiled
+double angle_deg(const Matrix& R) noexcept {
+  return so3_log<double>(R).norm() * 180 / pi<double>;
+}
+
+/// The length; the largest double where it overflows.
+inline double finite_norm(const Vector3<double>& v) noexcept {
+  const double length = std::hypot(v[0], v[1], v[2]);
+  return is_finite(length) ? length : (std::numeric_limits<double>::max)();
 }
 
 }  // namespace CFP_ISA
