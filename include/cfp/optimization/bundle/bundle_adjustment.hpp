@@ -1,9 +1,8 @@
 /// @file bundle_adjustment.hpp
 /// Weighted bundle adjustment: camera poses and points that minimise
 ///   cost = sum over observations of w rho(|r|^2 / sigma^2),
-/// r = projection - (u, v), or - (u, v, u_right) for a stereo or RGB-D observation. The weight stands outside the loss:
-/// a probably dynamic point is never harder to reject. (g2o as ORB-SLAM2 uses it puts the factor inside, rho(w r^2 /
-/// sigma^2); the two agree for w in {0, 1}.)
+/// r = projection - (u, v), or - (u, v, u_right) for a stereo or RGB-D observation. The weight stands outside the loss,
+/// for the reason given in pose_refinement.hpp.
 ///
 /// Levenberg-Marquardt on the normal equations, points eliminated (Schur complement), the reduced camera system
 /// factorised by block Cholesky within its envelope. Time and memory per iteration are linear in the observations, in
