@@ -136,12 +136,6 @@ inline namespace CFP_ISA {
   return nested("health", invalid_field(o.health));
 }
 
-/// Whether objects of this class are told from their background by depth.
-[[nodiscard]] inline bool is_non_rigid(int class_id, const FrameOptions& options) noexcept {
-  return std::any_of(options.classes.begin(), options.classes.end(),
-                     [class_id](const ObjectClass& c) { return c.class_id == class_id && c.non_rigid; });
-}
-
 /// Whether keypoints in no box are judged by the flow, too.
 [[nodiscard]] inline bool looks_for_unreported(const FrameOptions& options) noexcept {
   return options.use_boxes && options.map_point.weight == WeightRule::posterior &&

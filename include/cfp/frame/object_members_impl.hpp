@@ -3,6 +3,8 @@
 /// label_keypoints.hpp, not an interface.
 #pragma once
 
+#include <algorithm>
+
 #include "cfp/clustering/depth_foreground.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
@@ -26,7 +28,9 @@ template <typename Scalar>
 /// Whether depth tells where an object stands, and what in its box or mask is farther.
 template <typename Scalar>
 [[nodiscard]] bool is_told_by_depth(const TrackedBox<Scalar>& box, const FrameOptions& options) noexcept {
-  return options.coarse.use_depth_foreground && is_non_rigid(box.class_id, options);
+  return options.coarse.use_depth_foreground &&
+         std::any_of(options.classes.begin(), options.classes.end(),
+                     [&](const ObjectClass& c) { return c.class_id == box.class_id && c.non_rigid; });
 }
 
 /// Sets scratch.members to the indices for which `belongs` holds, and marks in scratch.mask which of them lie on the
