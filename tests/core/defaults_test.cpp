@@ -84,7 +84,7 @@ TEST_CASE("The defaults of the estimators", "[core]") {
   const cfp::PnpRansacOptions pnp;
   CHECK((pnp.threshold_px == 2.5 && pnp.min_iterations == 5 && pnp.max_iterations == 10000 && pnp.min_inliers == 8));
   const cfp::PoseOptions p;
-  CHECK((p.chi2_mono == 5.991 && p.chi2_stereo == 7.815 && p.min_observations == 3 && p.max_iterations == 20));
+  CHECK((p.chi2_mono == 5.991 && p.chi2_stereo == 7.815 && p.max_iterations == 20));
   CHECK(p.min_inlier_rows == 10);
   CHECK((p.round_count == 2 && p.rounds[0].loss == cfp::LossType::geman_mcclure && p.rounds[0].scale == 30));
   CHECK((p.rounds[1].loss == cfp::LossType::geman_mcclure && p.rounds[1].scale == 1.5));

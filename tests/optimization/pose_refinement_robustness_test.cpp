@@ -327,7 +327,6 @@ TEST_CASE("Pose refinement: options outside their range are named", "[optimizati
   };
   CHECK(named([](auto& o) { o.chi2_mono = 0; }) == "chi2_mono");
   CHECK(named([](auto& o) { o.chi2_stereo = std::nan(""); }) == "chi2_stereo");
-  CHECK(named([](auto& o) { o.min_observations = 2; }) == "min_observations");
   CHECK(named([](auto& o) { o.min_inlier_rows = 5; }) == "min_inlier_rows");
   CHECK(named([](auto& o) { o.round_count = 0; }) == "round_count");
   CHECK(named([](auto& o) { o.round_count = 5; }) == "round_count");

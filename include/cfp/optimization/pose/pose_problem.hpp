@@ -46,9 +46,9 @@ struct PoseRound {
 
 struct PoseOptions {
   static constexpr std::size_t max_rounds = 4;
+  static constexpr int min_observations = 3;  ///< fewer usable observations, or inliers, leave the pose untouched
   double chi2_mono = 5.991;    ///< outlier threshold on s of a pixel, 95 % of chi^2 with 2 degrees of freedom, > 0
   double chi2_stereo = 7.815;  ///< the same with a depth, 3 degrees of freedom, > 0
-  int min_observations = 3;    ///< fewer usable observations, or inliers, leave the pose untouched, >= 3
   /// Unless all observations agree, fewer rows of inliers (two of a pixel, three with a depth) leave the pose as it
   /// was, >= 6. Three pixels fit some pose whatever they show: of poses from 4 to 60 observations with up to 90 %
   /// mismatches 6 to 45 % were solved and wrong with 6 rows, at most 1 % with 10 (cfp_pose_loss_study).
@@ -94,7 +94,6 @@ inline namespace CFP_ISA {
 [[nodiscard]] inline OptionPath invalid_field(const PoseOptions& options) noexcept {
   if (!detail::positive(options.chi2_mono)) return "chi2_mono";
   if (!detail::positive(options.chi2_stereo)) return "chi2_stereo";
-  if (!(options.min_observations >= 3)) return "min_observations";
   if (!(options.min_inlier_rows >= 6)) return "min_inlier_rows";
   if (!(options.round_count >= 1 && options.round_count <= PoseOptions::max_rounds)) return "round_count";
   for (std::size_t i = 0; i < options.round_count; ++i) {
