@@ -123,14 +123,5 @@ template <int N>
   return inverse.allFinite();
 }
 
-/// By how much the quadratic model falls with that step: step^T (damping diag(H) step - g).
-template <int N>
-[[nodiscard]] double predicted_decrease(const Eigen::Matrix<double, N, N>& H, const Eigen::Matrix<double, N, 1>& g,
-                                        double damping, const Eigen::Matrix<double, N, 1>& step) noexcept {
-  double sum = 0;
-  for (int r = 0; r < N; ++r) sum += step[r] * (damping * H(r, r) * step[r] - g[r]);
-  return sum;
-}
-
 }  // namespace CFP_ISA
 }  // namespace cfp

@@ -163,7 +163,9 @@ class DenseLeastSquares {
     if (!solve_normal_equations<N>(equations_.H, equations_.g, damping, min_pivot_, step))
       return std::numeric_limits<double>::quiet_NaN();
     trial_ = model_.moved(state_, step);
-    return predicted_decrease<N>(equations_.H, equations_.g, damping, step);
+    double promised = 0;
+    for (int r = 0; r < N; ++r) promised += step[r] * (damping * equations_.H(r, r) * step[r] - equations_.g[r]);
+    return promised;
   }
   double linearize_trial() { return model_.linearize(trial_, trial_equations_); }
   void accept() {
