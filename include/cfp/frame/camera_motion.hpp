@@ -71,16 +71,6 @@ inline namespace CFP_ISA {
   return nested("pose", invalid_field(o.pose));
 }
 
-/// The standard deviation of one coordinate, from distances of static points of which at least half are right: their
-/// median over that of the chi distribution. degrees_of_freedom: 1 for distances from a line, 2 for distances from a
-/// point. Distances that are none are left out; none at all gives 0. `distances` is overwritten. O(n).
-template <typename Scalar>
-[[nodiscard]] Scalar robust_sigma(span<Scalar> distances, int degrees_of_freedom) noexcept {
-  const std::size_t n = copy_distances(span<const Scalar>(distances), distances);
-  const Scalar median = quantile(distances.subspan(0, n), 0.5);
-  return median / Scalar(degrees_of_freedom == 1 ? 0.674489750196082 : 1.177410022515475);
-}
-
 }  // namespace CFP_ISA
 
 namespace detail {
