@@ -143,10 +143,11 @@ template <typename Scalar>
 inline namespace CFP_ISA {
 
 /// The motion of the camera from the pairs of the undistorted image that `outside` marks as on no object and whose
-/// depth is known and shared by neighbours: weighted robust pose refinement (refine_pose) from `start`, once with the
-/// largest noise and once with the noise that the pairs then show; where that is above search_above_px, from the motion
-/// that pnp_ransac finds, tightly, and once more as usual if no more than chance is lost by it. Unknown where too few
-/// pairs have a depth or agree. O(pairs).
+/// depth is known and shared by neighbours. Unknown where too few pairs have such a depth or agree. O(pairs).
+///  1. refine_pose from `start` at the largest noise; then the noise that the pairs show is measured.
+///  2. If that is at most search_above_px, or pnp_ransac finds nothing: refine_pose again, at the noise measured.
+///  3. Else from what pnp_ransac finds by the last round of `pose` alone, at a third of its scale, then at its own; the
+///     second counts unless the noise grows by more than chance.
 template <typename Scalar>
 [[nodiscard]] CameraMotion<Scalar> estimate_camera_motion(const FlowPairs<Scalar>& flow, span<const char> outside,
                                                           const SE3<double>& start, const PinholeCamera<Scalar>& camera,

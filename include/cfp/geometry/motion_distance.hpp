@@ -122,14 +122,15 @@ inline namespace CFP_ISA {
   return nested("unknown_depth", invalid_field(o.unknown_depth));
 }
 
-/// d = sigma sqrt(r^T (sigma^2 I + sigma_z^2 J J^T + M C M^T)^-1 r), in pixels, with r = pixel_cur - project(p), p =
-/// T_cur_prev X, X the previous pixel at its depth z, J = d project / d z, M = d project / d xi and C the motion's
-/// covariance: the Mahalanobis distance of the pair, times sigma_px, so that (d / sigma)^2 has two degrees of freedom.
-/// The part of r along the epipolar line counts as far as the depth explains none of it, and what the motion's own
-/// error explains counts for nothing: the motion of a room that is far says little of what is near. A plane, a rotation
-/// or a resting camera is no special case. A depth that is not positive or not finite: see UnknownDepth. no_distance
-/// for a pixel without a ray, a point behind the current camera, or anything not finite. sigma_px > 0. Not in the
-/// paper.
+/// The Mahalanobis distance of a pair from where a static point would have gone, times sigma_px, in pixels:
+///
+///   d = sigma sqrt(r^T (sigma^2 I + sigma_z^2 J J^T + M C M^T)^-1 r),
+///
+/// r = pixel_cur - project(p), p = T_cur_prev X, X the previous pixel at its depth z, J = d project / d z,
+/// M = d project / d xi, C the motion's covariance. (d / sigma)^2 of a static point has two degrees of freedom. What an
+/// error of the depth explains, along the epipolar line, or of the motion, does not count; so a plane, a rotation or a
+/// resting camera is no special case. A depth that is not positive or not finite: see UnknownDepth. no_distance for a
+/// pixel without a ray, a point behind the current camera, or anything not finite. sigma_px > 0. Not in the paper.
 template <typename Camera, typename Scalar = typename Camera::ScalarType>
 [[nodiscard]] Scalar motion_distance(const Vector2<non_deduced<Scalar>>& pixel_prev,
                                      const non_deduced<Scalar>& depth_prev,

@@ -14,14 +14,17 @@
 namespace cfp::detail {
 inline namespace CFP_ISA {
 
-// Without parallax the distances of the pairs from H have no preferred direction, be they noise or mismatches, once
-// measured in units of the noise (H of a plane ahead stretches that along the lines); F says that they point along its
-// lines. With the distance d from H, a from the line and a scale s the density of the direction is (1 + d^2/s^2)^(3/2)
-// / (1 + d^2/2s^2) / (1 + a^2/s^2)^2 of the uniform one. Whatever s, a pair that does not know F expects the ratio 1,
-// and so 1 + share (ratio - 1), where only a share of the pairs obeys F. The product over all pairs then exceeds e^t
-// with a probability of at most e^-t, and so does the mean of such products for several shares: its logarithm is the
-// evidence. Mismatches lie far from H, parallax mostly near it: the share is another one in every range of d. T is
-// double.
+// Tests F against H by the directions in which the pairs lie from H, in units of the noise (which H of a plane ahead
+// stretches along the lines). Without parallax no direction is preferred, be it noise or mismatches; F says that they
+// point along its lines. With the distance d from H, a from the line and a scale s, the density of the direction over
+// the uniform one is
+//
+//   ratio = (1 + d^2/s^2)^(3/2) / (1 + d^2/2s^2) / (1 + a^2/s^2)^2.
+//
+// Whatever s, a pair that does not know F expects the ratio 1, and so 1 + share (ratio - 1), where only a share of the
+// pairs obeys F. By Markov's inequality the product over all pairs then exceeds e^t with a probability of at most e^-t.
+// So does the mean of such products for several shares: its logarithm is the evidence. Mismatches lie far from H,
+// parallax mostly near it: each range of d has a share of its own. T is double.
 template <typename T>
 struct FundamentalEvidence {
   static constexpr std::size_t cells = 16;              // over the extent of the pairs, either way

@@ -116,15 +116,19 @@ inline namespace CFP_ISA {
 /// Sampson distance d alone. inlier_mask: empty or one per pair, 1 = inlier. Works in double, scores in float.
 ///
 /// A homography that holds most inliers is looked for first: with parallax beside it the F is completed from both.
-/// There is no F, and `status` says why, unless more pairs lie near its lines than the best of all samples gathers by
-/// chance (30 true pairs among 300 are not told from that), and its lines explain the pairs better than chance does
-/// beside that homography and beside no motion, without any part of the image that somebody near may fill, and without
-/// any two lines of points (`degenerate`). Pairs that begin or end in one place (a cell of two thresholds) count as one
-/// there. Where most pairs are mismatches a moving region may still be taken for parallax. The result is refined under
-/// a Geman-McClure loss of 2.25 standard deviations of the noise that the pairs themselves show, from several starts,
-/// as a short baseline gives the cost several minima. Cost per sample about 1 us plus 0.3 us per 200 pairs, and some
-/// 100 us at the end. Sources: Chum, Matas, Kittler: "Locally optimized RANSAC", DAGM 2003; Geman and McClure 1987
-/// for score and loss; DEGENSAC (see fundamental_degeneracy_impl.hpp).
+/// There is no F, and `status` says why, unless
+///  - more pairs lie near its lines than the best of all samples gathers by chance (30 true pairs among 300 are not
+///    told from that),
+///  - its lines explain the pairs better than chance does, beside that homography and beside no motion,
+///  - also without any part of the image that somebody near may fill,
+///  - and without any two lines of points (`degenerate`).
+/// Pairs that begin or end in one place (a cell of two thresholds) count as one there. Where most pairs are mismatches
+/// a moving region may still be taken for parallax.
+///
+/// The result is refined under a Geman-McClure loss of 2.25 standard deviations of the noise that the pairs themselves
+/// show, from several starts, as a short baseline gives the cost several minima. Cost per sample about 1 us plus 0.3 us
+/// per 200 pairs, and some 100 us at the end. Sources: Chum, Matas, Kittler: "Locally optimized RANSAC", DAGM 2003;
+/// Geman and McClure 1987 for score and loss; DEGENSAC (see fundamental_degeneracy_impl.hpp).
 template <typename Scalar>
 [[nodiscard]] FundamentalResult<Scalar> fundamental_ransac(const PointPairs<Scalar>& pairs,
                                                            const FundamentalRansacOptions& options,
