@@ -206,21 +206,37 @@ TEST_CASE("A host that matches map points only loses people's keypoints, unless 
   CHECK(weight_with > weight_without);
 }
 
-TEST_CASE("An object index per keypoint replaces boxes and depths", "[frame]") {
-  const DynamicScene<double> scene = make_dynamic_scene<double>({}, 38);
-  Host host(scene);
-  host.probability.coarse(host.previous());
-  cfp::Frame<double> frame = host.current();
+namespace {
+
+// The detection that each keypoint lies on.
+std::vector<std::int32_t> object_index(const DynamicScene<double>& scene) {
   std::vector<std::int32_t> object(scene.keypoints.size(), cfp::no_object);
   for (std::size_t i = 0; i < object.size(); ++i) {
     if (scene.is_person[i])
       object[i] = cfp::contains(scene.boxes[0], scene.keypoints[i][0], scene.keypoints[i][1]) ? 0 : 1;
   }
+  return object;
+}
+
+}  // namespace
+
+TEST_CASE("An object index per keypoint tells what is on an object; what it leaves in a box is background", "[frame]") {
+  const DynamicScene<double> scene = make_dynamic_scene<double>({}, 38);
+  Host host(scene);
+  host.probability.coarse(host.previous());
+  cfp::Frame<double> frame = host.current();
+  const std::vector<std::int32_t> object = object_index(scene);
   frame.object_of_keypoint = object;
   const auto coarse = host.probability.coarse(frame);
   const auto& state = host.probability.state();
   for (std::size_t i = 0; i < object.size(); ++i) {
-    CHECK(state.label[i] == (scene.is_person[i] ? KeypointLabel::foreground : KeypointLabel::outside));
+    const auto holds = [&](const auto& tracked) {
+      return cfp::contains(tracked.box, scene.keypoints[i][0], scene.keypoints[i][1]);
+    };
+    const bool in_box = std::any_of(state.boxes.begin(), state.boxes.end(), holds);
+    CHECK(state.label[i] == (scene.is_person[i] ? KeypointLabel::foreground
+                             : in_box           ? KeypointLabel::background
+                                                : KeypointLabel::outside));
     if (scene.is_person[i]) CHECK(state.boxes[static_cast<std::size_t>(state.box[i])].detection == object[i]);
   }
   CHECK(coarse.report.undecided_foregrounds == 0);
@@ -237,17 +253,46 @@ TEST_CASE("An object index per keypoint replaces boxes and depths", "[frame]") {
   CHECK(missed.report.stray_labels == on_people);
 }
 
-TEST_CASE("A mask whose labels name no detection is told", "[frame]") {
+TEST_CASE("A box without a mask is as any box, and what a mask leaves out of a person is told by the flow", "[frame]") {
+  const DynamicScene<double> scene = make_dynamic_scene<double>({}, 38);
+  Host boxes(scene), nothing(scene), half(scene);
+  for (Host* host : {&boxes, &nothing, &half}) host->probability.coarse(host->previous());
+  boxes.probability.coarse(boxes.current());
+  cfp::Frame<double> frame = nothing.current();
+  const std::vector<std::int32_t> none(scene.keypoints.size(), cfp::no_object);
+  frame.object_of_keypoint = none;
+  nothing.probability.coarse(frame);
+  CHECK(nothing.probability.state().label == boxes.probability.state().label);
+  CHECK(nothing.probability.state().weight == boxes.probability.state().weight);
+
+  std::vector<std::int32_t> object = object_index(scene);
+  for (std::size_t i = 1; i < object.size(); i += 2) object[i] = cfp::no_object;
+  frame = half.current();
+  frame.object_of_keypoint = object;
+  half.probability.coarse(frame);
+  double left_out = 0, weight = 0;
+  for (std::size_t i = 1; i < object.size(); i += 2) {
+    if (!scene.is_person[i]) continue;
+    ++left_out;
+    weight += half.probability.weight(i, 0.98);
+    CHECK(half.probability.state().label[i] == KeypointLabel::background);
+    CHECK(half.probability.state().flow_probability[i] >= 0);
+  }
+  CHECK(left_out > 50);
+  CHECK(weight < 0.8 * left_out);
+}
+
+TEST_CASE("A mask whose labels name no detection is told, and its box is one without a mask", "[frame]") {
   // 255 for what moves, as segmentations have it, beside one box of a detector: of detection 254.
   const DynamicScene<double> scene = make_dynamic_scene<double>({}, 38);
-  Host host(scene);
-  host.probability.coarse(host.previous());
+  Host host(scene), boxes(scene);
+  for (Host* each : {&host, &boxes}) each->probability.coarse(each->previous());
   cfp::Frame<double> frame = host.current();
   const std::vector<std::uint8_t> mask(640 * 480, 255);
   frame.labels = {mask.data(), 640, 480, 640};
   const auto wrong = host.probability.coarse(frame).report;
   CHECK(wrong.stray_labels == scene.keypoints.size());
-  CHECK(wrong.foreground == 0);
+  CHECK(wrong.foreground == boxes.probability.coarse(boxes.current()).report.foreground);
   const std::vector<std::uint8_t> first(640 * 480, 1);
   frame.labels.labels = first.data();
   CHECK(host.probability.coarse(frame).report.stray_labels == 0);

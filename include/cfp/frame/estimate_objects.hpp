@@ -73,15 +73,16 @@ void label_margin(const Box<Scalar>& box, const ForegroundResult& separated, con
   const Box<Scalar> wide = widened(box, Scalar(margin));
   for (std::size_t i = 0; i < labels.size(); ++i) {
     if (labels[i] != PairLabel::outside || !contains(wide, flow.current(i, 0), flow.current(i, 1))) continue;
-    const Scalar z = flow.previous_depths[i];
-    const bool behind = separated.status == ForegroundStatus::ok && z > Scalar(separated.far_m) && is_valid_depth(z);
+    const bool behind = separated.status == ForegroundStatus::ok && is_valid_depth(flow.previous_depths[i]) &&
+                        flow.previous_depths[i] > Scalar(separated.far_m);
     if (!behind) labels[i] = PairLabel::undecided;
   }
 }
 
 /// Sets scratch.pair_label: per box and flow pair, how the pair stands to the object of that box. Where the object is
-/// told from its background by depth, so are the pairs, and those just outside of the box may be undecided. Those in
-/// its mask that are farther than it are: masks spill over the silhouette, where depth and flow are of two surfaces.
+/// told from its background by depth, so are the pairs, and those just outside of the box may be undecided. Where it
+/// has a mask, so are those that are farther than it, as masks spill over the silhouette, where depth and flow are of
+/// two surfaces, and those in its box beside the mask but for what is behind the object, as masks leave some of it out.
 template <typename Scalar>
 void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
@@ -90,18 +91,18 @@ void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameS
   scratch.pair_label.assign(state.boxes.size() * n, PairLabel::outside);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     const TrackedBox<Scalar>& box = state.boxes[b];
-    const auto belongs = [&](std::size_t i) {
-      return lies_on(box, frame.labels, flow.current(i, 0), flow.current(i, 1));
+    const auto detection_at = [&](std::size_t i) {
+      return label_at(frame.labels, flow.current(i, 0), flow.current(i, 1)) - 1;
     };
-    const bool segmented = has_label(box, frame.labels);
-    const PairLabel farther = segmented ? PairLabel::undecided : PairLabel::background;
     const span<const Scalar> depths = is_told_by_depth(box, options) ? flow.previous_depths : span<const Scalar>();
-    const ForegroundResult separated = separate_members(box, flow.current, depths, belongs, options, state);
+    const auto [by_mask, separated] = find_members(box, flow.current, depths, detection_at, options, state);
+    const PairLabel farther = by_mask ? PairLabel::undecided : PairLabel::background;
     for (std::size_t m = 0; m < scratch.members.size(); ++m)
       scratch.pair_label[b * n + static_cast<std::size_t>(scratch.members[m])] =
           scratch.mask[m] != 0 ? PairLabel::foreground : farther;
-    if (!depths.empty() && !segmented)
-      label_margin(box.box, separated, flow, options.coarse.flow.margin, {scratch.pair_label.data() + b * n, n});
+    if (!depths.empty() || by_mask)
+      label_margin(box.box, separated, flow, depths.empty() ? 0 : options.coarse.flow.margin,
+                   {scratch.pair_label.data() + b * n, n});
   }
 }
 

@@ -76,16 +76,34 @@ inline void count_labels(const std::vector<KeypointLabel>& label, FrameReport& r
   report.invalid = count(KeypointLabel::invalid);
 }
 
+/// The detection that object_of_keypoint or the mask at its pixel names for keypoint i; negative: none.
+template <typename Scalar>
+[[nodiscard]] std::int32_t detection_of_keypoint(std::size_t i, const Frame<Scalar>& frame,
+                                                 const FrameState<Scalar>& state) noexcept {
+  const auto& [x, y] = state.current.keypoints[i];
+  if (state.label[i] == KeypointLabel::invalid) return no_object;
+  return frame.object_of_keypoint.empty() ? label_at(frame.labels, x, y) - 1 : frame.object_of_keypoint[i];
+}
+
+/// Adds what lies in the box of an object and on no mask to scratch.members, as its background.
+template <typename Scalar, typename DetectionAt>
+void take_what_masks_leave_out(const Box<Scalar>& box, const DetectionAt& detection_at, FrameState<Scalar>& state) {
+  for (std::size_t i = 0; i < state.size(); ++i) {
+    const auto& [x, y] = state.current.keypoints[i];
+    if (!contains(box, x, y) || detection_at(i) >= 0) continue;
+    state.scratch.members.push_back(static_cast<std::int32_t>(i));
+    state.scratch.mask.push_back(char(0));
+  }
+}
+
 /// How many keypoints are said to lie on a detection that the frame has not.
 template <typename Scalar>
 [[nodiscard]] std::size_t stray_labels(const Frame<Scalar>& frame, const FrameState<Scalar>& state) noexcept {
   const std::size_t detections = frame.detections ? frame.detections->size() : 0;
   std::size_t count = 0;
   for (std::size_t i = 0; i < state.size(); ++i) {
-    const auto& [x, y] = state.current.keypoints[i];
-    const std::int32_t object =
-        frame.object_of_keypoint.empty() ? label_at(frame.labels, x, y) - 1 : frame.object_of_keypoint[i];
-    count += object >= 0 && static_cast<std::size_t>(object) >= detections ? 1U : 0U;
+    const std::int32_t detection = detection_of_keypoint(i, frame, state);
+    count += detection >= 0 && static_cast<std::size_t>(detection) >= detections ? 1U : 0U;
   }
   return count;
 }
@@ -97,33 +115,29 @@ inline namespace CFP_ISA {
 
 /// Sets K, label and box of every keypoint from state.boxes and state.objects. A keypoint on several objects takes the
 /// smallest of their K, and that box decides for it from then on (ties: foreground before background, then the lower
-/// index). Keypoints on no object keep K = 1. What a mask or object_of_keypoint gives an object is its foreground;
-/// depth then only tells where it stands, for the next frame and for boxes without a mask. O(keypoints x boxes), and
-/// keypoints x flow pairs within each box. Outside of boxes the flow is asked as UnreportedOptions say.
+/// index). Keypoints on no object keep K = 1. Where a mask or object_of_keypoint names any keypoint for a box, these
+/// are its members, else all in the box; those that depth tells are farther are background, and so is what lies in the
+/// box and on no mask: masks spill over a silhouette and leave some of it out, and the flow at its place tells such a
+/// keypoint. O(keypoints x boxes), and keypoints x flow pairs within each box. Outside of boxes the flow is asked as
+/// UnreportedOptions say.
 template <typename Scalar>
 void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   CFP_ASSERT(state.objects.size() == state.boxes.size());
   CFP_ASSERT(detail::fits(state.size(), frame.object_of_keypoint));
   FrameReport& report = state.report;
   report.undecided_foregrounds = 0;
+  const auto detection_at = [&](std::size_t i) { return detail::detection_of_keypoint(i, frame, state); };
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     const TrackedBox<Scalar>& box = state.boxes[b];
-    const bool by_index = !frame.object_of_keypoint.empty() && !box.compensated();
-    const bool segmented = by_index || detail::has_label(box, frame.labels);
-    const auto belongs = [&](std::size_t i) {
-      if (state.label[i] == KeypointLabel::invalid) return false;
-      const auto& [x, y] = state.current.keypoints[i];
-      return by_index ? frame.object_of_keypoint[i] == box.detection : detail::lies_on(box, frame.labels, x, y);
-    };
     const bool by_depth = detail::is_told_by_depth(box, options);
-    const ForegroundResult separated = detail::separate_members(
+    const auto [by_mask, separated] = detail::find_members(
         box, PointSpan<Scalar, 2>(state.current.keypoints),
-        by_depth ? span<const Scalar>(state.current.depths) : span<const Scalar>(), belongs, options, state);
+        by_depth ? span<const Scalar>(state.current.depths) : span<const Scalar>(), detection_at, options, state);
     if (separated.status == ForegroundStatus::ok)
       state.current.object_depths.push_back({box.id, static_cast<Scalar>(separated.depth_m)});
-    else if (by_depth && !segmented)
+    else if (by_depth && !by_mask)
       ++report.undecided_foregrounds;
-    if (segmented) std::fill(state.scratch.mask.begin(), state.scratch.mask.end(), char(1));
+    if (by_mask) detail::take_what_masks_leave_out(box.box, detection_at, state);
     detail::label_members(b, options, state);
   }
   report.stray_labels = detail::stray_labels(frame, state);

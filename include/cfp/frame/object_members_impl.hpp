@@ -12,19 +12,6 @@
 namespace cfp::detail {
 inline namespace CFP_ISA {
 
-/// Whether the frame's labels tell what belongs to the object of a box; a compensated box has no label.
-template <typename Scalar>
-[[nodiscard]] bool has_label(const TrackedBox<Scalar>& box, const LabelImage& labels) noexcept {
-  return !labels.empty() && !box.compensated();
-}
-
-/// Whether a pixel belongs to an object: by its label if it has one, else by its box.
-template <typename Scalar>
-[[nodiscard]] CFP_INLINE bool lies_on(const TrackedBox<Scalar>& box, const LabelImage& labels, Scalar x,
-                                      Scalar y) noexcept {
-  return has_label(box, labels) ? label_at(labels, x, y) == box.detection + 1 : contains(box.box, x, y);
-}
-
 /// Whether depth tells where an object stands, and what in its box or mask is farther.
 template <typename Scalar>
 [[nodiscard]] bool is_told_by_depth(const TrackedBox<Scalar>& box, const FrameOptions& options) noexcept {
@@ -33,19 +20,30 @@ template <typename Scalar>
                      [&](const ObjectClass& c) { return c.class_id == box.class_id && c.non_rigid; });
 }
 
-/// Sets scratch.members to the indices for which `belongs` holds, and marks in scratch.mask which of them lie on the
-/// object of the box: all where there are no depths, and where these cannot tell.
-template <typename Scalar, typename Belongs>
-ForegroundResult separate_members(const TrackedBox<Scalar>& box, const PointSpan<Scalar, 2>& pixels,
-                                  span<const Scalar> depths, const Belongs& belongs, const FrameOptions& options,
-                                  FrameState<Scalar>& state) {
+/// How the members of an object were found, and what depth says of them.
+struct ObjectMembers {
+  bool by_mask = false;
+  ForegroundResult separated;
+};
+
+/// Sets scratch.members to the pixels that `detection_at(i)` names for the box's detection or, where it names none, as
+/// for a box without a mask, to those in the box. Marks in scratch.mask which of them lie on the object: all where
+/// there are no depths, and where these cannot tell.
+template <typename Scalar, typename DetectionAt>
+ObjectMembers find_members(const TrackedBox<Scalar>& box, const PointSpan<Scalar, 2>& pixels, span<const Scalar> depths,
+                           const DetectionAt& detection_at, const FrameOptions& options, FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
   scratch.members.clear();
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    if (belongs(i)) scratch.members.push_back(static_cast<std::int32_t>(i));
-  }
+  const auto take = [&](const auto& belongs) {
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      if (belongs(i)) scratch.members.push_back(static_cast<std::int32_t>(i));
+    }
+  };
+  if (!box.compensated()) take([&](std::size_t i) { return detection_at(i) == box.detection; });
+  const bool by_mask = !scratch.members.empty();
+  if (!by_mask) take([&](std::size_t i) { return contains(box.box, pixels(i, 0), pixels(i, 1)); });
   scratch.mask.assign(scratch.members.size(), char(1));
-  if (depths.empty()) return {};
+  if (depths.empty()) return {by_mask, {}};
   scratch.depths.clear();
   scratch.points.clear();
   for (const std::int32_t member : scratch.members) {
@@ -55,7 +53,7 @@ ForegroundResult separate_members(const TrackedBox<Scalar>& box, const PointSpan
   }
   ForegroundInput<Scalar> in{scratch.depths, scratch.points, box.box};
   if (state.previous.known) in.previous_depth_m = object_depth(state.previous, box.id);
-  return depth_foreground(in, options.coarse.foreground, scratch.foreground, scratch.mask);
+  return {by_mask, depth_foreground(in, options.coarse.foreground, scratch.foreground, scratch.mask)};
 }
 
 }  // namespace CFP_ISA
