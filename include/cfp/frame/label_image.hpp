@@ -12,7 +12,7 @@ namespace cfp {
 /// A view of 8-bit labels: 0 is nothing, v belongs to detection v - 1. A semantic mask with one label is one object.
 struct LabelImage {
   const std::uint8_t* labels = nullptr;  ///< nullptr: there is no segmentation
-  int width = 0, height = 0;             ///< px
+  int width = 0, height = 0;             ///< px, those of the image that the keypoints are of
   std::size_t row_bytes = 0;             ///< from one row to the next
 
   [[nodiscard]] bool empty() const noexcept { return labels == nullptr || width <= 0 || height <= 0; }
