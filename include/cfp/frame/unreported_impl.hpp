@@ -44,9 +44,9 @@ void measure_room(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow,
     flow_distances(model, flow, camera, options, span<Scalar>(room_distances));
 }
 
-/// Puts the flow pairs on no object into scratch.grid where they move, into scratch.resting where they do not, and
-/// their scores into scratch.samples. Whether few enough move that this is not the camera, whose motion must rest on
-/// more than a few of them, too.
+/// Puts the flow pairs on no object, and those of known depth on one, into scratch.grid where they move, into
+/// scratch.resting where they do not, and their scores into scratch.samples. Whether few enough of those on no object
+/// move that this is not the camera, whose motion must rest on more than a few of them, too.
 template <typename Scalar>
 [[nodiscard]] bool gather_pairs_outside(const FlowPairs<Scalar>& flow, const FrameOptions& options,
                                         FrameState<Scalar>& state) {
@@ -56,18 +56,23 @@ template <typename Scalar>
   FrameScratch<Scalar>& scratch = state.scratch;
   const std::vector<Scalar>& distances =
       state.report.flow_model == FlowModelKind::motion_up_to_scale ? scratch.room_distances : state.flow_distances;
+  const bool by_depth = state.report.flow_model == FlowModelKind::motion && !flow.previous_depths.empty();
   const std::size_t n = flow.current.size();
   scratch.samples.assign(n, Scalar(-1));  // of pairs without a score
-  std::size_t moving = 0, all = 0;
+  std::size_t moving = 0, moving_outside = 0, all = 0;
   for (std::size_t p = 0; p < n; ++p) {
-    if (scratch.outside[p] == 0 || !has_distance(distances[p])) continue;
+    const bool outside = scratch.outside[p] != 0;
+    const bool asked = outside || (by_depth && is_valid_depth(flow.previous_depths[p]));
+    if (!asked || !has_distance(distances[p])) continue;
     scratch.samples[p] = object_score(distances[p], scored);
-    moving += scratch.samples[p] < threshold ? 1U : 0U;
-    ++all;
+    const bool moves = scratch.samples[p] < threshold;
+    moving += moves ? 1U : 0U;
+    moving_outside += moves && outside ? 1U : 0U;
+    all += outside ? 1U : 0U;
   }
-  if (moving < unreported.pairs || static_cast<double>(moving) > unreported.max_share * static_cast<double>(all))
+  if (moving < unreported.pairs ||
+      static_cast<double>(moving_outside) > unreported.max_share * static_cast<double>(all))
     return false;
-  const bool by_depth = state.report.flow_model == FlowModelKind::motion && !flow.previous_depths.empty();
   if (by_depth && 2 * share_with_depth(flow, span<const char>(scratch.outside)) < unreported.min_known_depths)
     return false;
   const Scalar radius_px = static_cast<Scalar>(unreported.radius_px);
@@ -78,8 +83,9 @@ template <typename Scalar>
   return true;
 }
 
-/// Of the pairs near keypoint i, at its depth where both have one: the median score of the nearest `pairs` that move,
-/// if these are nearer than as many that rest; -1 if not.
+/// Of the pairs near keypoint i, at its depth where both have one, and on no object where not: the median score of the
+/// nearest `pairs` that move, if these are nearer than as many that rest; -1 if not. Boxes seldom hold all of a person:
+/// what sticks out of one is told by the pairs in it.
 template <typename Scalar>
 [[nodiscard]] Scalar score_moving_near(std::size_t i, const FlowPairs<Scalar>& flow, const FrameOptions& options,
                                        FrameState<Scalar>& state) {
@@ -92,9 +98,10 @@ template <typename Scalar>
   const auto visit_here = [&](const PointGrid<Scalar>& grid, Scalar below_sq, const auto& visit) {
     visit_near(grid, x, y, [&](const auto& pair) {
       const Scalar apart_sq = (pair.x - x) * (pair.x - x) + (pair.y - y) * (pair.y - y);
-      const bool elsewhere = by_depth && is_valid_depth(flow.previous_depths[pair.index]) &&
-                             std::abs(flow.previous_depths[pair.index] - depth) > reach;
-      return apart_sq < below_sq && !elsewhere && visit(pair.index, apart_sq);
+      const bool here = by_depth && is_valid_depth(flow.previous_depths[pair.index])
+                            ? std::abs(flow.previous_depths[pair.index] - depth) <= reach
+                            : state.scratch.outside[pair.index] != 0;
+      return apart_sq < below_sq && here && visit(pair.index, apart_sq);
     });
   };
   FrameScratch<Scalar>& scratch = state.scratch;
