@@ -176,7 +176,7 @@ TEST_CASE("A report that nothing was counted for counts nothing", "[core]") {
   const cfp::FrameReport report;
   CHECK((report.stage == cfp::Stage::coarse && report.time == cfp::Status::ok && report.flow_sigma_px == 0));
   CHECK((report.flow_model == cfp::FlowModelKind::none && report.flow_support == cfp::FlowSupport::none));
-  CHECK(report.flow_status == cfp::RansacStatus::not_enough_data);
+  CHECK((report.flow_status == cfp::RansacStatus::not_enough_data && !report.motion_refused));
   const cfp::FrameHealth health;
   CHECK((health.observations == 0 && health.weight == 0 && health.effective_points == 0 && health.box_share == 0));
   CHECK(health.fallback == cfp::WeightFallback::none);

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -110,6 +111,65 @@ TEST_CASE("A host's motion that errs as it says makes nobody who stands move", "
   CHECK(as_exact == 0);
   CHECK(with_sigmas == 5);
   CHECK(one_camera == 5);
+}
+
+TEST_CASE("A host's motion that errs by more than it says is refused and makes nobody who stands move", "[frame]") {
+  cfp_test::DynamicSceneOptions standing;
+  standing.person_motion_m = 0;
+  const cfp::SE3<double> error =
+      cfp::se3_exp((cfp::Vector6<double>() << 0.01, -0.01, 0.01, 0.003, 0.003, -0.003).finished());
+  for (const std::uint64_t seed : {61U, 62U, 63U, 64U, 65U}) {
+    const DynamicScene<double> scene = make_dynamic_scene<double>(standing, seed);
+    FrameRun<double> run(scene);
+    cfp::Frame<double> frame = run.frame();
+    frame.flow.previous_depths = scene.previous_depths;
+    const auto judged = [&](const cfp::SE3<double>& T) {
+      frame.T_cur_prev = {T, 0.001, 0.0003};
+      return run.coarse({}, frame, scene.camera).motion_refused;
+    };
+    CHECK(judged(error * scene.T_cur_prev));
+    CHECK(run.state.objects[0].static_probability > cfp::FrameOptions().object_threshold);
+    CHECK_FALSE(judged(scene.T_cur_prev));
+    frame.T_cur_prev.reset();
+    CHECK_FALSE(run.coarse({}, frame, scene.camera).motion_refused);
+  }
+}
+
+TEST_CASE("A host's motion is believed against a flow that something unreported took along", "[frame]") {
+  cfp_test::DynamicSceneOptions board;
+  board.people = 1, board.points_per_person = 600, board.wall_points = 250;
+  for (const std::uint64_t seed : {96U, 97U, 98U}) {
+    FrameRun<double> run(make_dynamic_scene<double>(board, seed));
+    run.scene.boxes.clear();
+    cfp::Frame<double> frame = run.frame();
+    frame.flow.previous_depths = run.scene.previous_depths;
+    const auto error_m = [&] {
+      const auto& T = run.state.current.motion.motion.T_cur_prev;
+      return (T * run.scene.T_cur_prev.inverse()).translation.norm();
+    };
+    run.coarse({}, frame, run.scene.camera);
+    CHECK(error_m() > 0.01);
+    frame.T_cur_prev = {run.scene.T_cur_prev, 0.003, 0.001};
+    CHECK_FALSE(run.coarse({}, frame, run.scene.camera).motion_refused);
+    CHECK(error_m() < 0.001);
+  }
+}
+
+TEST_CASE("A host's motion that is not finite counts as none", "[frame]") {
+  const DynamicScene<double> scene = make_dynamic_scene<double>({}, 61);
+  FrameRun<double> run(scene);
+  cfp::Frame<double> frame = run.frame();
+  frame.flow.previous_depths = scene.previous_depths;
+  run.coarse({}, frame, scene.camera);
+  const double without = run.state.objects[0].static_probability;
+  for (const double sigma : {0.0, 0.001}) {
+    frame.T_cur_prev = {scene.T_cur_prev, sigma, sigma};
+    frame.T_cur_prev->T_cur_prev.translation.x() = std::numeric_limits<double>::quiet_NaN();
+    const cfp::FrameReport report = run.coarse({}, frame, scene.camera);
+    CHECK(report.motion_refused);
+    CHECK((report.flow_support == cfp::FlowSupport::outside_pairs && report.unknown_objects == 0));
+    CHECK(run.state.objects[0].static_probability == without);
+  }
 }
 
 TEST_CASE("A host's motion stands in where the flow tells none", "[frame]") {

@@ -56,23 +56,31 @@ inline namespace CFP_ISA {
 }
 
 /// Two independent estimates of one motion as one, to first order in what they differ by; the given one if it is exact.
-/// The measured one where the covariances have no common inverse, the squared Mahalanobis distance between the two is
-/// above the most, or anything is not finite.
+/// False, and the result untouched, where the covariances have no common inverse, the squared Mahalanobis distance
+/// between the two is above the most, or anything is not finite.
+template <typename Scalar>
+[[nodiscard]] bool join(const UncertainMotion<double>& given, const UncertainMotion<non_deduced<Scalar>>& measured,
+                        double most_distance_sq, UncertainMotion<Scalar>& result) noexcept {
+  const UncertainMotion<double> other = measured.template cast<double>();
+  Matrix6<double> inverse;
+  if (!invert_normal_equations<6>(Matrix6<double>(given.covariance + other.covariance), 1e-12, inverse)) return false;
+  const Vector6<double> apart = se3_log(other.T_cur_prev * given.T_cur_prev.inverse());
+  if (!(apart.dot(inverse.lazyProduct(apart)) <= most_distance_sq)) return false;
+  const Matrix6<double> gain = given.covariance.lazyProduct(inverse);
+  const Vector6<double> correction = gain.lazyProduct(apart);
+  UncertainMotion<double> both(se3_exp(correction) * given.T_cur_prev);
+  both.covariance = gain.lazyProduct(other.covariance);
+  result = both.template cast<Scalar>();
+  return true;
+}
+
+/// The same; the measured one where they do not join.
 template <typename Scalar>
 [[nodiscard]] UncertainMotion<Scalar> joined(
     const UncertainMotion<double>& given, const UncertainMotion<Scalar>& measured,
     double most_distance_sq = (std::numeric_limits<double>::infinity)()) noexcept {
-  const UncertainMotion<double> other = measured.template cast<double>();
-  Matrix6<double> inverse;
-  if (!invert_normal_equations<6>(Matrix6<double>(given.covariance + other.covariance), 1e-12, inverse))
-    return measured;
-  const Vector6<double> apart = se3_log(other.T_cur_prev * given.T_cur_prev.inverse());
-  if (!(apart.dot(inverse.lazyProduct(apart)) <= most_distance_sq)) return measured;
-  const Matrix6<double> gain = given.covariance.lazyProduct(inverse);
-  const Vector6<double> correction = gain.lazyProduct(apart);
-  UncertainMotion<double> result(se3_exp(correction) * given.T_cur_prev);
-  result.covariance = gain.lazyProduct(other.covariance);
-  return result.template cast<Scalar>();
+  UncertainMotion<Scalar> result = measured;
+  return join(given, measured, most_distance_sq, result) ? result : measured;
 }
 
 }  // namespace CFP_ISA
