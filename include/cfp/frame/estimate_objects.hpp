@@ -3,10 +3,10 @@
 #pragma once
 
 #include <algorithm>
-#include <optional>
 #include <utility>
 
 #include "cfp/frame/flow_model.hpp"
+#include "cfp/frame/frame_flow_model_impl.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
 #include "cfp/frame/object_members_impl.hpp"
@@ -18,89 +18,6 @@ namespace cfp {
 
 namespace detail {
 inline namespace CFP_ISA {
-
-/// Two motions that differ by more are not one: chi^2 of 6 degrees of freedom, one in a thousand.
-inline constexpr double most_motion_distance_sq = 22.5;
-
-/// The motion of the flow's depths joined with what the frame before lets expect if the two agree, for a camera that is
-/// pushed keeps no velocity.
-template <typename Scalar>
-[[nodiscard]] UncertainMotion<Scalar> joined_with_expected(const UncertainMotion<Scalar>& measured,
-                                                           const TimedMotion& last, double time_s,
-                                                           double acceleration_m_s2) noexcept {
-  if (!(acceleration_m_s2 > 0 && last.time_s > 0 && time_s > 0)) return measured;
-  return joined(predicted_motion(last, time_s, acceleration_m_s2), measured, most_motion_distance_sq);
-}
-
-/// Joins the flow's motion with the host's. Where they disagree, one is wrong: the flow's if most of the pairs on no
-/// object that it leaves unexplained agree to the host's, for then something that nobody reported took it along; the
-/// host's if not, and false.
-template <typename Scalar>
-[[nodiscard]] bool join_with_given(const UncertainMotion<double>& given, const FlowPairs<Scalar>& flow,
-                                   span<const char> outside, const PinholeCamera<Scalar>& camera,
-                                   const FlowModelOptions& options, FlowModel<Scalar>& model,
-                                   CameraMotionWorkspace<Scalar>& workspace) {
-  if (join(given, model.motion, most_motion_distance_sq, model.motion)) return true;
-  FlowModel<Scalar> as_given = model;
-  as_given.motion = given.template cast<Scalar>();
-  std::vector<Scalar>&by_flow = workspace.distances, &by_given = workspace.sigmas;
-  by_flow.resize(outside.size());
-  by_given.resize(outside.size());
-  flow_distances(model, flow, camera, options, span<Scalar>(by_flow));
-  flow_distances(as_given, flow, camera, options, span<Scalar>(by_given));
-  const Scalar most_px = Scalar(3) * noise_of(model, options);
-  std::size_t unexplained = 0, by_host = 0;
-  for (std::size_t i = 0; i < outside.size(); ++i) {
-    if (outside[i] == 0 || !(by_flow[i] > most_px)) continue;
-    ++unexplained;
-    by_host += has_distance(by_given[i]) && by_given[i] <= most_px ? 1U : 0U;
-  }
-  if (unexplained < options.motion.min_pairs || 2 * by_host <= unexplained) return false;
-  model = as_given;
-  return true;
-}
-
-/// What the flow pairs are judged by: the host's motion if it is exact, or its F; else the model of the pairs outside
-/// all boxes, joined with the host's motion where it is one of known depths, and that motion alone where there is none.
-/// Without boxes few depths are left out: see UnreportedOptions::min_known_depths.
-template <typename Scalar>
-[[nodiscard]] FlowModel<Scalar> flow_model(const Frame<Scalar>& frame, const FlowPairs<Scalar>& undistorted_flow,
-                                           const PinholeCamera<Scalar>& camera, const CoarseOptions& coarse,
-                                           FrameState<Scalar>& state) {
-  const FlowModelOptions& options = coarse.flow;
-  const span<const char> outside(state.scratch.outside);
-  std::optional<UncertainMotion<double>> given = frame.T_cur_prev;
-  if (given &&
-      !is_finite(given->T_cur_prev.rotation.sum() + given->T_cur_prev.translation.sum() + given->covariance.sum()))
-    given.reset();
-  state.report.motion_refused = frame.T_cur_prev && !given;
-  const bool exact = given && given->covariance.isZero(0);
-  FlowModel<Scalar> model;
-  if (!exact && !frame.fundamental) {
-    FlowPairs<Scalar> judges = undistorted_flow;
-    if (state.boxes.empty() && !given && share_with_depth(judges, outside) < coarse.unreported.min_known_depths)
-      judges.previous_depths = {};
-    model = estimate_flow_model(judges, outside, camera, options, state.scratch.flow);
-    if (model.kind == FlowModelKind::motion) {
-      const double time_s = elapsed_s(state);
-      if (given)
-        state.report.motion_refused =
-            !join_with_given(*given, judges, outside, camera, options, model, state.scratch.flow.motion);
-      else
-        model.motion =
-            joined_with_expected(model.motion, state.previous.motion, time_s, options.camera_acceleration_m_s2);
-      state.current.motion = {model.motion.template cast<double>(), time_s};
-    }
-    if (!given || model.kind != FlowModelKind::none) return model;
-  }
-  model.support = FlowSupport::caller;
-  model.status = RansacStatus::ok;
-  model.kind = exact || !frame.fundamental ? FlowModelKind::motion : FlowModelKind::fundamental;
-  if (given) model.motion = given->template cast<Scalar>();
-  if (frame.fundamental) model.F = *frame.fundamental;
-  measure_sigma(undistorted_flow, outside, camera, options, model, state.scratch.flow.distances);
-  return model;
-}
 
 /// Labels undecided the pairs just outside of a box, but for those behind its object.
 template <typename Scalar>
