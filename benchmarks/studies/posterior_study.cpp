@@ -65,10 +65,19 @@ enum class FlowSource {
   matched_inside  ///< these in boxes, tracked outside
 };
 
+/// What tells which keypoints are on the people: their boxes, or an index of them, as of a mask.
+enum class Masks {
+  none,
+  exact,
+  legless,   ///< leaves out what is in the lowest quarter of a box
+  of_first,  ///< of the first detection only
+};
+
 struct Rule {
   std::string name;
   cfp::FrameOptions options;
   FlowSource flow = FlowSource::all;
+  Masks masks = Masks::none;
   bool mean = false;         ///< the mean of K and M as weight, whatever the options say
   bool independent = false;  ///< K beside E as if they were independent: without keypoint_evidence
   int detector_every = 1;    ///< so manieth frame alone has detections; judged is what lies in those of any frame
@@ -98,6 +107,7 @@ class Tracker {
     input.depths = frame.depths;
     if (frames_ % rule_.detector_every == 0)
       input.detections = cfp::span<const cfp::Detection<double>>(frame.detections);
+    if (input.detections && rule_.masks != Masks::none) input.object_of_keypoint = masked(frame);
     input.flow = flow(frame);
     input.map_point_probability = m_;
     cfp::StageResult<double> stage = probability_.coarse(input);
@@ -146,6 +156,20 @@ class Tracker {
   static bool is_detected(const SeenFrame& frame, const std::array<double, 2>& p) {
     return std::any_of(frame.detections.begin(), frame.detections.end(),
                        [&](const auto& d) { return cfp::contains(d.box, p[0], p[1]); });
+  }
+
+  const std::vector<std::int32_t>& masked(const SeenFrame& frame) {
+    object_.assign(frame.points.size(), cfp::no_object);
+    for (std::size_t i = 0; i < frame.points.size(); ++i) {
+      const auto& [x, y] = frame.pixels[i];
+      if (frame.points[i].label == PointLabel::room) continue;
+      for (std::size_t d = 0; d < frame.detections.size() && (d == 0 || rule_.masks != Masks::of_first); ++d) {
+        const cfp::Box<double>& box = frame.detections[d].box;
+        const double bottom = rule_.masks == Masks::legless ? box.y2 - box.height() / 4 : box.y2;
+        if (cfp::contains(box, x, y) && y <= bottom) object_[i] = static_cast<std::int32_t>(d);
+      }
+    }
+    return object_;
   }
 
   cfp::FlowPairs<double> flow(const SeenFrame& frame) {
@@ -300,6 +324,7 @@ class Tracker {
   std::vector<std::array<double, 3>> points_;
   std::vector<std::array<double, 2>> pixels_, last_pixels_, from_, to_;
   std::vector<std::size_t> keypoint_;
+  std::vector<std::int32_t> object_;
   std::vector<char> inlier_, is_static_, object_is_static_;
   double error_sq_ = 0, brier_sum_ = 0, brier_count_ = 0;
   int frames_ = 0;
@@ -324,6 +349,9 @@ std::vector<Rule> rules() {
   add("matches for flow", nothing).flow = FlowSource::matches;
   add("matches in boxes", nothing).flow = FlowSource::matched_inside;
   add("object's O alone", [](auto& o) { o.coarse.flow_radius_px = 0; });
+  add("masks", nothing).masks = Masks::exact;
+  add("masks without legs", nothing).masks = Masks::legless;
+  add("masks of the first", nothing).masks = Masks::of_first;
   for (const int every : {5, 10, 30}) {
     for (const int max_idle : {0, 30}) {
       add("every " + std::to_string(every) + "th, idle " + std::to_string(max_idle), [&](auto& o) {

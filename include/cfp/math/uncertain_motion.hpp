@@ -59,7 +59,7 @@ inline namespace CFP_ISA {
 /// False, and the result untouched, where the covariances have no common inverse, the squared Mahalanobis distance
 /// between the two is above the most, or anything is not finite.
 template <typename Scalar>
-[[nodiscard]] bool join(const UncertainMotion<double>& given, const UncertainMotion<non_deduced<Scalar>>& measured,
+[[nodiscard]] bool join(const UncertainMotion<double>& given, const UncertainMotion<Scalar>& measured,
                         double most_distance_sq, UncertainMotion<Scalar>& result) noexcept {
   const UncertainMotion<double> other = measured.template cast<double>();
   Matrix6<double> inverse;
