@@ -51,8 +51,8 @@ struct Frame {
   std::optional<span<const Detection<Scalar>>> detections;
   FlowPairs<Scalar> flow;  ///< empty: the objects are unknown
   /// For hosts that segment: per keypoint, the index of the detection it lies on, or no_object. What in a box lies on
-  /// the object then comes from it, but for what depth puts behind. A detection that it never names, and a compensated
-  /// box, are as without.
+  /// the object then comes from it, not from depths. A detection that it never names, and a compensated box, are as
+  /// without.
   span<const std::int32_t> object_of_keypoint;
   LabelImage labels;           ///< the same as an image: label v belongs to detection v - 1
   DescriptorSpan descriptors;  ///< binary, one per keypoint: `fine` then matches what lies in boxes by itself

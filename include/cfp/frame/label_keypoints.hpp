@@ -115,10 +115,10 @@ inline namespace CFP_ISA {
 
 /// Sets K, label and box of every keypoint from state.boxes and state.objects. A keypoint on several objects takes the
 /// smallest of their K, and that box decides for it from then on (ties: foreground before background, then the lower
-/// index). Keypoints on no object keep K = 1. Where a mask or object_of_keypoint names any keypoint for a box, these
-/// are its members, else all in the box; those that depth tells are farther are background, and so is what lies in the
-/// box and on no mask: masks spill over a silhouette and leave some of it out, and the flow at its place tells such a
-/// keypoint. O(keypoints x boxes), and keypoints x flow pairs within each box. Outside of boxes the flow is asked as
+/// index). Keypoints on no object keep K = 1. What a mask or object_of_keypoint gives an object is its foreground;
+/// depth then only tells where it stands, and what lies in its box and on no mask is background: masks leave out hands
+/// and feet, which the flow at their place tells (cfp_posterior_study). In a box for which nothing is named depth
+/// decides. O(keypoints x boxes), and keypoints x flow pairs within each box. Outside of boxes the flow is asked as
 /// UnreportedOptions say.
 template <typename Scalar>
 void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
@@ -137,7 +137,10 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
       state.current.object_depths.push_back({box.id, static_cast<Scalar>(separated.depth_m)});
     else if (by_depth && !by_mask)
       ++report.undecided_foregrounds;
-    if (by_mask) detail::take_what_masks_leave_out(box.box, detection_at, state);
+    if (by_mask) {
+      std::fill(state.scratch.mask.begin(), state.scratch.mask.end(), char(1));
+      detail::take_what_masks_leave_out(box.box, detection_at, state);
+    }
     detail::label_members(b, options, state);
   }
   report.stray_labels = detail::stray_labels(frame, state);
