@@ -7,6 +7,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 GUARD = "if(mpStaticWeights) "
+OPTIMIZER = "src/Optimizer.cc"
 
 
 def new_frame(depth):
@@ -19,11 +20,27 @@ def reset(before):
     return (before, r"if(mpStaticWeights)\n    {\n        mpStaticWeights->Reset();\n        mFlow.Reset();\n    }\n\n    \1", 1)
 
 
-def weighted(function, edges):
+def weighted(step, function, edges):
     """The information and the kernels of edges whose weight is w."""
-    return [(function[0], "src/Optimizer.cc", function[1], r"Identity\(\) ?\* ?invSigma2", r"Identity()*(w*invSigma2)", edges),
-            (function[0], "src/Optimizer.cc", function[1], r"setDelta\(((?:delta|thHuber)\w+)\)", r"setDelta(\1*sqrt(w))",
-             edges)]
+    return [(step, OPTIMIZER, function, r"Identity\(\) ?\* ?invSigma2", r"Identity()*(w*invSigma2)", edges),
+            (step, OPTIMIZER, function, r"setDelta\(((?:delta|thHuber)\w+)\)", r"setDelta(\1*sqrt(w))", edges)]
+
+
+def weighted_points(step, function, kinds, edges):
+    """A bundle adjustment: the edges of each kind with M of their points, which is kept beside them."""
+    return [(step, OPTIMIZER, function, r"(\n    vector<MapPoint\*> vpMapPointEdgeMono;)",
+             r"\n    vector<float> " + ", ".join("vWeight" + kind for kind in kinds) + r";\1", 1),
+            (step, OPTIMIZER, function, r"(\n[ \t]*)(g2o::VertexSBAPointXYZ\* vPoint = new)",
+             r"\1const float w = max(pMP->mStaticProbability.load(),0.01f);  // read once: tracking goes on learning\1\2", 1),
+            *weighted(step, function, edges),
+            (step, OPTIMIZER, function, r"(\n[ \t]*)(vpEdges(" + "|".join(kinds) + r")\.push_back\(e\);)",
+             r"\1\2\1vWeight\3.push_back(w);", edges)]
+
+
+def without_dynamic_points(step, function, times):
+    """A bundle adjustment that takes no points of M = 0."""
+    return (step, OPTIMIZER, function, r"if\(!pMP->isBad\(\)([^\n]*\)\n[\s{]*if\(pMP->mnBALocalForKF)",
+            r"if(!pMP->isBad() && pMP->mStaticProbability>0\1", times)
 
 
 def adapter(host, supported):
@@ -45,9 +62,6 @@ def adapter(host, supported):
 
 
 LOCAL_BA = "Optimizer::LocalBundleAdjustment(KeyFrame *pKF, bool"
-LEAVE_OUT = [r"if\(!pMP->isBad\(\)([^\n]*\)\n[\s{]*if\(pMP->mnBALocalForKF)", r"if(!pMP->isBad() && pMP->mStaticProbability>0\1"]
-POINT_WEIGHT = [r"(\n[ \t]*)(g2o::VertexSBAPointXYZ\* vPoint = new)",
-                r"\1const float w = max(pMP->mStaticProbability.load(),0.01f);  // read once: tracking goes on learning\1\2", 1]
 TAKE_PART = (r"\1\2const float w = Weight(pFrame,i);\2if(!(w>0))\2{\2"
              r"    pFrame->mvbOutlier[i] = false;\2    continue;\2}\n")
 
@@ -65,16 +79,12 @@ ORB_SLAM2 = [
     (4, "src/Tracking.cc", "Tracking::StereoInitialization()", r"(new MapPoint\(x3D,pKFini,mpMap\);)",
      r"\1\n                pNewMP->mStaticProbability = InitialM(mCurrentFrame,i);", 1),
     (5, "src/Tracking.cc", "", r"Optimizer::PoseOptimization\(&mCurrentFrame\)", "PoseOptimization()", 6),
-    (5, "src/Optimizer.cc", "Optimizer::PoseOptimization(", r"if\(chi2>(chi2\w+\[it\])\)",
+    (5, OPTIMIZER, "Optimizer::PoseOptimization(", r"if\(chi2>(chi2\w+\[it\])\)",
      r"if(chi2>\1*Weight(pFrame,idx))", 2),
-    *weighted((5, "Optimizer::PoseOptimization("), 2),
-    (11, "src/Optimizer.cc", LOCAL_BA, r"(\n    vector<MapPoint\*> vpMapPointEdgeMono;)",
-     r"\n    vector<float> vWeightMono, vWeightStereo;\1", 1),
-    *weighted((11, LOCAL_BA), 2),
-    (11, "src/Optimizer.cc", LOCAL_BA, r"(\n[ \t]*)(vpEdges(Mono|Stereo)\.push_back\(e\);)",
-     r"\1\2\1vWeight\3.push_back(w);", 2),
-    (11, "src/Optimizer.cc", LOCAL_BA, r"e->chi2\(\)>5\.991", "e->chi2()>5.991*vWeightMono[i]", 2),
-    (11, "src/Optimizer.cc", LOCAL_BA, r"e->chi2\(\)>7\.815", "e->chi2()>7.815*vWeightStereo[i]", 2),
+    *weighted(5, "Optimizer::PoseOptimization(", 2),
+    *weighted_points(11, LOCAL_BA, ["Mono", "Stereo"], 2),
+    (11, OPTIMIZER, LOCAL_BA, r"e->chi2\(\)>5\.991", "e->chi2()>5.991*vWeightMono[i]", 2),
+    (11, OPTIMIZER, LOCAL_BA, r"e->chi2\(\)>7\.815", "e->chi2()>7.815*vWeightStereo[i]", 2),
 ]
 
 INERTIAL = [f"Optimizer::PoseInertialOptimizationLast{last}(" for last in ("KeyFrame", "Frame")]
@@ -89,29 +99,20 @@ ORB_SLAM3 = [
     (5, "src/Tracking.cc", "", r"Optimizer::PoseOptimization\(&mCurrentFrame\)", "PoseOptimization()", 7),
     (5, "src/Tracking.cc", "Tracking::TrackLocalMap()", r"(\n[ \t]*)(inliers = Optimizer::PoseInertial)",
      r"\1" + GUARD + r"mpStaticWeights->Weigh(mCurrentFrame);\1\2", 2),
-    (5, "src/Optimizer.cc", "Optimizer::PoseOptimization(", r"if\(chi2>(chi2\w+\[it\])\)",
+    (5, OPTIMIZER, "Optimizer::PoseOptimization(", r"if\(chi2>(chi2\w+\[it\])\)",
      r"if(chi2>\1*Weight(pFrame,idx))", 3),
-    *weighted((5, "Optimizer::PoseOptimization("), 4),
-    (11, "src/Optimizer.cc", LOCAL_BA, r"(\n    vector<MapPoint\*> vpMapPointEdgeMono;)",
-     r"\n    vector<float> vWeightMono, vWeightBody, vWeightStereo;\1", 1),
-    *weighted((11, LOCAL_BA), 3),
-    (11, "src/Optimizer.cc", LOCAL_BA, r"(\n[ \t]*)(vpEdges(Mono|Body|Stereo)\.push_back\(e\);)",
-     r"\1\2\1vWeight\3.push_back(w);", 3),
-    (11, "src/Optimizer.cc", LOCAL_BA, r"(= vpEdges(\w+)\[i\];[^}]*?e->chi2\(\)>[\d.]+)", r"\1*vWeight\2[i]", 3),
+    *weighted(5, "Optimizer::PoseOptimization(", 4),
+    *weighted_points(11, LOCAL_BA, ["Mono", "Body", "Stereo"], 3),
+    (11, OPTIMIZER, LOCAL_BA, r"(= vpEdges(\w+)\[i\];[^}]*?e->chi2\(\)>[\d.]+)", r"\1*vWeight\2[i]", 3),
     # 12: the same with an IMU
     *[step for function in INERTIAL for step in [
-        (12, "src/Optimizer.cc", function, r"(\n            if\(pMP\)\n            \{)(\n                )", TAKE_PART + r"\2", 1),
-        *weighted((12, function), 3),
-        (12, "src/Optimizer.cc", function, r"chi2>(chi2(?:\w+\[it\]|close))", r"chi2>\1*Weight(pFrame,idx)", 3),
-        (12, "src/Optimizer.cc", function, r"chi2\(\)<(chi2\w+Out)", r"chi2()<\1*Weight(pFrame,idx)", 2)]],
-    (12, "src/Optimizer.cc", INERTIAL_BA, *LEAVE_OUT, 2),
-    (12, "src/Optimizer.cc", INERTIAL_BA, r"(\n    vector<MapPoint\*> vpMapPointEdgeMono;)",
-     r"\n    vector<float> vWeightMono, vWeightStereo;\1", 1),
-    (12, "src/Optimizer.cc", INERTIAL_BA, *POINT_WEIGHT),
-    *weighted((12, INERTIAL_BA), 3),
-    (12, "src/Optimizer.cc", INERTIAL_BA, r"(\n[ \t]*)(vpEdges(Mono|Stereo)\.push_back\(e\);)",
-     r"\1\2\1vWeight\3.push_back(w);", 3),
-    (12, "src/Optimizer.cc", INERTIAL_BA, r"chi2(Mono|Stereo)2( &&|\))", r"chi2\g<1>2*vWeight\1[i]\2", 3),
+        (12, OPTIMIZER, function, r"(\n            if\(pMP\)\n            \{)(\n                )", TAKE_PART + r"\2", 1),
+        *weighted(12, function, 3),
+        (12, OPTIMIZER, function, r"chi2>(chi2(?:\w+\[it\]|close))", r"chi2>\1*Weight(pFrame,idx)", 3),
+        (12, OPTIMIZER, function, r"chi2\(\)<(chi2\w+Out)", r"chi2()<\1*Weight(pFrame,idx)", 2)]],
+    without_dynamic_points(12, INERTIAL_BA, 2),
+    *weighted_points(12, INERTIAL_BA, ["Mono", "Stereo"], 3),
+    (12, OPTIMIZER, INERTIAL_BA, r"chi2(Mono|Stereo)2( &&|\))", r"chi2\g<1>2*vWeight\1[i]\2", 3),
 ]
 
 BOTH = [
@@ -166,10 +167,10 @@ BOTH = [
     (5, "src/Tracking.cc", "", r"(\nbool Tracking::TrackReferenceKeyFrame\(\)\n)",
      r"\nint Tracking::PoseOptimization()\n{\n    " + GUARD + r"mpStaticWeights->Weigh(mCurrentFrame);\n"
      r"    return Optimizer::PoseOptimization(&mCurrentFrame);\n}\n\1", 1),
-    (5, "src/Optimizer.cc", "", r"(\nint Optimizer::PoseOptimization\(Frame \*pFrame\)\n)",
+    (5, OPTIMIZER, "", r"(\nint Optimizer::PoseOptimization\(Frame \*pFrame\)\n)",
      r"\nstatic float Weight(const Frame *pFrame, size_t i)\n{\n"
      r"    return pFrame->mvWeight.empty() ? 1.0f : pFrame->mvWeight[i];\n}\n\1", 1),
-    (5, "src/Optimizer.cc", "Optimizer::PoseOptimization(", r"(\n        if\(pMP\)\n        \{)(\n            )",
+    (5, OPTIMIZER, "Optimizer::PoseOptimization(", r"(\n        if\(pMP\)\n        \{)(\n            )",
      TAKE_PART + r"\2", 1),
     # 6: after the first pose
     (6, "src/Tracking.cc", "Tracking::Track()", r"(// If we have an initial estimation of the camera pose)",
@@ -210,6 +211,5 @@ BOTH = [
      r"const float found = pMP->GetFound();\n    pMP->mStaticProbability ="
      r" (found*pMP->mStaticProbability+nfound*mStaticProbability)/(found+nfound);\n    \1", 1),
     # 11: local bundle adjustment
-    (11, "src/Optimizer.cc", LOCAL_BA, *LEAVE_OUT, 1),
-    (11, "src/Optimizer.cc", LOCAL_BA, *POINT_WEIGHT),
+    without_dynamic_points(11, LOCAL_BA, 1),
 ]
