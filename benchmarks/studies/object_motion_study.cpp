@@ -13,7 +13,7 @@
 // motion of the frame before adds, by FlowModelOptions::camera_acceleration_m_s2, where the camera's velocity changes
 // (a hand: 0.6 m/s^2 in the truth of TUM's fr3_walking_xyz at 30 Hz). Then with one camera, no depths at all, in five
 // kinds of scene and at three frame rates: with the fundamental matrix alone, and with the motion up to scale where
-// there is none.
+// there is none, or with a host's motion, which the flow refines.
 //   cfp_object_motion_study [N per cell, default 20] [seed, default 1] | --smoke
 //
 // The simulator: 640 x 480 at 30 Hz, f = 535 px. Camera: still; sideways or forward 0.3 m/s; rotating 20 deg/s; both;

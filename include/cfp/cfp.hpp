@@ -41,6 +41,7 @@
 #include "cfp/frame/label_keypoints.hpp"
 #include "cfp/frame/match_in_boxes.hpp"
 #include "cfp/frame/pose_health.hpp"
+#include "cfp/frame/refine_motion.hpp"
 #include "cfp/frame/static_probability.hpp"
 #include "cfp/frame/track_boxes.hpp"
 #include "cfp/frame/weigh_keypoints.hpp"

@@ -210,6 +210,7 @@ static void instantiate_frame() noexcept {
   use(&cfp::estimate_flow_model<Scalar>);
   use(&cfp::flow_distances<Scalar>);
   use(&cfp::estimate_camera_motion<Scalar>);
+  use(&cfp::refine_camera_motion<Scalar>);
   use(&cfp::joined<Scalar>);
   use(&cfp::robust_sigma<Scalar>);
   use(&cfp::remember_objects<Scalar>);

@@ -132,11 +132,13 @@
   CFP_LAYOUT_OPAQUE(cfp::PnpRansacResult<double>)                        \
   CFP_LAYOUT(cfp::BundleWorkspace, schur)                            \
   CFP_LAYOUT(cfp::FlowModelOptions, ransac)                              \
-  CFP_LAYOUT(cfp::FlowModel<float>, sigma_px)                            \
-  CFP_LAYOUT(cfp::FlowModel<double>, sigma_px)                           \
+  CFP_LAYOUT(cfp::FlowModel<float>, coordinates)                         \
+  CFP_LAYOUT(cfp::FlowModel<double>, coordinates)                        \
   CFP_LAYOUT(cfp::CameraMotionOptions, pose)                             \
-  CFP_LAYOUT(cfp::CameraMotion<float>, sigma_px)                         \
-  CFP_LAYOUT(cfp::CameraMotion<double>, sigma_px)                        \
+  CFP_LAYOUT(cfp::CameraMotion<float>, coordinates)                      \
+  CFP_LAYOUT(cfp::RefinedMotion<float>, contradicted)                    \
+  CFP_LAYOUT(cfp::CameraMotion<double>, coordinates)                     \
+  CFP_LAYOUT(cfp::RefinedMotion<double>, contradicted)                   \
   CFP_LAYOUT(cfp::CameraMotionWorkspace<float>, search)                  \
   CFP_LAYOUT(cfp::CameraMotionWorkspace<double>, search)                 \
   CFP_LAYOUT(cfp::UnknownDepth, inverse_sigma)                           \

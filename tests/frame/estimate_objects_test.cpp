@@ -177,7 +177,7 @@ TEST_CASE("A host's motion stands in where the flow tells none", "[frame]") {
   FrameRun<double> run(scene);
   cfp::FrameOptions options;
   options.coarse.flow.use_depth = options.coarse.flow.use_motion_up_to_scale = false;
-  options.coarse.flow.min_outside_pairs = 100000;  // no F
+  options.coarse.flow.min_outside_pairs = options.coarse.flow.motion.min_pairs = 100000;  // no F, nothing refined
   cfp::Frame<double> frame = run.frame();
   frame.flow.previous_depths = scene.previous_depths;
   frame.T_cur_prev = {scene.T_cur_prev, 0.001, 0.0001};

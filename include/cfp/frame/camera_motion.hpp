@@ -43,6 +43,7 @@ template <typename Scalar>
 struct CameraMotion : UncertainMotion<Scalar> {
   bool known = false;
   Scalar sigma_px = Scalar(1);  ///< standard deviation of one coordinate of a static flow pair, robust
+  int coordinates = 2;          ///< of a pixel that most distances see: one where a depth is unknown and counts
 
   CFP_INLINE CameraMotion() noexcept {}  // NOLINT(modernize-use-equals-default): inline
 };

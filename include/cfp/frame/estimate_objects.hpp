@@ -136,6 +136,7 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   report.flow_support = model.support == FlowSupport::outside_pairs ? support : model.support;
   report.flow_status = model.status;
   report.flow_sigma_px = static_cast<double>(model.sigma_px);
+  report.flow_coordinates = model.coordinates;
   if (model.kind == FlowModelKind::none) return;
 
   state.flow_distances.resize(n);

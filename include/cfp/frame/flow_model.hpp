@@ -63,6 +63,7 @@ struct FlowModel {
   /// Of both kinds of motion; up to scale, the room's depth is the unit of length.
   UncertainMotion<Scalar> motion;
   Scalar sigma_px = Scalar(0);  ///< noise of one coordinate, measured on the pairs on no object; 0: not measured
+  int coordinates = 2;          ///< of a pixel that most distances see: 1 across lines
 
   CFP_INLINE FlowModel() noexcept {}  // NOLINT(modernize-use-equals-default): inline
 };
@@ -87,11 +88,6 @@ enum class PairLabel : std::uint8_t {
 
 inline namespace CFP_ISA {
 
-/// How many coordinates of a pixel the distances see: across a line one of two.
-[[nodiscard]] constexpr int coordinates_of(FlowModelKind kind) noexcept {
-  return kind == FlowModelKind::fundamental ? 1 : 2;
-}
-
 template <typename Scalar>
 [[nodiscard]] Scalar noise_of(const FlowModel<Scalar>& model, const FlowModelOptions& options) noexcept {
   return model.sigma_px > Scalar(0) ? model.sigma_px : Scalar(options.motion.min_sigma_px);
@@ -111,6 +107,7 @@ FlowModel<Scalar> estimate_motion_model(FlowModelKind kind, const FlowPairs<Scal
   model.status = RansacStatus::ok;
   model.motion = motion;
   model.sigma_px = motion.sigma_px;
+  model.coordinates = motion.coordinates;
   return model;
 }
 
@@ -125,7 +122,7 @@ void measure_sigma(const FlowPairs<Scalar>& flow, span<const char> outside, cons
     if (outside[i] != 0 && has_distance(distances[i])) distances[kept++] = distances[i];
   }
   if (kept < options.min_outside_pairs) return;
-  model.sigma_px = flow_sigma(span<Scalar>(distances.data(), kept), coordinates_of(model.kind), options.motion);
+  model.sigma_px = flow_sigma(span<Scalar>(distances.data(), kept), model.coordinates, options.motion);
 }
 
 /// The fundamental matrix of the pairs marked in `outside` and their noise; none of too few, or if they have none.
@@ -145,6 +142,7 @@ FlowModel<Scalar> estimate_fundamental(const FlowPairs<Scalar>& flow, span<const
   model.kind = FlowModelKind::fundamental;
   model.support = FlowSupport::outside_pairs;
   model.F = estimate.F;
+  model.coordinates = 1;
   measure_sigma(flow, outside, camera, options, model, workspace.distances);
   return model;
 }

@@ -58,10 +58,11 @@ struct Frame {
   DescriptorSpan descriptors;  ///< binary, one per keypoint: `fine` then matches what lies in boxes by itself
   span<const Scalar> map_point_probability;  ///< M per keypoint if matches are known by now, negative: no map point
   /// The camera's motion since frame k-1, if the host knows it by now, and its standard deviations in metres and
-  /// radians: {T, 0.003, 0.001}. Flow with depths is joined with it, or refuses it (FrameReport::motion_refused) where
-  /// the two differ by more than they may; an F, of the flow or the host's, comes before it unless it is exact. {T, 0,
-  /// 0} is exact: a millimetre that it errs then counts as the motion of whoever stands near. Not set: the motion of
-  /// the frame before is carried on, see FlowModelOptions::camera_acceleration_m_s2.
+  /// radians: {T, 0.003, 0.001}. Flow with depths is joined with it, flow without refines it (refine_camera_motion),
+  /// and either refuses it (FrameReport::motion_refused) where the two differ by more than they may; the host's F comes
+  /// before it unless it is exact. {T, 0, 0} is exact: a millimetre that it errs then counts as the motion of whoever
+  /// stands near. Not set: the motion of the frame before is carried on, see
+  /// FlowModelOptions::camera_acceleration_m_s2.
   std::optional<UncertainMotion<double>> T_cur_prev;
   std::optional<Matrix3<Scalar>> fundamental;   ///< F of the undistorted flow pairs, if the host has one
   std::optional<Matrix3<Scalar>> image_motion;  ///< homography from the previous image, moves the predicted boxes

@@ -9,14 +9,12 @@
 #include "cfp/frame/flow_model.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
+#include "cfp/frame/refine_motion.hpp"
 #include "cfp/frame/unreported_impl.hpp"
 #include "cfp/math/uncertain_motion.hpp"
 
 namespace cfp::detail {
 inline namespace CFP_ISA {
-
-/// Two motions that differ by more are not one: chi^2 of 6 degrees of freedom, one in a thousand.
-inline constexpr double most_motion_distance_sq = 22.5;
 
 /// The motion of the flow's depths joined with what the frame before lets expect if the two agree, for a camera that is
 /// pushed keeps no velocity.
@@ -56,14 +54,55 @@ template <typename Scalar>
   return true;
 }
 
-/// What the flow pairs are judged by: the host's motion if it is exact, or its F; else the model of the pairs outside
-/// all boxes, joined with the host's motion where it is one of known depths, and that motion alone where there is none.
-/// Without boxes few depths are left out: see UnreportedOptions::min_known_depths.
+/// The model by the pairs' depths, joined with the host's motion or what the frame before lets expect; none where they
+/// do not tell. Without boxes few depths are left out: see UnreportedOptions::min_known_depths.
+template <typename Scalar>
+[[nodiscard]] FlowModel<Scalar> model_by_depths(const std::optional<UncertainMotion<double>>& given,
+                                                FlowPairs<Scalar> flow, const PinholeCamera<Scalar>& camera,
+                                                const CoarseOptions& coarse, FrameState<Scalar>& state) {
+  const FlowModelOptions& options = coarse.flow;
+  const span<const char> outside(state.scratch.outside);
+  const bool few_known =
+      state.boxes.empty() && !given && share_with_depth(flow, outside) < coarse.unreported.min_known_depths;
+  if (!options.use_depth || few_known) return {};
+  FlowModel<Scalar> model =
+      estimate_motion_model(FlowModelKind::motion, flow, outside, camera, options, state.scratch.flow);
+  if (model.kind == FlowModelKind::none) return model;
+  const double time_s = elapsed_s(state);
+  if (given)
+    state.report.motion_refused =
+        !join_with_given(*given, flow, outside, camera, options, model, state.scratch.flow.motion);
+  else
+    model.motion = joined_with_expected(model.motion, state.previous.motion, time_s, options.camera_acceleration_m_s2);
+  state.current.motion = {model.motion.template cast<double>(), time_s};
+  return model;
+}
+
+/// The host's motion as a model: refined by the pairs and with their noise where enough agree to it; false if not.
+template <typename Scalar>
+[[nodiscard]] bool take_given(const UncertainMotion<double>& given, const FlowPairs<Scalar>& flow,
+                              const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
+                              FrameState<Scalar>& state, FlowModel<Scalar>& model) {
+  const RefinedMotion<Scalar> refined = refine_camera_motion(given, flow, span<const char>(state.scratch.outside),
+                                                             camera, options.motion, state.scratch.flow.distances);
+  const bool exact = given.covariance.isZero(0);
+  state.report.motion_refused = refined.contradicted && !exact;
+  model.kind = FlowModelKind::motion;
+  model.support = exact || !refined.known ? FlowSupport::caller : FlowSupport::outside_pairs;
+  model.status = RansacStatus::ok;
+  model.motion = refined.known ? UncertainMotion<Scalar>(refined) : given.template cast<Scalar>();
+  model.sigma_px = refined.known ? refined.sigma_px : Scalar(0);
+  model.coordinates = refined.coordinates;
+  return refined.known;
+}
+
+/// What the flow pairs are judged by: the host's F, unless it has an exact motion; else the motion by their depths,
+/// joined with the host's; else the host's motion, refined by them; else the F of the flow, or its motion up to scale;
+/// and where there is neither, the host's motion as it is.
 template <typename Scalar>
 [[nodiscard]] FlowModel<Scalar> flow_model(const Frame<Scalar>& frame, const FlowPairs<Scalar>& undistorted_flow,
                                            const PinholeCamera<Scalar>& camera, const CoarseOptions& coarse,
                                            FrameState<Scalar>& state) {
-  const FlowModelOptions& options = coarse.flow;
   const span<const char> outside(state.scratch.outside);
   std::optional<UncertainMotion<double>> given = frame.T_cur_prev;
   if (given &&
@@ -71,31 +110,22 @@ template <typename Scalar>
     given.reset();
   state.report.motion_refused = frame.T_cur_prev && !given;
   const bool exact = given && given->covariance.isZero(0);
-  FlowModel<Scalar> model;
-  if (!exact && !frame.fundamental) {
-    FlowPairs<Scalar> judges = undistorted_flow;
-    if (state.boxes.empty() && !given && share_with_depth(judges, outside) < coarse.unreported.min_known_depths)
-      judges.previous_depths = {};
-    model = estimate_flow_model(judges, outside, camera, options, state.scratch.flow);
-    if (model.kind == FlowModelKind::motion) {
-      const double time_s = elapsed_s(state);
-      if (given)
-        state.report.motion_refused =
-            !join_with_given(*given, judges, outside, camera, options, model, state.scratch.flow.motion);
-      else
-        model.motion =
-            joined_with_expected(model.motion, state.previous.motion, time_s, options.camera_acceleration_m_s2);
-      state.current.motion = {model.motion.template cast<double>(), time_s};
-    }
-    if (!given || model.kind != FlowModelKind::none) return model;
+  FlowModel<Scalar> model, as_given;
+  if (frame.fundamental && !exact) {
+    model.kind = FlowModelKind::fundamental;
+    model.support = FlowSupport::caller;
+    model.status = RansacStatus::ok;
+    model.F = *frame.fundamental;
+    model.coordinates = 1;
+    measure_sigma(undistorted_flow, outside, camera, coarse.flow, model, state.scratch.flow.distances);
+    return model;
   }
-  model.support = FlowSupport::caller;
-  model.status = RansacStatus::ok;
-  model.kind = exact || !frame.fundamental ? FlowModelKind::motion : FlowModelKind::fundamental;
-  if (given) model.motion = given->template cast<Scalar>();
-  if (frame.fundamental) model.F = *frame.fundamental;
-  measure_sigma(undistorted_flow, outside, camera, options, model, state.scratch.flow.distances);
-  return model;
+  if (!exact) model = model_by_depths(given, undistorted_flow, camera, coarse, state);
+  if (model.kind != FlowModelKind::none) return model;
+  if (given && (take_given(*given, undistorted_flow, camera, coarse.flow, state, as_given) || exact)) return as_given;
+  model = estimate_flow_model(FlowPairs<Scalar>{undistorted_flow.previous, undistorted_flow.current, {}}, outside,
+                              camera, coarse.flow, state.scratch.flow);
+  return model.kind == FlowModelKind::none ? as_given : model;
 }
 
 }  // namespace CFP_ISA

@@ -44,6 +44,7 @@ struct FrameReport {
   RansacStatus flow_status = RansacStatus::not_enough_data;  ///< and how its estimation ended
   bool motion_refused = false;                               ///< T_cur_prev: not finite, or the flow contradicts it
   double flow_sigma_px = 0;                                  ///< noise of the flow as measured; 0: not
+  int flow_coordinates = 2;  ///< of a pixel that most of its distances see: 1 across lines
   std::size_t unknown_objects = 0;                           ///< boxes whose O is not known
   // keypoints
   std::size_t outside = 0, foreground = 0, background = 0, invalid = 0;  ///< by label
@@ -141,7 +142,7 @@ template <typename Scalar>
 /// The options on the scale of the noise of this frame's flow.
 [[nodiscard]] inline ObjectProbabilityOptions scaled_to_flow(const ObjectProbabilityOptions& options,
                                                              const FrameReport& report) noexcept {
-  return scaled_to_noise(options, report.flow_sigma_px, coordinates_of(report.flow_model));
+  return scaled_to_noise(options, report.flow_sigma_px, report.flow_coordinates);
 }
 
 }  // namespace CFP_ISA

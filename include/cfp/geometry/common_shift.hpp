@@ -12,39 +12,6 @@
 
 namespace cfp {
 
-namespace detail {
-inline namespace CFP_ISA {
-
-/// Sums of the pairs in units of the noise: H += w M^T W^-1 M, g -= w M^T W^-1 r, W of the noise and of the depth's
-/// error, w of a Geman-McClure loss at `moved`. Returns w, 0 of what is not finite.
-template <typename Scalar>
-double add_to_shift(const MotionResidual<Scalar>& pair, double sigma_px, const Vector6<double>& moved,
-                    NormalEquations<6>& sums) noexcept {
-  constexpr double loss_sq = 32;  // 4 sigma per coordinate
-  double r[2], e[2], j[2], M[2][6];
-  for (int q = 0; q < 2; ++q) {
-    e[q] = r[q] = static_cast<double>(pair.r[q]) / sigma_px;
-    j[q] = static_cast<double>(pair.along[q] * pair.sigma_z) / sigma_px;
-    for (int k = 0; k < 6; ++k) {
-      M[q][k] = static_cast<double>(pair.M[q][k]) / sigma_px;
-      e[q] -= M[q][k] * moved[k];
-    }
-  }
-  const double kept = 1 / (1 + j[0] * j[0] + j[1] * j[1]), explained = j[0] * e[0] + j[1] * e[1];
-  const double root = 1 / (1 + (e[0] * e[0] + e[1] * e[1] - explained * explained * kept) / loss_sq), w = root * root;
-  if (!is_finite(w)) return 0;
-  for (int a = 0; a < 6; ++a) {
-    const double share = (j[0] * M[0][a] + j[1] * M[1][a]) * kept;
-    const double m0 = w * (M[0][a] - j[0] * share), m1 = w * (M[1][a] - j[1] * share);
-    sums.g[a] -= m0 * r[0] + m1 * r[1];
-    for (int b = a; b < 6; ++b) sums.H(a, b) += m0 * M[0][b] + m1 * M[1][b];
-  }
-  return w;
-}
-
-}  // namespace CFP_ISA
-}  // namespace detail
-
 inline namespace CFP_ISA {
 
 /// How much better the pairs `members` are explained by one translation D of what they show than by a world at rest:
@@ -81,8 +48,8 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
       const Scalar depth = depths_prev[i];
       detail::MotionResidual<Scalar> pair;
       if (is_valid_depth(depth) &&
-          detail::motion_residual<Camera, Scalar>(prev[i], depth, cur[i], motion.T_cur_prev, camera, options, pair))
-        count += detail::add_to_shift(pair, static_cast<double>(sigma_px), moved, sums);
+          detail::expected_residual<Camera, Scalar>(prev[i], depth, cur[i], motion.T_cur_prev, camera, options, pair))
+        count += detail::add_pair(pair, static_cast<double>(sigma_px), moved, sums).weight;
     }
     const double share = count > most_pairs ? most_pairs / count : 1;
     const Vector6<double> g = -share * sums.g;

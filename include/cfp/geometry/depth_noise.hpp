@@ -26,6 +26,11 @@ struct UnknownDepth {
   double inverse_sigma = 0.5;  ///< 1/m, >= 0
 };
 
+struct MotionDistanceOptions {
+  DepthNoise depth_noise;      ///< of a measured depth
+  UnknownDepth unknown_depth;  ///< of all others
+};
+
 inline namespace CFP_ISA {
 
 [[nodiscard]] constexpr OptionPath invalid_field(const DepthNoise& o) noexcept {
@@ -37,6 +42,11 @@ inline namespace CFP_ISA {
 [[nodiscard]] constexpr OptionPath invalid_field(const UnknownDepth& o) noexcept {
   if (!detail::positive(o.inverse_mean)) return "inverse_mean";
   return detail::non_negative(o.inverse_sigma) ? OptionPath() : "inverse_sigma";
+}
+
+[[nodiscard]] constexpr OptionPath invalid_field(const MotionDistanceOptions& o) noexcept {
+  if (const OptionPath field = nested("depth_noise", invalid_field(o.depth_noise))) return field;
+  return nested("unknown_depth", invalid_field(o.unknown_depth));
 }
 
 }  // namespace CFP_ISA

@@ -4,6 +4,7 @@
 /// of eq. 6, with none at all d^F of eq. 13, the distance from the epipolar line.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "cfp/core/numeric.hpp"
@@ -12,60 +13,28 @@
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/depth_noise.hpp"
 #include "cfp/geometry/distance.hpp"
-#include "cfp/math/matrix3.hpp"
+#include "cfp/geometry/motion_residual_impl.hpp"
 #include "cfp/math/se3.hpp"
 #include "cfp/math/uncertain_motion.hpp"
 
 namespace cfp {
 
-struct MotionDistanceOptions {
-  DepthNoise depth_noise;      ///< of a measured depth
-  UnknownDepth unknown_depth;  ///< of all others
-};
-
 namespace detail {
-
-/// A flow pair against the camera's motion.
-template <typename Scalar>
-struct MotionResidual {
-  Vector2<Scalar> r;      // pixel_cur - project(p), px
-  Vector2<Scalar> along;  // J = d project / d z, px/m
-  Scalar sigma_z;         // of the depth, m
-  Scalar M[2][6];         // d project / d xi
-};
-
 inline namespace CFP_ISA {
-
-/// False for a pixel without a ray or a point behind the current camera.
-template <typename Camera, typename Scalar>
-[[nodiscard]] bool motion_residual(const Vector2<Scalar>& pixel_prev, const Scalar& depth_prev,
-                                   const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
-                                   const Camera& camera, const MotionDistanceOptions& options,
-                                   MotionResidual<Scalar>& out) noexcept {
-  Vector3<Scalar> ray;
-  if (!camera.unproject(pixel_prev, ray)) return false;
-  const bool measured = is_valid_depth(depth_prev);
-  const Scalar z = measured ? depth_prev : Scalar(1 / options.unknown_depth.inverse_mean);
-  out.sigma_z = measured ? Scalar(options.depth_noise.sigma_m(static_cast<double>(z)))
-                         : z * z * Scalar(options.unknown_depth.inverse_sigma);
-  const Vector3<Scalar> turned = T_cur_prev.rotation * ray, point = turned * z + T_cur_prev.translation;
-  Vector2<Scalar> projected;
-  Matrix23<Scalar> jacobian;
-  if (!camera.project(point, projected, &jacobian)) return false;
-  out.r = pixel_cur - projected;
-  out.along = jacobian * turned;
-  // The rows of the Jacobian, and what turning the point about the camera makes of them.
-  for (int row = 0; row < 2; ++row) {
-    const Vector3<Scalar> by_point(jacobian(row, 0), jacobian(row, 1), jacobian(row, 2)),
-        turning = cross(point, by_point);
-    for (int i = 0; i < 3; ++i) out.M[row][i] = by_point[i], out.M[row][i + 3] = turning[i];
-  }
-  return true;
-}
 
 /// What distances are computed in: at least double, as det W may be a difference of large numbers.
 template <typename Scalar>
 using AtLeastDouble = decltype(Scalar() + double());
+
+/// What becomes of the motion where a depth is unknown: C of motion_distance.
+template <typename Real>
+[[nodiscard]] UncertainMotion<Real> at_unknown_depth(UncertainMotion<Real> motion, const UnknownDepth& depth) noexcept {
+  const double ratio = depth.inverse_sigma / depth.inverse_mean, more = 1 + (std::min)(ratio * ratio, 1.0);
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) motion.covariance(i, k) *= Real(more);
+  }
+  return motion;
+}
 
 /// motion_distance, with the 36 values of the motion's covariance; null: it is exact.
 template <typename Camera, typename Scalar>
@@ -77,7 +46,7 @@ template <typename Camera, typename Scalar>
   using Real = AtLeastDouble<Scalar>;
   const Scalar none = Scalar(no_distance<double>);
   MotionResidual<Scalar> pair;
-  if (!motion_residual(pixel_prev, depth_prev, pixel_cur, T_cur_prev, camera, options, pair)) return none;
+  if (!expected_residual(pixel_prev, depth_prev, pixel_cur, T_cur_prev, camera, options, pair)) return none;
   // W = I + A with A = M C M^T / sigma^2, and its inverse.
   Real a(0), b(0), c(0);
   if (covariance != nullptr) {
@@ -117,11 +86,6 @@ template <typename Camera, typename Scalar>
 
 inline namespace CFP_ISA {
 
-[[nodiscard]] constexpr OptionPath invalid_field(const MotionDistanceOptions& o) noexcept {
-  if (const OptionPath field = nested("depth_noise", invalid_field(o.depth_noise))) return field;
-  return nested("unknown_depth", invalid_field(o.unknown_depth));
-}
-
 /// The Mahalanobis distance of a pair from where a static point would have gone, times sigma_px, in pixels:
 ///
 ///   d = sigma sqrt(r^T (sigma^2 I + sigma_z^2 J J^T + M C M^T)^-1 r),
@@ -129,8 +93,10 @@ inline namespace CFP_ISA {
 /// r = pixel_cur - project(p), p = T_cur_prev X, X the previous pixel at its depth z, J = d project / d z,
 /// M = d project / d xi, C the motion's covariance. (d / sigma)^2 of a static point has two degrees of freedom. What an
 /// error of the depth explains, along the epipolar line, or of the motion, does not count; so a plane, a rotation or a
-/// resting camera is no special case. A depth that is not positive or not finite: see UnknownDepth. no_distance for a
-/// pixel without a ray, a point behind the current camera, or anything not finite. sigma_px > 0. Not in the paper.
+/// resting camera is no special case. A depth that is not positive or not finite: see UnknownDepth; the nearer, the more
+/// a translation moves a point, so that the covariance of the translation then counts 1 + (sigma / mean)^2 times, at
+/// most twice (cfp_object_motion_study). no_distance for a pixel without a ray, a point behind the current camera, or
+/// anything not finite. sigma_px > 0. Not in the paper.
 template <typename Camera, typename Scalar = typename Camera::ScalarType>
 [[nodiscard]] Scalar motion_distance(const Vector2<non_deduced<Scalar>>& pixel_prev,
                                      const non_deduced<Scalar>& depth_prev,
@@ -138,7 +104,8 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
                                      const UncertainMotion<non_deduced<Scalar>>& motion, const Camera& camera,
                                      const non_deduced<Scalar>& sigma_px,
                                      const MotionDistanceOptions& options) noexcept {
-  const auto precise = motion.template cast<detail::AtLeastDouble<Scalar>>();
+  auto precise = motion.template cast<detail::AtLeastDouble<Scalar>>();
+  if (!is_valid_depth(depth_prev)) precise = detail::at_unknown_depth(precise, options.unknown_depth);
   return detail::distance_under<Camera, Scalar>(pixel_prev, depth_prev, pixel_cur, motion.T_cur_prev,
                                                 precise.covariance.data(), camera, sigma_px, options);
 }
@@ -152,11 +119,14 @@ void motion_distances(const PointSpan<non_deduced<Scalar>, 2>& prev, span<const 
   CFP_ASSERT(prev.size() == out.size() && cur.size() == out.size());
   CFP_ASSERT(detail::fits(out.size(), depths_prev));
   const auto precise = motion.template cast<detail::AtLeastDouble<Scalar>>();
-  const auto* covariance = motion.covariance.isZero(0) ? nullptr : precise.covariance.data();
+  const auto without_depth = detail::at_unknown_depth(precise, options.unknown_depth);
+  const bool exact = motion.covariance.isZero(0);
   for (std::size_t i = 0; i < out.size(); ++i) {
     const Scalar depth = depths_prev.empty() ? Scalar(0) : depths_prev[i];
-    out[i] = detail::distance_under<Camera, Scalar>(prev[i], depth, cur[i], motion.T_cur_prev, covariance, camera,
-                                                    sigma_px, options);
+    const auto& uncertain = is_valid_depth(depth) ? precise : without_depth;
+    out[i] = detail::distance_under<Camera, Scalar>(prev[i], depth, cur[i], motion.T_cur_prev,
+                                                    exact ? nullptr : uncertain.covariance.data(), camera, sigma_px,
+                                                    options);
   }
 }
 

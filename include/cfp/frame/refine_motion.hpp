@@ -1,0 +1,179 @@
+/// @file refine_motion.hpp
+/// The camera's motion that a host knows, from an IMU or odometry, refined by flow pairs of which few or none have a
+/// depth. Not in the paper, whose fundamental matrix forgets what the host knows, and follows whoever holds most pairs.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "cfp/core/span.hpp"
+#include "cfp/frame/camera_motion.hpp"
+#include "cfp/frame/frame.hpp"
+#include "cfp/geometry/motion_distance.hpp"
+#include "cfp/math/normal_equations.hpp"
+#include "cfp/math/se3.hpp"
+#include "cfp/optimization/least_squares.hpp"
+
+namespace cfp {
+
+template <typename Scalar>
+struct RefinedMotion : CameraMotion<Scalar> {
+  double apart_sq = 0;        ///< from the host's motion, in squares of its sigmas
+  bool contradicted = false;  ///< by enough pairs: the host's motion is less certain than its covariance says
+
+  CFP_INLINE RefinedMotion() noexcept {}  // NOLINT(modernize-use-equals-default): inline
+};
+
+namespace detail {
+
+/// Two motions that differ by more are not one: chi-squared of 6 degrees of freedom, one in a thousand.
+inline constexpr double most_motion_distance_sq = 22.5;
+
+inline namespace CFP_ISA {
+
+/// The prior and the pairs on no object as a model of least_squares.hpp. The noise is given; the sums and the distances
+/// of the pairs, no_distance of those that do not count, are those of the last evaluation.
+template <typename Scalar>
+struct RefinementModel {
+  const UncertainMotion<double>& prior;
+  const Matrix6<double>& information;  // of the prior; 0: it is exact
+  const FlowPairs<Scalar>& flow;
+  span<const char> outside;
+  const PinholeCamera<Scalar>& camera;
+  const MotionDistanceOptions& options;
+  std::vector<Scalar>& distances;
+  Scalar sigma_px = 1;
+  double pairs = 0, agreeing = 0, coordinates = 0;  // the last two: sums by the weights of the loss
+
+  /// By how much T differs from the prior, in squares of its sigmas.
+  [[nodiscard]] double apart_sq(const SE3<double>& T) const noexcept {
+    const Vector6<double> moved = se3_log(T * prior.T_cur_prev.inverse());
+    return moved.dot(information.lazyProduct(moved));
+  }
+  double linearize(const SE3<double>& T_cur_prev, NormalEquations<6>& equations) noexcept {
+    const SE3<Scalar> T = T_cur_prev.template cast<Scalar>();
+    equations.H = information;
+    equations.g = information.lazyProduct(se3_log(T_cur_prev * prior.T_cur_prev.inverse()));
+    double cost = apart_sq(T_cur_prev);
+    pairs = agreeing = coordinates = 0;
+    for (std::size_t i = 0; i < outside.size(); ++i) {
+      distances[i] = Scalar(no_distance<double>);
+      if (outside[i] == 0) continue;
+      ++pairs;
+      const Scalar depth = flow.previous_depths.empty() ? Scalar(0) : flow.previous_depths[i];
+      MotionResidual<Scalar> pair;
+      if (!likely_residual<PinholeCamera<Scalar>, Scalar>(flow.previous[i], depth, flow.current[i], T, camera, sigma_px,
+                                                          options, pair))
+        continue;
+      const PairTerm term = add_pair(pair, static_cast<double>(sigma_px), Vector6<double>::Zero(), equations);
+      if (!(term.weight > 0)) continue;
+      agreeing += term.weight;
+      coordinates += term.weight * term.coordinates;
+      cost += term.distance_sq * std::sqrt(term.weight);
+      distances[i] = sigma_px * static_cast<Scalar>(std::sqrt(term.distance_sq));
+    }
+    return cost;
+  }
+  [[nodiscard]] SE3<double> moved(const SE3<double>& T, const Vector6<double>& step) const noexcept {
+    return se3_exp(step) * T;
+  }
+};
+
+/// From the prior, which counts as one more observation; the first round with a loss of `first_scale` times its width.
+/// An exact prior stays as it is.
+template <typename Scalar>
+[[nodiscard]] RefinedMotion<Scalar> refine_from(const UncertainMotion<double>& prior, const FlowPairs<Scalar>& flow,
+                                                span<const char> outside, const PinholeCamera<Scalar>& camera,
+                                                const CameraMotionOptions& options, double first_scale,
+                                                std::vector<Scalar>& distances) {
+  constexpr int rounds = 2;
+  LevenbergMarquardtOptions steps;
+  steps.max_iterations = 4;
+  steps.min_relative_decrease = 1e-3;
+  RefinedMotion<Scalar> motion;
+  const bool exact = prior.covariance.isZero(0);
+  UncertainMotion<double> refined = prior;
+  Matrix6<double> information = Matrix6<double>::Zero(), covariance;
+  if (!exact && !invert_normal_equations<6>(Matrix6<double>(prior.covariance), 1e-14, information)) return motion;
+  distances.resize(outside.size());
+  RefinementModel<Scalar> model{prior, information, flow, outside, camera, options.distance, distances};
+  model.sigma_px = Scalar(options.max_sigma_px);
+  const auto measure_noise = [&] {
+    NormalEquations<6> equations;
+    model.linearize(refined.T_cur_prev, equations);
+    motion.coordinates = model.coordinates > 1.5 * model.agreeing ? 2 : 1;
+    model.sigma_px = motion.sigma_px = flow_sigma(span<Scalar>(distances), motion.coordinates, options);
+    return model.pairs >= static_cast<double>(options.min_pairs) && model.agreeing > 0;
+  };
+  for (int round = 0; round < rounds; ++round) {
+    if (!measure_noise()) return motion;
+    if (exact) continue;
+    if (round == 0) model.sigma_px *= static_cast<Scalar>(first_scale);
+    DenseLeastSquares<6, SE3<double>, RefinementModel<Scalar>> problem(model, refined.T_cur_prev, 1e-14);
+    minimize_least_squares(problem, steps);
+    if (!invert_normal_equations<6>(problem.equations().H, 1e-14, covariance)) return motion;
+    refined.T_cur_prev = problem.state();
+    refined.covariance = covariance;
+  }
+  motion.known = measure_noise() && model.agreeing >= options.min_inlier_share * model.pairs;
+  static_cast<UncertainMotion<Scalar>&>(motion) = refined.template cast<Scalar>();
+  motion.apart_sq = model.apart_sq(refined.T_cur_prev);
+  return motion;
+}
+
+/// A tight loss keeps to the prior where something that moves would take a wide one along, and loses a prior that errs
+/// much: whichever leaves less noise, where that of the wide one is more than the flow's own may be.
+template <typename Scalar>
+[[nodiscard]] RefinedMotion<Scalar> refine_wide_or_tight(const UncertainMotion<double>& prior,
+                                                         const FlowPairs<Scalar>& flow, span<const char> outside,
+                                                         const PinholeCamera<Scalar>& camera,
+                                                         const CameraMotionOptions& options,
+                                                         std::vector<Scalar>& distances) {
+  const auto refine = [&](double scale) {
+    return refine_from(prior, flow, outside, camera, options, scale, distances);
+  };
+  const RefinedMotion<Scalar> wide = refine(1);
+  if (wide.known && wide.sigma_px <= Scalar(options.search_above_px)) return wide;
+  const RefinedMotion<Scalar> tight = refine(1.0 / 3);
+  return tight.known && !(wide.known && wide.sigma_px <= tight.sigma_px) ? tight : wide;
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
+
+inline namespace CFP_ISA {
+
+/// The motion that minimises
+///
+///   (xi - xi_0)^T C^-1 (xi - xi_0) + sum of rho(r_i^T (sigma^2 I + sigma_z^2 J_i J_i^T)^-1 r_i)
+///
+/// over the pairs of the undistorted image that `outside` marks as on no object: xi_0 and C the host's motion and its
+/// covariance, r, J and sigma_z of motion_distance, where a depth is unknown at the one that fits best, rho Geman and
+/// McClure's loss at four times the noise, which is measured. The length of the translation is then the host's, as one
+/// camera cannot tell it. Where the result is farther from the host's motion than one in a thousand, C grows until it
+/// is not (apart_sq / 6 times), and all begins again: `contradicted`. Unknown with fewer than options.min_pairs pairs,
+/// where less than min_inlier_share of them agree, where C has no inverse, or if even the larger C is contradicted. An
+/// exact motion (C = 0) stays, and the noise of the pairs is measured. O(pairs); allocates `distances` alone. Not in
+/// the paper (cfp_object_motion_study).
+template <typename Scalar>
+[[nodiscard]] RefinedMotion<Scalar> refine_camera_motion(UncertainMotion<double> prior, const FlowPairs<Scalar>& flow,
+                                                         span<const char> outside, const PinholeCamera<Scalar>& camera,
+                                                         const CameraMotionOptions& options,
+                                                         std::vector<Scalar>& distances) {
+  CFP_ASSERT(outside.size() == flow.current.size());
+  const auto refine = [&] { return detail::refine_wide_or_tight(prior, flow, outside, camera, options, distances); };
+  RefinedMotion<Scalar> motion = refine();
+  const auto inside = static_cast<std::size_t>(std::count(outside.begin(), outside.end(), char(0)));
+  motion.contradicted =
+      motion.known ? motion.apart_sq > detail::most_motion_distance_sq : outside.size() - inside >= options.min_pairs;
+  if (!motion.known || !motion.contradicted) return motion;
+  prior.covariance *= motion.apart_sq / 6;
+  motion = refine();
+  motion.contradicted = true;
+  motion.known = motion.known && motion.apart_sq <= detail::most_motion_distance_sq;
+  return motion;
+}
+
+}  // namespace CFP_ISA
+}  // namespace cfp

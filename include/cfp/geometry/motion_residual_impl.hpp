@@ -1,0 +1,117 @@
+/// @file motion_residual_impl.hpp
+/// A flow pair against the camera's motion, linearised, for motion_distance.hpp, common_shift.hpp and
+/// refine_motion.hpp. Not an interface.
+#pragma once
+
+#include <algorithm>
+
+#include "cfp/core/numeric.hpp"
+#include "cfp/core/types.hpp"
+#include "cfp/geometry/depth_noise.hpp"
+#include "cfp/geometry/distance.hpp"
+#include "cfp/math/matrix3.hpp"
+#include "cfp/math/normal_equations.hpp"
+#include "cfp/math/se3.hpp"
+
+namespace cfp::detail {
+
+/// A flow pair against the camera's motion.
+template <typename Scalar>
+struct MotionResidual {
+  Vector2<Scalar> r;      // pixel_cur - project(p), px
+  Vector2<Scalar> along;  // J = d project / d z, px/m
+  Scalar sigma_z;         // of the depth, m
+  Scalar M[2][6];         // d project / d xi
+};
+
+/// What a pair says of a motion, in units of the noise.
+struct PairTerm {
+  double weight = 0;       // of a Geman-McClure loss; 0 of what is not finite
+  double distance_sq = 0;  // Mahalanobis, of the noise and of the depth's error
+  double coordinates = 0;  // of the pixel that tell: 2, and down to 1 where the depth may be anything
+};
+
+inline namespace CFP_ISA {
+
+/// At depth z. False for a pixel without a ray or a point behind the current camera.
+template <typename Camera, typename Scalar>
+[[nodiscard]] bool motion_residual(const Vector2<Scalar>& pixel_prev, const Scalar& z, const Vector2<Scalar>& pixel_cur,
+                                   const SE3<Scalar>& T_cur_prev, const Camera& camera,
+                                   MotionResidual<Scalar>& out) noexcept {
+  Vector3<Scalar> ray;
+  if (!camera.unproject(pixel_prev, ray)) return false;
+  const Vector3<Scalar> turned = T_cur_prev.rotation * ray, point = turned * z + T_cur_prev.translation;
+  Vector2<Scalar> projected;
+  Matrix23<Scalar> jacobian;
+  if (!camera.project(point, projected, &jacobian)) return false;
+  out.r = pixel_cur - projected;
+  out.along = jacobian * turned;
+  // The rows of the Jacobian, and what turning the point about the camera makes of them.
+  for (int row = 0; row < 2; ++row) {
+    const Vector3<Scalar> by_point(jacobian(row, 0), jacobian(row, 1), jacobian(row, 2)),
+        turning = cross(point, by_point);
+    for (int i = 0; i < 3; ++i) out.M[row][i] = by_point[i], out.M[row][i + 3] = turning[i];
+  }
+  return true;
+}
+
+/// At the measured depth, or at the mean of an unknown one.
+template <typename Camera, typename Scalar>
+[[nodiscard]] bool expected_residual(const Vector2<Scalar>& pixel_prev, const Scalar& depth_prev,
+                                     const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
+                                     const Camera& camera, const MotionDistanceOptions& options,
+                                     MotionResidual<Scalar>& out) noexcept {
+  const bool measured = is_valid_depth(depth_prev);
+  const Scalar z = measured ? depth_prev : Scalar(1 / options.unknown_depth.inverse_mean);
+  out.sigma_z = measured ? Scalar(options.depth_noise.sigma_m(static_cast<double>(z)))
+                         : z * z * Scalar(options.unknown_depth.inverse_sigma);
+  return motion_residual(pixel_prev, z, pixel_cur, T_cur_prev, camera, out);
+}
+
+/// At the measured depth, or at that which fits the pair best among what is likely of an unknown one: a Gauss-Newton
+/// step from the mean of its inverse. So what is left is noise, and the pair as near as it seems.
+template <typename Camera, typename Scalar>
+[[nodiscard]] bool likely_residual(const Vector2<Scalar>& pixel_prev, const Scalar& depth_prev,
+                                   const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
+                                   const Camera& camera, const Scalar& sigma_px, const MotionDistanceOptions& options,
+                                   MotionResidual<Scalar>& out) noexcept {
+  if (!expected_residual(pixel_prev, depth_prev, pixel_cur, T_cur_prev, camera, options, out)) return false;
+  if (is_valid_depth(depth_prev)) return true;
+  const Scalar mean = Scalar(options.unknown_depth.inverse_mean), sigma = Scalar(options.unknown_depth.inverse_sigma);
+  const Scalar variance = out.sigma_z * out.sigma_z;
+  const Scalar farther = variance * out.along.dot(out.r) / (sigma_px * sigma_px + variance * out.along.squaredNorm());
+  const Scalar inverse = std::clamp(mean - farther * mean * mean, mean / 50, mean + 6 * sigma), z = 1 / inverse;
+  out.sigma_z = z * z * sigma;
+  return motion_residual(pixel_prev, z, pixel_cur, T_cur_prev, camera, out);
+}
+
+/// Adds a pair in units of the noise: H += w M^T W^-1 M, g -= w M^T W^-1 r, W of the noise and of the depth's error, w
+/// of the loss at xi = `moved`.
+template <typename Scalar>
+PairTerm add_pair(const MotionResidual<Scalar>& pair, double sigma_px, const Vector6<double>& moved,
+                  NormalEquations<6>& sums) noexcept {
+  constexpr double loss_sq = 32;  // 4 sigma per coordinate
+  double r[2], e[2], j[2], M[2][6];
+  for (int q = 0; q < 2; ++q) {
+    e[q] = r[q] = static_cast<double>(pair.r[q]) / sigma_px;
+    j[q] = static_cast<double>(pair.along[q] * pair.sigma_z) / sigma_px;
+    for (int k = 0; k < 6; ++k) {
+      M[q][k] = static_cast<double>(pair.M[q][k]) / sigma_px;
+      e[q] -= M[q][k] * moved[k];
+    }
+  }
+  const double kept = 1 / (1 + j[0] * j[0] + j[1] * j[1]), explained = j[0] * e[0] + j[1] * e[1];
+  const double distance_sq = (std::max)(e[0] * e[0] + e[1] * e[1] - explained * explained * kept, 0.0);
+  const double root = 1 / (1 + distance_sq / loss_sq), w = root * root;
+  if (!is_finite(w)) return {};
+  for (int a = 0; a < 6; ++a) {
+    const double share = (j[0] * M[0][a] + j[1] * M[1][a]) * kept;
+    const double m0 = w * (M[0][a] - j[0] * share), m1 = w * (M[1][a] - j[1] * share);
+    sums.g[a] -= m0 * r[0] + m1 * r[1];
+    for (int b = a; b < 6; ++b) sums.H(a, b) += m0 * M[0][b] + m1 * M[1][b];
+  }
+  return {w, distance_sq, 1 + kept};
+}
+
+}  // namespace CFP_ISA
+}  // namespace cfp::detail
