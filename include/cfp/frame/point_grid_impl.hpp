@@ -25,17 +25,18 @@ struct PointGrid {
   std::vector<Point> points, unsorted;  // by cell, row by row; of one cell by index
   std::vector<std::uint32_t> first;     // of each cell
   Scalar left = 0, top = 0, width = 0, height = 0, reach = 0;
+  Scalar columns_per_px = 0, rows_per_px = 0;
 
   static constexpr std::size_t side = 32;  // columns, and rows, over the extent of the points
 };
 
 inline namespace CFP_ISA {
 
-/// Which column or row a place lies in; the outermost ones hold all beyond, and 0 / 0 lies in the first.
+/// Which column or row a place lies in; the outermost ones hold all beyond, and no number lies in the first.
 template <typename Scalar>
-[[nodiscard]] std::size_t cell_at(Scalar offset, Scalar extent) noexcept {
-  constexpr Scalar side = PointGrid<Scalar>::side;
-  return static_cast<std::uint32_t>((std::min)((std::max)(Scalar(0), offset / extent * side), side - 1));
+[[nodiscard]] std::size_t cell_at(Scalar offset, Scalar cells_per_px) noexcept {
+  constexpr Scalar last = PointGrid<Scalar>::side - 1;
+  return static_cast<std::uint32_t>((std::min)((std::max)(Scalar(0), offset * cells_per_px), last));
 }
 
 /// Puts those of the points for which `keep(index)` holds, all finite, into cells. Later `reach` is how near is near.
@@ -54,8 +55,9 @@ void fill_grid(const PointSpan<Scalar, 2>& points, const Keep& keep, Scalar reac
   constexpr std::size_t side = PointGrid<Scalar>::side;
   const Vector2<Scalar> size = high - low;
   grid.left = low.x(), grid.top = low.y(), grid.width = size.x(), grid.height = size.y(), grid.reach = reach;
+  grid.columns_per_px = Scalar(side) / grid.width, grid.rows_per_px = Scalar(side) / grid.height;
   const auto cell = [&](const auto& p) {
-    return cell_at(p.y - grid.top, grid.height) * side + cell_at(p.x - grid.left, grid.width);
+    return cell_at(p.y - grid.top, grid.rows_per_px) * side + cell_at(p.x - grid.left, grid.columns_per_px);
   };
   grid.first.assign(side * side + 2, 0);
   for (const auto& p : grid.unsorted) ++grid.first[cell(p) + 2];
@@ -68,8 +70,8 @@ void fill_grid(const PointSpan<Scalar, 2>& points, const Keep& keep, Scalar reac
 template <typename Scalar, typename Visit>
 void visit_near(const PointGrid<Scalar>& grid, Scalar x, Scalar y, const Visit& visit) {
   const Scalar from_left = x - grid.left, from_top = y - grid.top;
-  const auto column = [&](Scalar offset) { return cell_at(from_left + offset, grid.width); };
-  const auto row = [&](Scalar offset) { return cell_at(from_top + offset, grid.height); };
+  const auto column = [&](Scalar offset) { return cell_at(from_left + offset, grid.columns_per_px); };
+  const auto row = [&](Scalar offset) { return cell_at(from_top + offset, grid.rows_per_px); };
   const std::size_t left = column(-grid.reach), right = column(grid.reach), bottom = row(grid.reach);
   for (std::size_t r = row(-grid.reach); r <= bottom; ++r) {
     const std::size_t end = grid.first[r * grid.side + right + 1];
