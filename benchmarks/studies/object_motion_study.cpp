@@ -5,7 +5,8 @@
 // "pairs one by one" leaves out what they share, "shared, 5 pairs" and "60 pairs" are other ObjectProbabilityOptions::
 // shift_pairs.
 // Then the same in a bare room, whose motion says little of a person who is near; "motion taken as exact" leaves its
-// covariance out; "a host's motion" is the true one with errors of 3 mm and 1 mrad, and these as its sigmas. Then with
+// covariance out; "a host's motion" is the true one with errors of 3 mm and 1 mrad, and these as its sigmas, a "wrong"
+// one errs by five times as much as it says. Then with
 // 5, 15 and 30 % of the depths wrong by anything before furniture and walls, with
 // CameraMotionOptions::nearest_share and shared_depth_ratio and without. Then with 10 to 14 points on the person, by
 // ObjectProbabilityOptions::min_pairs. Then how soon somebody who sways counts as moving, and how often somebody at
@@ -196,7 +197,7 @@ Scene simulate(const Cell& cell, const Room& room, double frame_s, double wrong_
 }
 
 /// What a host hands over as the camera's motion.
-enum class Given { nothing, pairs_as_exact, prediction_as_exact, prediction };
+enum class Given { nothing, pairs_as_exact, prediction_as_exact, prediction, wrong_prediction };
 
 struct Way {
   const char* name = "";
@@ -208,7 +209,7 @@ struct Way {
 constexpr double host_error_m = 0.003, host_error_rad = 0.001;
 
 std::vector<Way> ways() {
-  std::vector<Way> all(13);
+  std::vector<Way> all(14);
   all[0].name = "as printed";
   all[1].name = "without depths";
   all[2].name = "depth";
@@ -222,6 +223,7 @@ std::vector<Way> ways() {
   all[10].name = "depth, pairs one by one";
   all[11].name = "depth, shared, 5 pairs";
   all[12].name = "depth, shared, 60 pairs";
+  all[13].name = "depth, a host's wrong motion";
   all[0].options.coarse.flow.use_motion_up_to_scale = false;
   all[0].options.coarse.flow.use_depth = all[1].options.coarse.flow.use_depth = false;
   all[0].options.coarse.object.noise_factor = all[4].options.coarse.object.noise_factor = 0;
@@ -234,6 +236,7 @@ std::vector<Way> ways() {
   all[10].options.coarse.object.shift_pairs = 0;
   all[11].options.coarse.object.shift_pairs = 5;
   all[12].options.coarse.object.shift_pairs = 60;
+  all[13].given = Given::wrong_prediction;
   return all;
 }
 
@@ -249,9 +252,10 @@ void give_motion(Given given, const Scene& scene, cfp::Random& random, cfp::Fram
     if (motion.known) frame.T_cur_prev = {motion.T_cur_prev, 0, 0};
     return;
   }
+  const double factor = given == Given::wrong_prediction ? 5 : 1;
   cfp::Vector6<double> error;
-  for (int k = 0; k < 6; ++k) error[k] = (k < 3 ? host_error_m : host_error_rad) * random.normal();
-  const double known = given == Given::prediction ? 1 : 0;
+  for (int k = 0; k < 6; ++k) error[k] = factor * (k < 3 ? host_error_m : host_error_rad) * random.normal();
+  const double known = given == Given::prediction_as_exact ? 0 : 1;
   frame.T_cur_prev = {cfp::se3_exp(error) * scene.T_cur_prev, known * host_error_m, known * host_error_rad};
 }
 
@@ -526,7 +530,7 @@ int main(int argc, char** argv) {
   print_shared(repetitions, seed);
   print_accelerated(cells, (repetitions + 4) / 5, seed);
 
-  print_head("one camera, no depths; then F alone; a host's motion");
+  print_head("one camera, no depths; then F alone; a host's motion, and a wrong one");
   Way one_camera;
   one_camera.depth_of_every = 0;
   for (const Room& room : rooms) {
@@ -541,6 +545,8 @@ int main(int argc, char** argv) {
       host.options = {};
       host.given = Given::prediction;
       judge("  a host's motion", host, cells, room, 1 / hz, 0, repetitions, seed);
+      host.given = Given::wrong_prediction;
+      judge("  a host's wrong motion", host, cells, room, 1 / hz, 0, repetitions, seed);
     }
   }
 
