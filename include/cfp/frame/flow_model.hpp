@@ -93,22 +93,26 @@ template <typename Scalar>
   return model.sigma_px > Scalar(0) ? model.sigma_px : Scalar(options.motion.min_sigma_px);
 }
 
-/// The camera's motion as a model of the given kind; none where it is not known.
+/// A motion that is known as a model of the given kind.
 template <typename Scalar>
-FlowModel<Scalar> estimate_motion_model(FlowModelKind kind, const FlowPairs<Scalar>& flow, span<const char> outside,
-                                        const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
-                                        FlowModelWorkspace<Scalar>& workspace) {
+[[nodiscard]] FlowModel<Scalar> model_of(FlowModelKind kind, FlowSupport support, const CameraMotion<Scalar>& motion) {
   FlowModel<Scalar> model;
-  const CameraMotion<Scalar> motion =
-      estimate_camera_motion(flow, outside, SE3<double>(), camera, options.motion, workspace.motion);
-  if (!motion.known) return model;
-  model.kind = kind;
-  model.support = FlowSupport::outside_pairs;
+  model.kind = kind, model.support = support;
   model.status = RansacStatus::ok;
   model.motion = motion;
   model.sigma_px = motion.sigma_px;
   model.coordinates = motion.coordinates;
   return model;
+}
+
+/// The camera's motion as a model of the given kind; none where it is not known.
+template <typename Scalar>
+FlowModel<Scalar> estimate_motion_model(FlowModelKind kind, const FlowPairs<Scalar>& flow, span<const char> outside,
+                                        const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
+                                        FlowModelWorkspace<Scalar>& workspace) {
+  const CameraMotion<Scalar> motion =
+      estimate_camera_motion(flow, outside, SE3<double>(), camera, options.motion, workspace.motion);
+  return motion.known ? model_of(kind, FlowSupport::outside_pairs, motion) : FlowModel<Scalar>();
 }
 
 /// Measures the noise of the pairs marked in `outside` under the model, if enough of them have a distance.

@@ -58,13 +58,13 @@ template <typename Scalar>
 /// do not tell. Without boxes few depths are left out: see UnreportedOptions::min_known_depths.
 template <typename Scalar>
 [[nodiscard]] FlowModel<Scalar> model_by_depths(const std::optional<UncertainMotion<double>>& given,
-                                                FlowPairs<Scalar> flow, const PinholeCamera<Scalar>& camera,
+                                                const FlowPairs<Scalar>& flow, const PinholeCamera<Scalar>& camera,
                                                 const CoarseOptions& coarse, FrameState<Scalar>& state) {
   const FlowModelOptions& options = coarse.flow;
   const span<const char> outside(state.scratch.outside);
   const bool few_known =
       state.boxes.empty() && !given && share_with_depth(flow, outside) < coarse.unreported.min_known_depths;
-  if (!options.use_depth || few_known) return {};
+  if (!options.use_depth || flow.previous_depths.empty() || few_known) return {};
   FlowModel<Scalar> model =
       estimate_motion_model(FlowModelKind::motion, flow, outside, camera, options, state.scratch.flow);
   if (model.kind == FlowModelKind::none) return model;
@@ -87,13 +87,12 @@ template <typename Scalar>
                                                              camera, options.motion, state.scratch.flow.distances);
   const bool exact = given.covariance.isZero(0);
   state.report.motion_refused = refined.contradicted && !exact;
-  model.kind = FlowModelKind::motion;
-  model.support = exact || !refined.known ? FlowSupport::caller : FlowSupport::outside_pairs;
-  model.status = RansacStatus::ok;
-  model.motion = refined.known ? UncertainMotion<Scalar>(refined) : given.template cast<Scalar>();
-  model.sigma_px = refined.known ? refined.sigma_px : Scalar(0);
-  model.coordinates = refined.coordinates;
-  return refined.known;
+  model = model_of<Scalar>(FlowModelKind::motion, exact ? FlowSupport::caller : FlowSupport::outside_pairs, refined);
+  if (refined.known) return true;
+  model.support = FlowSupport::caller;
+  model.motion = given.template cast<Scalar>();
+  model.sigma_px = Scalar(0);
+  return false;
 }
 
 /// What the flow pairs are judged by: the host's F, unless it has an exact motion; else the motion by their depths,

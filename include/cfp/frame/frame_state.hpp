@@ -44,8 +44,8 @@ struct FrameReport {
   RansacStatus flow_status = RansacStatus::not_enough_data;  ///< and how its estimation ended
   bool motion_refused = false;                               ///< T_cur_prev: not finite, or the flow contradicts it
   double flow_sigma_px = 0;                                  ///< noise of the flow as measured; 0: not
-  int flow_coordinates = 2;  ///< of a pixel that most of its distances see: 1 across lines
-  std::size_t unknown_objects = 0;                           ///< boxes whose O is not known
+  int flow_coordinates = 2;         ///< of a pixel that most of its distances see: 1 across lines
+  std::size_t unknown_objects = 0;  ///< boxes whose O is not known
   // keypoints
   std::size_t outside = 0, foreground = 0, background = 0, invalid = 0;  ///< by label
   std::size_t stray_labels = 0;  ///< keypoints whose mask or object_of_keypoint names no detection of the frame

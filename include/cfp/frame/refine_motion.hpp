@@ -44,18 +44,16 @@ struct RefinementModel {
   const MotionDistanceOptions& options;
   std::vector<Scalar>& distances;
   Scalar sigma_px = 1;
+  double apart_sq = 0;                              // from the prior, in squares of its sigmas
   double pairs = 0, agreeing = 0, coordinates = 0;  // the last two: sums by the weights of the loss
 
-  /// By how much T differs from the prior, in squares of its sigmas.
-  [[nodiscard]] double apart_sq(const SE3<double>& T) const noexcept {
-    const Vector6<double> moved = se3_log(T * prior.T_cur_prev.inverse());
-    return moved.dot(information.lazyProduct(moved));
-  }
   double linearize(const SE3<double>& T_cur_prev, NormalEquations<6>& equations) noexcept {
     const SE3<Scalar> T = T_cur_prev.template cast<Scalar>();
     equations.H = information;
-    equations.g = information.lazyProduct(se3_log(T_cur_prev * prior.T_cur_prev.inverse()));
-    double cost = apart_sq(T_cur_prev);
+    const Vector6<double> apart = se3_log(T_cur_prev * prior.T_cur_prev.inverse());
+    equations.g = information.lazyProduct(apart);
+    apart_sq = apart.dot(equations.g);
+    double cost = apart_sq;
     pairs = agreeing = coordinates = 0;
     for (std::size_t i = 0; i < outside.size(); ++i) {
       distances[i] = Scalar(no_distance<double>);
@@ -118,7 +116,7 @@ template <typename Scalar>
   }
   motion.known = measure_noise() && model.agreeing >= options.min_inlier_share * model.pairs;
   static_cast<UncertainMotion<Scalar>&>(motion) = refined.template cast<Scalar>();
-  motion.apart_sq = model.apart_sq(refined.T_cur_prev);
+  motion.apart_sq = model.apart_sq;
   return motion;
 }
 

@@ -26,6 +26,7 @@ struct UnknownDepth {
   double inverse_sigma = 0.5;  ///< 1/m, >= 0
 };
 
+/// What motion_distance takes the depth of a pair for.
 struct MotionDistanceOptions {
   DepthNoise depth_noise;      ///< of a measured depth
   UnknownDepth unknown_depth;  ///< of all others
