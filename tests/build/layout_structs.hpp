@@ -86,7 +86,7 @@
   CFP_LAYOUT(cfp::SE3<double>, translation)                              \
   CFP_LAYOUT(cfp::UncertainMotion<float>, covariance)                    \
   CFP_LAYOUT(cfp::UncertainMotion<double>, covariance)                   \
-  CFP_LAYOUT(cfp::TimedMotion, time_s)                                   \
+  CFP_LAYOUT(cfp::TimedMotion<double>, time_s)                           \
   CFP_LAYOUT(cfp::Trivial<float>, delta)                                 \
   CFP_LAYOUT(cfp::Trivial<double>, delta)                                \
   CFP_LAYOUT(cfp::Huber<float>, delta)                                   \

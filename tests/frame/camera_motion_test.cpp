@@ -208,7 +208,7 @@ TEST_CASE("A camera that keeps its velocity moves on by what it moved, however l
     for (int k = 0; k < 6; ++k) velocity[k] = random.normal();
     const double last_s = random.uniform(0.01, 0.2), time_s = random.uniform(0.01, 0.2);
     const cfp::SE3<double> moved = cfp::se3_exp(cfp::Vector6<double>(last_s * velocity));
-    const cfp::TimedMotion last{{moved, 0.001, 0.002}, last_s};
+    const cfp::TimedMotion<double> last{{moved, 0.001, 0.002}, last_s};
     const cfp::UncertainMotion<double> next = cfp::predicted_motion(last, time_s, 3);
     const cfp::SE3<double> expected = cfp::se3_exp(cfp::Vector6<double>(time_s * velocity));
     CHECK(cfp::se3_log(next.T_cur_prev * expected.inverse()).norm() < 1e-12);

@@ -480,7 +480,7 @@ TEST_CASE("The motion of the frame before tells of this one, where the host does
   for (std::uint64_t seed = 1; seed <= runs; ++seed) {
     const auto motion = [&](int frames, const cfp::FrameOptions& used, double push_m,
                             const std::optional<cfp::UncertainMotion<double>>& given = {}) {
-      const cfp::TimedMotion found = follow_wall(frames, used, push_m, seed, given).current.motion;
+      const cfp::TimedMotion<double> found = follow_wall(frames, used, push_m, seed, given).current.motion;
       CHECK(std::abs(found.time_s - (frames > 1 ? 0.03 : 0)) < 1e-12);
       return found.motion;
     };

@@ -20,7 +20,7 @@ inline namespace CFP_ISA {
 /// pushed keeps no velocity.
 template <typename Scalar>
 [[nodiscard]] UncertainMotion<Scalar> joined_with_expected(const UncertainMotion<Scalar>& measured,
-                                                           const TimedMotion& last, double time_s,
+                                                           const TimedMotion<double>& last, double time_s,
                                                            double acceleration_m_s2) noexcept {
   if (!(acceleration_m_s2 > 0 && last.time_s > 0 && time_s > 0)) return measured;
   return joined(predicted_motion(last, time_s, acceleration_m_s2), measured, most_motion_distance_sq);

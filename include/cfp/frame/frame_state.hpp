@@ -79,7 +79,7 @@ struct FrameMemory {
   std::vector<ObjectDepth<Scalar>> object_depths;  ///< of the boxes that the depths could separate
   std::vector<std::uint8_t> descriptors;           ///< one after the other; empty: none
   std::size_t descriptor_bytes = 0;                ///< of each
-  TimedMotion motion;                              ///< of the camera until then, by the flow's depths
+  TimedMotion<double> motion;                      ///< of the camera until then, by the flow's depths
 
   [[nodiscard]] DescriptorSpan descriptor_view() const noexcept {
     return {descriptors.data(), descriptors.empty() ? 0 : keypoints.size(), descriptor_bytes, descriptor_bytes};

@@ -37,19 +37,21 @@ struct UncertainMotion {
 };
 
 /// What a camera moved in a time; time_s 0: unknown.
+template <typename Scalar>
 struct TimedMotion {
-  UncertainMotion<double> motion;
-  double time_s = 0;
+  UncertainMotion<Scalar> motion;
+  Scalar time_s = 0;
 };
 
 inline namespace CFP_ISA {
 
 /// The motion in the next time_s of a camera that keeps its velocity but for an acceleration, the standard deviation of
 /// each coordinate of which is given; how it turns may change at will. Both times above 0.
-[[nodiscard]] inline UncertainMotion<double> predicted_motion(const TimedMotion& last, double time_s,
-                                                              double acceleration_m_s2) noexcept {
-  const double ratio = time_s / last.time_s, between_s = (time_s + last.time_s) / 2;
-  UncertainMotion<double> motion(se3_exp(Vector6<double>(ratio * se3_log(last.motion.T_cur_prev))),
+template <typename Scalar>
+[[nodiscard]] UncertainMotion<Scalar> predicted_motion(const TimedMotion<Scalar>& last, non_deduced<Scalar> time_s,
+                                                       non_deduced<Scalar> acceleration_m_s2) noexcept {
+  const Scalar ratio = time_s / last.time_s, between_s = (time_s + last.time_s) / 2;
+  UncertainMotion<Scalar> motion(se3_exp(Vector6<Scalar>(ratio * se3_log(last.motion.T_cur_prev))),
                                  acceleration_m_s2 * between_s * time_s, 1);
   motion.covariance += ratio * ratio * last.motion.covariance;
   return motion;
