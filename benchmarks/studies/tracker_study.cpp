@@ -11,17 +11,18 @@
 // other seeds, other numbers of people, other speeds and other miss rates.
 //
 // The aim is to cover nowhere more than a point less than the best of the three, with at most 10 % more false boxes
-// than the least of them, which are different trackers. All cells of TUD-Stadtmitte reach it (with bursts withheld +1.0,
-// -0.4 and -0.9 points, +6, +2 and +2 % false boxes at full, half and quarter rate), and all simulated ones but two of
-// a hand-held camera at 60 Hz whose motion is not handed over: -1.1 points at 1 %, +11 % at 2 % (with 80 sequences -1.1
-// and +10). On "tune" with 80 sequences all reach it. What it took was seen in
-// where the false boxes of TUD-Stadtmitte lay; no other default changed:
+// than the least of them, which are different trackers. All cells of TUD-Stadtmitte reach it (with bursts withheld
+// +1.0, -0.4 and -0.9 points, +6, +2 and +2 % false boxes at full, half and quarter rate), and all simulated ones but
+// two of a hand-held camera at 60 Hz whose motion is not handed over: -1.1 points at 1 %, +11 % at 2 % (with 80
+// sequences -1.1 and +10). On "tune" with 80 sequences all reach it. What it took was seen in where the false boxes of
+// TUD-Stadtmitte lay; no other default changed:
 //   - The acceleration of the centre is as large up and down as across. In units of the height, 3.5 times as large for
-//     people, compensated boxes at quarter rate were 0.40 heights off after six frames, where SORT's were 0.07. Price: a
-//     camera's tilt that is not handed over is followed less, -0.2 points at 60 Hz, -2.3 at 15 Hz, where the lead is 3.
+//     people, compensated boxes at quarter rate were 0.40 heights off after six frames, where SORT's were 0.07. Price:
+//     a camera's tilt that is not handed over is followed less, -0.2 points at 60 Hz, -2.3 at 15 Hz, where the lead
+//     is 3.
 //   - A detection that no track takes starts the nearest one without a detection anew. Identity switches fall by a
-//     sixth, false boxes at 5 Hz by 14 to 23 %. The simulated cells take any restart_gate up to 5; 4, which is 99.7 % of
-//     chi-squared with four degrees of freedom, is also what TUD-Stadtmitte asks for, on the bursts of "tune".
+//     sixth, false boxes at 5 Hz by 14 to 23 %. The simulated cells take any restart_gate up to 5; 4, which is 99.7 %
+//     of chi-squared with four degrees of freedom, is also what TUD-Stadtmitte asks for, on the bursts of "tune".
 //
 // What was tried beside the options of table 2, on the stream "tune", before these two: rates that fade in 1 to 2 s
 // cover 0.5 % more, with up to +29 to +37 % false boxes; no coasting for tracks seen in less than 70 (80) % of their
@@ -31,8 +32,8 @@
 // With the first of them: a size and an aspect instead of width and height, no difference; no compensation once the
 // centre is unsure by half a width, a tenth fewer false boxes for 0.6 points. With both: process noise driven by the
 // innovation (inflated where it exceeds 1.5 to 3 sigma), up to 0.6 points more of the simulated and 2 to 4 less of
-// TUD-Stadtmitte, whose boxes are cut by who stands before them; a restart that keeps half of its detections, 0.8 points
-// more and up to +26 % false boxes.
+// TUD-Stadtmitte, whose boxes are cut by who stands before them; a restart that keeps half of its detections, 0.8
+// points more and up to +26 % false boxes.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>

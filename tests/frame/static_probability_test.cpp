@@ -296,6 +296,12 @@ TEST_CASE("A mask whose labels name no detection is told, and its box is one wit
   const std::vector<std::uint8_t> first(640 * 480, 1);
   frame.labels.labels = first.data();
   CHECK(host.probability.coarse(frame).report.stray_labels == 0);
+  // A mask of half the size, as networks give them, has nothing to say of three quarters of the image.
+  frame.labels = {first.data(), 320, 240, 320};
+  const auto beyond = std::count_if(scene.keypoints.begin(), scene.keypoints.end(),
+                                    [](const auto& pixel) { return !(pixel[0] < 319.5 && pixel[1] < 239.5); });
+  CHECK(beyond > 100);
+  CHECK(host.probability.coarse(frame).report.stray_labels == static_cast<std::size_t>(beyond));
 }
 
 TEST_CASE("A missed detection is compensated, and with no-mdc it is not", "[frame]") {

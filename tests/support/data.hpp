@@ -1,4 +1,5 @@
-// Where the real recordings of others are: the environment's CFP_TEST_DATA, else the folder of that name in CMake's cache.
+// Where the real recordings of others are: the environment's CFP_TEST_DATA, else the folder of that name in CMake's
+// cache.
 #pragma once
 
 #include <cstdlib>

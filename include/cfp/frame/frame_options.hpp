@@ -23,10 +23,10 @@ struct ObjectClass {
   bool non_rigid = true;  ///< people, animals: told from the background by depth; rigid: all inside is foreground
 };
 
-/// The search for what moves and no detector reports, or a box holds in part, under WeightRule::posterior. A keypoint in
-/// no box counts as on a moving object where, of the flow pairs near it and at its depth, in boxes or not, `pairs` that
-/// move are nearer than as many that rest. Without depths all near it and on no object are asked. Not in the paper, for
-/// which all outside of boxes is static.
+/// The search for what moves and no detector reports, or a box holds in part, under WeightRule::posterior. A keypoint
+/// in no box counts as on a moving object where, of the flow pairs near it and at its depth, in boxes or not, `pairs`
+/// that move are nearer than as many that rest. Without depths all near it and on no object are asked. Not in the
+/// paper, for which all outside of boxes is static.
 struct UnreportedOptions {
   double radius_px = 60;     ///< around the keypoint, >= 0; 0: nothing of this
   double depth_share = 0.1;  ///< of the keypoint's depth: a pair farther from it in depth is not asked, >= 0

@@ -48,7 +48,8 @@ struct FrameReport {
   std::size_t unknown_objects = 0;  ///< boxes whose O is not known
   // keypoints
   std::size_t outside = 0, foreground = 0, background = 0, invalid = 0;  ///< by label
-  std::size_t stray_labels = 0;  ///< keypoints whose mask or object_of_keypoint names no detection of the frame
+  std::size_t stray_labels = 0;  ///< keypoints whose mask or object_of_keypoint names no detection of the frame, and
+                                 ///< those beyond the mask (is it of a smaller image?)
   std::size_t unreported = 0;    ///< keypoints on no object around which the flow moves: see UnreportedOptions
   std::size_t undecided_foregrounds = 0;  ///< boxes that the depths could not separate: all inside is foreground
   // constraints

@@ -20,13 +20,19 @@ struct LabelImage {
 
 inline namespace CFP_ISA {
 
+/// Whether (x, y) is nearest to a pixel of the image; what is not finite is not.
+template <typename Scalar>
+[[nodiscard]] bool contains(const LabelImage& image, Scalar x, Scalar y) noexcept {
+  const Scalar column = x + Scalar(0.5), row = y + Scalar(0.5);
+  return !image.empty() && column >= 0 && column < Scalar(image.width) && row >= 0 && row < Scalar(image.height);
+}
+
 /// The label of the pixel nearest to (x, y); 0 outside the image and for what is not finite.
 template <typename Scalar>
 [[nodiscard]] int label_at(const LabelImage& image, Scalar x, Scalar y) noexcept {
-  const Scalar column = x + Scalar(0.5), row = y + Scalar(0.5);
-  if (image.empty() || !(column >= 0 && column < Scalar(image.width) && row >= 0 && row < Scalar(image.height)))
-    return 0;
-  return image.labels[static_cast<std::size_t>(row) * image.row_bytes + static_cast<std::size_t>(column)];
+  if (!contains(image, x, y)) return 0;
+  const auto column = static_cast<std::size_t>(x + Scalar(0.5)), row = static_cast<std::size_t>(y + Scalar(0.5));
+  return image.labels[row * image.row_bytes + column];
 }
 
 /// The box of every label, as the detections of a frame: detection v - 1 spans the pixels of label v. Labels that do

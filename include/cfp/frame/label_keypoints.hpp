@@ -96,14 +96,18 @@ void take_what_masks_leave_out(const Box<Scalar>& box, const DetectionAt& detect
   }
 }
 
-/// How many keypoints are said to lie on a detection that the frame has not.
+/// How many keypoints are said to lie on a detection that the frame has not, or lie beside the mask.
 template <typename Scalar>
 [[nodiscard]] std::size_t stray_labels(const Frame<Scalar>& frame, const FrameState<Scalar>& state) noexcept {
   const std::size_t detections = frame.detections ? frame.detections->size() : 0;
+  const bool by_mask = frame.object_of_keypoint.empty() && !frame.labels.empty();
   std::size_t count = 0;
   for (std::size_t i = 0; i < state.size(); ++i) {
+    if (state.label[i] == KeypointLabel::invalid) continue;
+    const auto& [x, y] = state.current.keypoints[i];
     const std::int32_t detection = detection_of_keypoint(i, frame, state);
-    count += detection >= 0 && static_cast<std::size_t>(detection) >= detections ? 1U : 0U;
+    const bool unnamed = detection >= 0 && static_cast<std::size_t>(detection) >= detections;
+    count += unnamed || (by_mask && !contains(frame.labels, x, y)) ? 1U : 0U;
   }
   return count;
 }
