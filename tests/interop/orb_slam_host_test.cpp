@@ -1,4 +1,4 @@
-#include "../../examples/integration/orb_slam/orb_slam2.hpp"
+#include "../../examples/integration/orb_slam/orb_slam.hpp"
 
 #include <atomic>
 #include <memory>

@@ -1,6 +1,6 @@
 // cfp beside the Tracking of ORB-SLAM2, ORB-SLAM3 or a system built like them. README.md says where each call goes.
 //
-// Host names what differs between such systems (orb_slam2.hpp, ../orb_slam_shape/cfp_glue.hpp): the types Frame and
+// Host names what differs between such systems (orb_slam.hpp, ../orb_slam_shape/cfp_glue.hpp): the types Frame and
 // Camera, and the static functions Keys (of the image in which objects are detected), Descriptors and Pose
 // (T_cam_world). Frame gets two members, std::vector<float> mvStaticProbability and mvWeight; its map points get
 // mStaticProbability, a float, or std::atomic<float> where other threads read it.

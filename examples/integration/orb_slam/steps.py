@@ -138,7 +138,7 @@ BOTH = [
     # 2: the adapter beside Tracking, and the door for the host's program
     (2, "include/Tracking.h", "", r"(#include\s*<mutex>)",
      r'#include<iostream>\n#include<memory>\n#include<optional>\n'
-     r'#include"orb_slam2.hpp"  // of cfp, examples/integration/orb_slam\n\n\1', 1),
+     r'#include"orb_slam.hpp"  // of cfp, examples/integration/orb_slam\n\n\1', 1),
     (2, "include/System.h", "", r"(#include\s*<string>)", r'#include"cfp/frame/frame_options.hpp"\n\1', 1),
     (2, "include/System.h", "", r"(\n    // Proccess the given monocular frame)",
      r"\n    // cfp: once, and the detections of every image before it is tracked (not at all: the detector did not run)"
