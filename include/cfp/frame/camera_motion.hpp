@@ -6,15 +6,13 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 #include <vector>
 
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/frame/frame.hpp"
-#include "cfp/frame/lone_depths_impl.hpp"
+#include "cfp/frame/pair_points_impl.hpp"
 #include "cfp/geometry/motion_distance.hpp"
-#include "cfp/math/order_statistic.hpp"
 #include "cfp/optimization/pose/pose_refinement.hpp"
 #include "cfp/robust/pnp_ransac.hpp"
 
@@ -83,52 +81,72 @@ template <typename Scalar>
   return std::clamp(robust_sigma(distances, coordinates), Scalar(options.min_sigma_px), Scalar(options.max_sigma_px));
 }
 
-/// The pairs marked in `outside` whose depth is valid, as points of the previous camera; the others as NaN.
+/// The pairs that tell, those with a point in workspace.points, and what can be had of them. Points nearer than near_m
+/// tell no more of the translation than one there.
 template <typename Scalar>
-void place_points(const FlowPairs<Scalar>& flow, span<const char> outside, const PinholeCamera<Scalar>& camera,
-                  std::vector<std::array<Scalar, 3>>& points) {
-  const Scalar nowhere = std::numeric_limits<Scalar>::quiet_NaN();
-  points.assign(outside.size(), {nowhere, nowhere, nowhere});
-  for (std::size_t i = 0; i < flow.previous_depths.size(); ++i) {
-    const Scalar z = flow.previous_depths[i];
-    Vector3<Scalar> ray;
-    if (outside[i] == 0 || !is_valid_depth(z) || !camera.unproject(flow.previous[i], ray)) continue;
-    points[i] = {ray.x() * z, ray.y() * z, z};
-  }
-}
+struct PairsWithDepth {
+  const FlowPairs<Scalar>& flow;
+  const PinholeCamera<Scalar>& camera;
+  const CameraMotionOptions& options;
+  CameraMotionWorkspace<Scalar>& workspace;
+  std::size_t count;
+  Scalar near_m;
 
-/// The depth that the given share of the points do not exceed. At least one point must be finite.
-template <typename Scalar>
-[[nodiscard]] Scalar depth_at_share(const std::vector<std::array<Scalar, 3>>& points, double share,
-                                    std::vector<Scalar>& depths) {
-  depths.clear();
-  for (const auto& point : points) {
-    if (is_finite(point[0])) depths.push_back(point[2]);
+  /// The noise that they show under a motion.
+  [[nodiscard]] Scalar noise_under(const SE3<double>& T_cur_prev, Scalar sigma_px) const {
+    std::vector<Scalar>& distances = workspace.distances;
+    distances.resize(workspace.points.size());
+    motion_distances(flow.previous, flow.previous_depths, flow.current,
+                     UncertainMotion<Scalar>(T_cur_prev.template cast<Scalar>()), camera, sigma_px, options.distance,
+                     distances);
+    for (std::size_t i = 0; i < distances.size(); ++i) {
+      if (!is_finite(workspace.points[i][0])) distances[i] = Scalar(no_distance<double>);
+    }
+    return flow_sigma(span<Scalar>(distances), 2, options);
   }
-  return quantile(span<Scalar>(depths), share);
-}
 
-/// The motion that most of the `taken` workspace.points agree to; false, and T untouched, without one. Its threshold is
-/// below sigma_px, their noise under a motion which what moves may have led astray: a wider one would hold both.
-template <typename Scalar>
-[[nodiscard]] bool search_camera_motion(const PointSpan<Scalar, 2>& current, std::size_t taken,
-                                        const PinholeCamera<Scalar>& camera, Scalar sigma_px,
-                                        CameraMotionWorkspace<Scalar>& workspace, SE3<double>& T) {
-  constexpr std::size_t most = 150;  // pairs; more take their time and find little more
-  PnpRansacOptions search;
-  search.threshold_px = 0.7 * (std::min)(static_cast<double>(sigma_px), 1e3);
-  search.max_iterations = 50;
-  workspace.sigmas.assign(current.size(), Scalar(0));
-  for (std::size_t i = 0, k = 0; i < current.size(); ++i) {
-    if (!is_finite(workspace.points[i][0])) continue;
-    if (k * most / taken != (k + 1) * most / taken) workspace.sigmas[i] = Scalar(1);
-    ++k;
+  /// refine_pose from T at a noise; T becomes the result, and the motion has the noise that is left.
+  [[nodiscard]] CameraMotion<Scalar> refine(Scalar sigma_px, const PoseOptions& rounds, SE3<double>& T) const {
+    workspace.sigmas.clear();
+    for (const auto& point : workspace.points)
+      workspace.sigmas.push_back(sigma_px * (std::max)(Scalar(1), near_m / point[2]));
+    PoseObservations<Scalar> observations;
+    observations.points = workspace.points;
+    observations.pixels = flow.current;
+    observations.sigmas = workspace.sigmas;
+    const PoseResult refined = refine_pose(observations, camera, T, rounds, workspace.pose);
+    CameraMotion<Scalar> motion;
+    Matrix6<double> covariance;
+    motion.known = is_solved(refined.status) &&
+                   static_cast<double>(refined.inliers) >= options.min_inlier_share * static_cast<double>(count) &&
+                   invert_normal_equations<6>(refined.information, 1e-12, covariance);
+    if (!motion.known) return motion;
+    T = refined.T_cam_world;
+    motion.T_cur_prev = T.template cast<Scalar>();
+    motion.covariance = covariance.template cast<Scalar>();
+    motion.sigma_px = noise_under(T, sigma_px);
+    return motion;
   }
-  const PnpRansacResult<Scalar> found =
-      pnp_ransac(PointSpan<Scalar, 3>(workspace.points), current, workspace.sigmas, camera, search, workspace.search);
-  if (found.found()) T = found.T_cam_world.template cast<double>();
-  return found.found();
-}
+
+  /// The motion that most of them agree to; false, and T untouched, without one. Its threshold is below sigma_px, their
+  /// noise under a motion which what moves may have led astray: a wider one would hold both.
+  [[nodiscard]] bool search(Scalar sigma_px, SE3<double>& T) const {
+    constexpr std::size_t most = 150;  // pairs; more take their time and find little more
+    PnpRansacOptions ransac;
+    ransac.threshold_px = 0.7 * (std::min)(static_cast<double>(sigma_px), 1e3);
+    ransac.max_iterations = 50;
+    workspace.sigmas.assign(workspace.points.size(), Scalar(0));
+    for (std::size_t i = 0, k = 0; i < workspace.points.size(); ++i) {
+      if (!is_finite(workspace.points[i][0])) continue;
+      if (k * most / count != (k + 1) * most / count) workspace.sigmas[i] = Scalar(1);
+      ++k;
+    }
+    const PnpRansacResult<Scalar> found = pnp_ransac(PointSpan<Scalar, 3>(workspace.points), flow.current,
+                                                     workspace.sigmas, camera, ransac, workspace.search);
+    if (found.found()) T = found.T_cam_world.template cast<double>();
+    return found.found();
+  }
+};
 
 /// The last round alone, its scale times a factor.
 [[nodiscard]] inline PoseOptions last_round(PoseOptions options, double factor) noexcept {
@@ -155,61 +173,29 @@ template <typename Scalar>
                                                           const CameraMotionOptions& options,
                                                           CameraMotionWorkspace<Scalar>& workspace) {
   CFP_ASSERT(outside.size() == flow.current.size());
-  CameraMotion<Scalar> motion;
   detail::place_points(flow, outside, camera, workspace.points);
   const std::size_t taken =
       detail::leave_out_lone_depths(flow.previous, Scalar(options.shared_depth_ratio),
                                     span<std::array<Scalar, 3>>(workspace.points), workspace.depths);
-  if (taken < options.min_pairs) return motion;
+  if (taken < options.min_pairs) return {};
 
-  const Scalar near_m = detail::depth_at_share(workspace.points, options.nearest_share, workspace.distances);
-  workspace.distances.resize(outside.size());
   if (workspace.search.observations.index.size() < outside.size())  // a later call may search and must not allocate
     workspace.search.observations.begin(outside.size());
   workspace.search.sampling.reserve(outside.size());
-  const auto believe = [&](const SE3<double>& T_cur_prev) {
-    motion.T_cur_prev = T_cur_prev.template cast<Scalar>();
-    motion_distances(flow.previous, flow.previous_depths, flow.current, UncertainMotion<Scalar>(motion.T_cur_prev),
-                     camera, motion.sigma_px, options.distance, workspace.distances);
-    for (std::size_t i = 0; i < outside.size(); ++i) {
-      if (!is_finite(workspace.points[i][0])) workspace.distances[i] = Scalar(no_distance<double>);
-    }
-    motion.sigma_px = detail::flow_sigma(span<Scalar>(workspace.distances), 2, options);
-  };
-  const auto refine = [&](SE3<double>& T, const PoseOptions& rounds) {
-    workspace.sigmas.clear();
-    for (const auto& point : workspace.points)
-      workspace.sigmas.push_back(motion.sigma_px * (std::max)(Scalar(1), near_m / point[2]));
-    PoseObservations<Scalar> observations;
-    observations.points = workspace.points;
-    observations.pixels = flow.current;
-    observations.sigmas = workspace.sigmas;
-    const PoseResult refined = refine_pose(observations, camera, T, rounds, workspace.pose);
-    Matrix6<double> covariance;
-    motion.known = is_solved(refined.status) &&
-                   static_cast<double>(refined.inliers) >= options.min_inlier_share * static_cast<double>(taken) &&
-                   invert_normal_equations<6>(refined.information, 1e-12, covariance);
-    if (!motion.known) return false;
-    T = refined.T_cam_world;
-    motion.covariance = covariance.template cast<Scalar>();
-    believe(T);
-    return true;
-  };
+  const Scalar near_m = detail::depth_at_share(workspace.points, options.nearest_share, workspace.distances);
+  const detail::PairsWithDepth<Scalar> pairs{flow, camera, options, workspace, taken, near_m};
   SE3<double> T = start;
-  motion.sigma_px = Scalar(options.max_sigma_px);
-  if (!refine(T, options.pose)) return motion;
-  if (!(motion.sigma_px > Scalar(options.search_above_px)) ||
-      !detail::search_camera_motion(flow.current, taken, camera, motion.sigma_px, workspace, T)) {
-    refine(T, options.pose);
-    return motion;
-  }
+  const CameraMotion<Scalar> first = pairs.refine(Scalar(options.max_sigma_px), options.pose, T);
+  if (!first.known) return first;
+  if (!(first.sigma_px > Scalar(options.search_above_px)) || !pairs.search(first.sigma_px, T))
+    return pairs.refine(first.sigma_px, options.pose, T);
   // A wide loss would lose what was found again to what moves: a tight one first. The usual one errs less, and counts
   // unless the pairs agree to it less, by more than chance (cfp_camera_motion_study, cfp_object_motion_study).
-  believe(T);
-  if (!refine(T, detail::last_round(options.pose, 1.0 / 3))) return motion;
-  const CameraMotion<Scalar> tight = motion;
-  const Scalar most_px = tight.sigma_px * (1 + 20 / static_cast<Scalar>(taken));
-  return refine(T, detail::last_round(options.pose, 1)) && motion.sigma_px <= most_px ? motion : tight;
+  const Scalar found_px = pairs.noise_under(T, first.sigma_px);
+  const CameraMotion<Scalar> tight = pairs.refine(found_px, detail::last_round(options.pose, 1.0 / 3), T);
+  if (!tight.known) return tight;
+  const CameraMotion<Scalar> usual = pairs.refine(tight.sigma_px, detail::last_round(options.pose, 1), T);
+  return usual.known && usual.sigma_px <= tight.sigma_px * (1 + 20 / static_cast<Scalar>(taken)) ? usual : tight;
 }
 
 }  // namespace CFP_ISA

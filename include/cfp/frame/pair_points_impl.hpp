@@ -1,5 +1,5 @@
-/// @file lone_depths_impl.hpp
-/// Depths that no neighbours in the image share, for camera_motion.hpp. Not an interface.
+/// @file pair_points_impl.hpp
+/// Flow pairs of known depth as points, and which of them to leave out, for camera_motion.hpp. Not an interface.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,10 @@
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
+#include "cfp/frame/frame.hpp"
 #include "cfp/frame/point_grid_impl.hpp"
+#include "cfp/geometry/camera.hpp"
+#include "cfp/math/order_statistic.hpp"
 
 namespace cfp::detail {
 
@@ -21,6 +24,31 @@ struct LoneDepthsWorkspace {
 };
 
 inline namespace CFP_ISA {
+
+/// The pairs marked in `outside` whose depth is valid, as points of the previous camera; the others as NaN.
+template <typename Scalar>
+void place_points(const FlowPairs<Scalar>& flow, span<const char> outside, const PinholeCamera<Scalar>& camera,
+                  std::vector<std::array<Scalar, 3>>& points) {
+  const Scalar nowhere = std::numeric_limits<Scalar>::quiet_NaN();
+  points.assign(outside.size(), {nowhere, nowhere, nowhere});
+  for (std::size_t i = 0; i < flow.previous_depths.size(); ++i) {
+    const Scalar z = flow.previous_depths[i];
+    Vector3<Scalar> ray;
+    if (outside[i] == 0 || !is_valid_depth(z) || !camera.unproject(flow.previous[i], ray)) continue;
+    points[i] = {ray.x() * z, ray.y() * z, z};
+  }
+}
+
+/// The depth that the given share of the points do not exceed. At least one point must be finite.
+template <typename Scalar>
+[[nodiscard]] Scalar depth_at_share(const std::vector<std::array<Scalar, 3>>& points, double share,
+                                    std::vector<Scalar>& depths) {
+  depths.clear();
+  for (const auto& point : points) {
+    if (is_finite(point[0])) depths.push_back(point[2]);
+  }
+  return quantile(span<Scalar>(depths), share);
+}
 
 /// Takes out of the points, by NaN, those whose depth no neighbours share (CameraMotionOptions::shared_depth_ratio);
 /// 0 takes out none. Returns how many stay. A wrong depth may move a pair by less than its noise, so that no distance

@@ -1,4 +1,4 @@
-#include "cfp/frame/lone_depths_impl.hpp"
+#include "cfp/frame/pair_points_impl.hpp"
 
 #include <algorithm>
 #include <array>
