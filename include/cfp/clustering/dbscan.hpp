@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "cfp/core/numeric.hpp"
@@ -41,6 +42,7 @@ struct SortedValues {
 /// Reused from call to call; grows to the largest input seen, then allocates nothing.
 template <typename Scalar>
 struct DbscanWorkspace {
+  std::vector<std::pair<Scalar, std::uint32_t>> sorted;
   std::vector<std::uint32_t> index;
   std::vector<Scalar> values;  // sorted
   std::vector<std::uint32_t> neighbours;
@@ -93,17 +95,16 @@ template <typename Scalar, typename Keep>
 SortedValues<Scalar> sort_values(span<const non_deduced<Scalar>> values, const Keep& keep,
                                  DbscanWorkspace<Scalar>& workspace) {
   CFP_ASSERT(values.size() < 0xffffffffU);
-  std::vector<std::uint32_t>& index = workspace.index;
-  index.clear();
+  workspace.sorted.clear(), workspace.values.clear(), workspace.index.clear();
   for (std::size_t i = 0; i < values.size(); ++i) {
-    if (keep(values[i])) index.push_back(static_cast<std::uint32_t>(i));
+    if (keep(values[i])) workspace.sorted.emplace_back(values[i], static_cast<std::uint32_t>(i));
   }
-  std::sort(index.begin(), index.end(), [=](std::uint32_t a, std::uint32_t b) {
-    return values[a] < values[b] || (!(values[b] < values[a]) && a < b);
-  });
-  workspace.values.clear();
-  for (const std::uint32_t i : index) workspace.values.push_back(values[i]);
-  return {workspace.values, index};
+  std::sort(workspace.sorted.begin(), workspace.sorted.end());
+  for (const auto& [value, i] : workspace.sorted) {
+    workspace.values.push_back(value);
+    workspace.index.push_back(i);
+  }
+  return {workspace.values, workspace.index};
 }
 
 /// DBSCAN of values that are finite and ascending already (asserted in debug builds): `labels[i]` belongs to
