@@ -68,7 +68,7 @@ TEMPLATE_TEST_CASE("DBSCAN agrees with the definition for many values and a wild
   cfp::Random random(12, "sizes");
   for (const std::size_t n : std::vector<std::size_t>{40, 300, 1500, 2500}) {
     std::vector<TestType> values = random_values<TestType>(random, n);
-    if (n == 300) values[7] = static_cast<TestType>(1e30);  // presses all others into one bucket
+    if (n == 300) values[7] = static_cast<TestType>(1e30);  // far from all others
     const auto out = cluster(values, 0.05, 4);
     CHECK(cfp_testing::verify_dbscan(values, {0.05, 4}, out.labels).fault == cfp_testing::DbscanFault::none);
   }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "cfp/core/numeric.hpp"
@@ -41,16 +42,13 @@ struct SortedValues {
 /// Reused from call to call; grows to the largest input seen, then allocates nothing.
 template <typename Scalar>
 struct DbscanWorkspace {
-  std::vector<std::uint32_t> kept, index;
-  std::vector<std::size_t> bucket_end;
+  std::vector<std::pair<Scalar, std::uint32_t>> sorted;
+  std::vector<std::uint32_t> index;
   std::vector<Scalar> values;  // sorted
   std::vector<std::uint32_t> neighbours;
   std::vector<int> labels;  // of sorted values
 
-  void reserve(std::size_t n) {
-    kept.reserve(n), index.reserve(n), bucket_end.reserve(2 * n + 2), values.reserve(n);
-    neighbours.reserve(n), labels.reserve(n);
-  }
+  void reserve(std::size_t n) { index.reserve(n), values.reserve(n), neighbours.reserve(n), labels.reserve(n); }
 };
 
 namespace detail {
@@ -92,43 +90,20 @@ inline namespace CFP_ISA {
 }
 
 /// Those of `values` for which `keep(value)` holds, ascending, equal values by ascending index (-0 equals +0). `keep`
-/// must refuse NaN and infinities. One counting pass puts the values into buckets of equal width, std::sort orders each
-/// bucket: O(n) unless the values crowd into few buckets, never worse than O(n log n).
+/// must refuse NaN and infinities. O(n log n).
 template <typename Scalar, typename Keep>
 SortedValues<Scalar> sort_values(span<const non_deduced<Scalar>> values, const Keep& keep,
                                  DbscanWorkspace<Scalar>& workspace) {
   CFP_ASSERT(values.size() < 0xffffffffU);
-  std::vector<std::uint32_t>&kept = workspace.kept, &index = workspace.index;
-  kept.clear();
-  Scalar low = (std::numeric_limits<Scalar>::max)(), high = (std::numeric_limits<Scalar>::lowest)();
+  workspace.sorted.clear(), workspace.values.clear(), workspace.index.clear();
   for (std::size_t i = 0; i < values.size(); ++i) {
-    if (!keep(values[i])) continue;
-    kept.push_back(static_cast<std::uint32_t>(i));
-    low = (std::min)(low, values[i]);
-    high = (std::max)(high, values[i]);
+    if (keep(values[i])) workspace.sorted.emplace_back(values[i], static_cast<std::uint32_t>(i));
   }
-  const std::size_t n = kept.size();
-
-  // The bucket is monotone in the value, also after rounding, so the buckets are in order.
-  Scalar scale = static_cast<Scalar>(2 * n) / (high - low);
-  if (!is_finite(scale)) scale = Scalar(0);  // equal values, or too near each other; 0 for a range that overflows
-  const auto bucket = [=](std::uint32_t i) {
-    return scale > Scalar(0) ? (std::min)(static_cast<std::size_t>((values[i] - low) * scale), 2 * n) : 0;
-  };
-  std::vector<std::size_t>& end = workspace.bucket_end;
-  end.assign(2 * n + 2, 0);
-  for (const std::uint32_t i : kept) ++end[bucket(i) + 1];
-  for (std::size_t b = 1; b < end.size(); ++b) end[b] += end[b - 1];
-  index.resize(n);
-  for (const std::uint32_t i : kept) index[end[bucket(i)]++] = i;
-  const auto before = [=](std::uint32_t a, std::uint32_t b) {
-    return values[a] < values[b] || (!(values[b] < values[a]) && a < b);
-  };
-  for (std::size_t b = 0, begin = 0; begin < n; begin = end[b++]) {
-    if (end[b] - begin > 1) std::sort(index.data() + begin, index.data() + end[b], before);
+  std::sort(workspace.sorted.begin(), workspace.sorted.end());
+  for (const auto& [value, i] : workspace.sorted) {
+    workspace.values.push_back(value);
+    workspace.index.push_back(i);
   }
-  workspace.values.resize(n);
-  for (std::size_t i = 0; i < n; ++i) workspace.values[i] = values[index[i]];
   return {workspace.values, workspace.index};
 }
 
@@ -178,7 +153,7 @@ DbscanResult dbscan_sorted(span<const non_deduced<Scalar>> values, const DbscanO
 /// share a cluster. A border point (not core, but within eps of a core point) joins its nearest core point; of two
 /// equally near ones the lower value (which leaves no choice: equal values are core together and share their cluster).
 /// So the labels depend on the values alone and not on their order. Distances are differences as rounded in Scalar; eps
-/// is rounded to Scalar. NaN and infinite values are noise. O(n log n), in practice O(n); deterministic; allocates only
+/// is rounded to Scalar. NaN and infinite values are noise. O(n log n); deterministic; allocates only
 /// when the workspace grows. Departure: the original lets a border point join the cluster that happens to find it
 /// first.
 template <typename Scalar>

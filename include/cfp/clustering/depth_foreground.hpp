@@ -144,9 +144,9 @@ inline namespace CFP_ISA {
 /// has more than a fiftieth of the points behind it; without a gap that is clear of noise and of evenly spread points,
 /// `behind_m` behind it; or `short_m` behind it. Of these windows the one is taken whose points lie most where people
 /// do (sum_place_odds); without pixels the previous, else the nearest. Points without a valid depth take no part and
-/// are foreground, the safe side. O(n log n), in practice O(n); deterministic; permuting the points
-/// permutes the mask; allocates only when the workspace grows. Departure from the paper, which clusters: a window is
-/// better on every kind of scene of foreground_study.
+/// are foreground, the safe side. O(n log n); deterministic; permuting the points permutes the mask; allocates only
+/// when the workspace grows. Departure from the paper, which clusters: a window is better on every kind of scene of
+/// foreground_study.
 template <typename Scalar>
 ForegroundResult depth_foreground(const ForegroundInput<non_deduced<Scalar>>& in, const ForegroundOptions& options,
                                   ForegroundWorkspace<Scalar>& workspace, span<char> mask) {

@@ -185,15 +185,13 @@ double median_interval(const Poses& poses, const std::vector<std::size_t>& order
   return error_statistics(std::move(intervals)).median;
 }
 
-template <typename Matrix>  // so that an evaluation that is not called is not compiled
-double angle_deg(const Matrix& R) noexcept {
-  return so3_log<double>(R).norm() * 180 / pi<double>;
-}
-
-/// The length; the largest double where it overflows.
-inline double finite_norm(const Vector3<double>& v) noexcept {
-  const double length = std::hypot(v[0], v[1], v[2]);
-  return is_finite(length) ? length : (std::numeric_limits<double>::max)();
+/// One more of PoseErrors: the length of a translation, the largest double where it overflows, and a rotation's angle.
+template <typename Errors>  // so that an evaluation that is not called is not compiled
+void add_error(std::size_t index, const Vector3<double>& translation, const Matrix3<double>& rotation, Errors& errors) {
+  const double length = std::hypot(translation[0], translation[1], translation[2]);
+  errors.pose.push_back(index);
+  errors.translation_m.push_back((std::min)((std::numeric_limits<double>::max)(), length));
+  errors.rotation_deg.push_back(so3_log(rotation).norm() * 180 / pi<double>);
 }
 
 }  // namespace CFP_ISA

@@ -28,12 +28,6 @@ struct AbsoluteErrorOptions {
 struct PoseErrors {
   std::vector<std::size_t> pose;
   std::vector<double> translation_m, rotation_deg;
-
-  CFP_INLINE void add(std::size_t index, double distance_m, double angle_deg) {
-    pose.push_back(index);
-    translation_m.push_back(distance_m);
-    rotation_deg.push_back(angle_deg);
-  }
 };
 
 /// What the absolute and the relative error have in common.
@@ -128,8 +122,8 @@ template <typename Truth, typename Estimate>
   for (std::size_t k = 0; k < matches.size(); ++k) {
     const Matrix3<double> R_truth = detail::double_pose(truth[matches[k].first]).rotation;
     const Matrix3<double> R_estimate = detail::double_pose(estimate[matches[k].second]).rotation;
-    result.errors.add(matches[k].second, detail::finite_norm(truth_points[k] - S * estimate_points[k]),
-                      detail::angle_deg(R_truth.transpose() * S.rotation * R_estimate));
+    detail::add_error(matches[k].second, truth_points[k] - S * estimate_points[k],
+                      R_truth.transpose() * S.rotation * R_estimate, result.errors);
   }
   result.translation_m = error_statistics(result.errors.translation_m);
   result.rotation_deg = error_statistics(result.errors.rotation_deg);
@@ -182,7 +176,7 @@ template <typename Truth, typename Estimate>
     P.translation *= options.scale;
     const SE3<double> E = P.inverse() * Q;
     used[i] = used[j] = 1;
-    result.errors.add(order[i], detail::finite_norm(E.translation), detail::angle_deg(E.rotation));
+    detail::add_error(order[i], E.translation, E.rotation, result.errors);
   }
   std::vector<TimeMatch> used_matches;
   for (std::size_t i = 0; i < n; ++i) {

@@ -110,40 +110,36 @@ class OpticalFlowTracker {
 
  private:
   // The strongest keypoint of every cell; the cells of each box are at most as many as it may have points, and so for
-  // the rest.
+  // the rest. A keypoint belongs to the first box that holds it.
   void choose(const std::vector<cv::KeyPoint>& keypoints, span<const Box<float>> boxes, cv::Size size) {
     const auto width = static_cast<float>(size.width), height = static_cast<float>(size.height);
-    regions_.clear();
-    std::size_t cells = 0;
+    taken_.assign(keypoints.size(), 0);
     const auto add = [&](const Box<float>& box, int points) {
-      Region region{box, 0, 0, cells};
+      int across = 0, down = 0;
       if (is_proper(box) && points > 0) {
         const float side = std::sqrt(box.width() * box.height() / static_cast<float>(points));
-        region.across = std::clamp(static_cast<int>(box.width() / side), 1, points);
-        region.down = std::clamp(static_cast<int>(box.height() / side), 1, points / region.across);
+        across = std::clamp(static_cast<int>(box.width() / side), 1, points);
+        down = std::clamp(static_cast<int>(box.height() / side), 1, points / across);
       }
-      cells += static_cast<std::size_t>(region.across * region.down);
-      regions_.push_back(region);
+      strongest_.assign(static_cast<std::size_t>(across * down), nullptr);
+      for (std::size_t i = 0; i < keypoints.size(); ++i) {
+        const cv::KeyPoint& k = keypoints[i];
+        if (taken_[i] != 0 || !contains(box, k.pt.x, k.pt.y)) continue;
+        taken_[i] = 1;
+        if (across == 0) continue;
+        const auto cell = [](float x, float length, int n) {
+          return std::clamp(static_cast<int>(x / length * static_cast<float>(n)), 0, n - 1);
+        };
+        const int column = cell(k.pt.x - box.x1, box.width(), across), row = cell(k.pt.y - box.y1, box.height(), down);
+        const cv::KeyPoint*& best = strongest_[static_cast<std::size_t>(row * across + column)];
+        if (best == nullptr || k.response > best->response) best = &k;
+      }
+      for (const cv::KeyPoint* k : strongest_) {
+        if (k != nullptr) from_.push_back(k->pt);
+      }
     };
     for (const Box<float>& box : boxes) add(clip(box, width, height), options_.keypoints_per_box);
     add({0, 0, width, height}, options_.keypoints_outside);
-
-    strongest_.assign(cells, nullptr);
-    for (const cv::KeyPoint& k : keypoints) {
-      const auto region = std::find_if(regions_.begin(), regions_.end(),
-                                       [&](const Region& r) { return contains(r.box, k.pt.x, k.pt.y); });
-      if (region == regions_.end() || region->across == 0) continue;
-      const auto cell = [](float x, float length, int n) {
-        return static_cast<std::size_t>(std::clamp(static_cast<int>(x / length * static_cast<float>(n)), 0, n - 1));
-      };
-      const std::size_t column = cell(k.pt.x - region->box.x1, region->box.width(), region->across);
-      const std::size_t row = cell(k.pt.y - region->box.y1, region->box.height(), region->down);
-      const cv::KeyPoint*& best = strongest_[region->first + row * static_cast<std::size_t>(region->across) + column];
-      if (best == nullptr || k.response > best->response) best = &k;
-    }
-    for (const cv::KeyPoint* k : strongest_) {
-      if (k != nullptr) from_.push_back(k->pt);
-    }
   }
 
   // The strongest, of which the room has its share. Near people have many strong corners and the room around them few,
@@ -168,15 +164,9 @@ class OpticalFlowTracker {
     }
   }
 
-  struct Region {
-    Box<float> box;
-    int across, down;   // cells
-    std::size_t first;  // cell
-  };
-
   OpticalFlowOptions options_;
   std::vector<cv::Mat> previous_pyramid_, pyramid_;
-  std::vector<Region> regions_;
+  std::vector<char> taken_;
   std::vector<const cv::KeyPoint*> strongest_;
   std::vector<cv::Point2f> from_, to_, corners_;
   std::vector<unsigned char> found_;

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cmath>
-#include <cstring>
 #include <limits>
 
 #include <opencv2/core/mat.hpp>
@@ -31,20 +30,17 @@ inline namespace CFP_ISA {
   return is_real_matrix(matrix) && matrix.cols == 4 && (matrix.rows == 4 || matrix.rows == 3);
 }
 
-// cv::Mat::at checks in debug builds by calling the library; the address arithmetic does not.
-[[nodiscard]] inline unsigned char* element_address(const cv::Mat& matrix, int row, int column) noexcept {
-  return matrix.data + matrix.step.p[0] * static_cast<std::size_t>(row) +
-         matrix.step.p[1] * static_cast<std::size_t>(column);
+// cv::Mat::ptr checks in debug builds by calling the library; the address arithmetic does not.
+template <typename T>
+[[nodiscard]] T* row_of(const cv::Mat& matrix, int row) noexcept {
+  return reinterpret_cast<T*>(matrix.data + matrix.step.p[0] * static_cast<std::size_t>(row));
 }
 
 // An element of a CV_16U, CV_32F or CV_64F matrix.
 [[nodiscard]] inline double element(const cv::Mat& matrix, int row, int column) noexcept {
-  const auto read_as = [&](auto value) {
-    std::memcpy(&value, element_address(matrix, row, column), sizeof(value));
-    return static_cast<double>(value);
-  };
-  if (matrix.type() == CV_16UC1) return read_as(std::uint16_t());
-  return matrix.type() == CV_32FC1 ? read_as(float()) : read_as(double());
+  if (matrix.type() == CV_16UC1) return row_of<const std::uint16_t>(matrix, row)[column];
+  if (matrix.type() == CV_32FC1) return static_cast<double>(row_of<const float>(matrix, row)[column]);
+  return row_of<const double>(matrix, row)[column];
 }
 
 // Metres at the nearest pixel, -1: none.
@@ -108,11 +104,11 @@ inline Status sample_depth(const cv::Mat& depth, const PointSpan<float, 2>& pixe
 template <typename Scalar>
 Status to_se3(const cv::Mat& matrix, SE3<Scalar>& pose) noexcept {
   if (!detail::is_pose_matrix(matrix)) return Status::invalid_input;
-  Matrix4<double> T = Matrix4<double>::Identity();
+  SE3<double> read;
   for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 4; ++column) T(row, column) = detail::element(matrix, row, column);
+    for (int column = 0; column < 3; ++column) read.rotation(row, column) = detail::element(matrix, row, column);
+    read.translation[row] = detail::element(matrix, row, 3);
   }
-  SE3<double> read = SE3<double>::from_matrix(T);
   if (!is_rigid_motion(read)) return Status::invalid_input;
   read.rotation = normalized_rotation(read.rotation);
   pose = read.template cast<Scalar>();
@@ -138,14 +134,13 @@ template <typename Scalar>
     for (int i = 0; i < count; ++i)
       values[4 + i] = detail::element(distortion, distortion.rows == 1 ? 0 : i, distortion.rows == 1 ? i : 0);
   }
-  for (const double value : values) {
-    if (!is_finite(static_cast<Scalar>(value))) return Status::invalid_input;
+  const PinholeCamera<double> pinhole{values[0], values[1], values[2], values[3]};
+  const Matrix3<double> K = pinhole.matrix();
+  for (int i = 0; i < 9; ++i) {
+    const bool same = detail::element(camera_matrix, i / 3, i % 3) == K(i / 3, i % 3);
+    if (!same || !is_finite(static_cast<Scalar>(values[i]))) return Status::invalid_input;
   }
-  const auto positive = [](double focal_length) { return static_cast<Scalar>(focal_length) > 0; };
-  const auto zero = [&](int row, int column) { return detail::element(camera_matrix, row, column) == 0; };
-  if (!positive(values[0]) || !positive(values[1]) || !zero(0, 1) || !zero(1, 0) || !zero(2, 0) || !zero(2, 1) ||
-      detail::element(camera_matrix, 2, 2) != 1)
-    return Status::invalid_input;
+  if (!(static_cast<Scalar>(pinhole.fx) > 0 && static_cast<Scalar>(pinhole.fy) > 0)) return Status::invalid_input;
   const RadialTangentialCamera<double> read{values[0], values[1], values[2], values[3], values[4],
                                             values[5], values[6], values[7], values[8]};
   camera = read.template cast<Scalar>();
@@ -161,13 +156,10 @@ Status write_pose(const SE3<Scalar>& pose, cv::Mat& matrix) noexcept {
   const Matrix4<Scalar> T = pose.matrix();
   for (int row = 0; row < matrix.rows; ++row) {
     for (int column = 0; column < 4; ++column) {
-      const auto write = [&](auto number) {
-        std::memcpy(detail::element_address(matrix, row, column), &number, sizeof(number));
-      };
       if (matrix.type() == CV_32FC1)
-        write(static_cast<float>(T(row, column)));
+        detail::row_of<float>(matrix, row)[column] = static_cast<float>(T(row, column));
       else
-        write(static_cast<double>(T(row, column)));
+        detail::row_of<double>(matrix, row)[column] = static_cast<double>(T(row, column));
     }
   }
   return Status::ok;

@@ -33,30 +33,15 @@ inline namespace CFP_ISA {
 template <typename Camera, typename Scalar>
 void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& workspace, BundleResult& result) {
   const BundleIndex& index = workspace.index;
-  BundleSchur& schur = workspace.schur;
-  const std::size_t poses = index.caller_pose.size(), slots = index.slots.size();
-  if (index.eliminate_poses)
-    find_envelope<6>(index, index.points, schur.envelope);
-  else
-    find_envelope<3>(index, index.free_poses, schur.envelope);
+  const std::size_t poses = index.caller_pose.size();
+  index.eliminate_poses ? reserve_schur<6>(index, workspace.schur) : reserve_schur<3>(index, workspace.schur);
   result.free_poses = index.free_poses;
   result.adjusted_points = index.points;
-  result.factor_blocks = schur.envelope.blocks;
-  const std::size_t kept_size = index.eliminate_poses ? 3 : 6;
-  for (std::size_t part = 0; part < bundle_parts; ++part) {
-    schur.blocks[part].resize(kept_size * kept_size * schur.envelope.blocks);
-    schur.right_side[part].resize(kept_size * schur.envelope.first.size());
-  }
-  schur.triangles.resize((index.eliminate_poses ? 42 : 12) * index.eliminated_part.back());
-  schur.couplings.resize(18 * slots);
-  schur.coupled.resize(slots);
-  schur.coupled_end.resize(index.eliminated_part.back());
-  schur.pose_steps.resize(6 * index.free_poses);
-  schur.point_steps.resize(3 * index.points);
+  result.factor_blocks = workspace.schur.envelope.blocks;
   workspace.state.poses.resize(poses);
   workspace.state.points.resize(index.points);
   for (BundleLinearization* linear : {&workspace.linear, &workspace.next_linear}) {
-    linear->slots.resize(BundleLinearization::slot_doubles * slots);
+    linear->slots.resize(BundleLinearization::slot_doubles * index.slots.size());
     linear->points.resize(BundleLinearization::point_doubles * index.points);
     linear->poses.resize(BundleLinearization::pose_doubles * index.free_poses);
     linear->costs.resize(poses);

@@ -74,13 +74,10 @@ inline void order_poses(BundleIndex& index) {
 /// that neighbours in memory stay neighbours.
 inline void sort_observations(BundleIndex& index) {
   const std::size_t poses = index.caller_pose.size();
-  if (index.eliminate_poses) {
-    group_by(index.kept, index.points, point_of, index.slot_begin, index.observations);
-    group_by(index.observations, poses, pose_of, index.slot_begin, index.kept);
-  } else {
-    group_by(index.kept, poses, pose_of, index.slot_begin, index.observations);
-    group_by(index.observations, index.points, point_of, index.slot_begin, index.kept);
-  }
+  const auto eliminated = [&](const BundleMeasurement& m) { return index.eliminate_poses ? m.pose : m.point; };
+  const auto kept = [&](const BundleMeasurement& m) { return index.eliminate_poses ? m.point : m.pose; };
+  group_by(index.kept, index.eliminate_poses ? index.points : poses, kept, index.slot_begin, index.observations);
+  group_by(index.observations, index.eliminate_poses ? poses : index.points, eliminated, index.slot_begin, index.kept);
   index.slots.resize(index.kept.size());
   for (std::size_t s = 0; s < index.slots.size(); ++s) index.kept[s].slot = s, index.slots[s] = index.kept[s];
   const auto range_of = [](const BundleMeasurement& m) { return 2 * m.pose + (m.stereo ? 1 : 0); };

@@ -68,15 +68,11 @@ void reserve_columns(std::size_t n, PoseWorkspace<Scalar>& workspace, PoseColumn
   }
 }
 
-/// Weights by their mean, information from sigma or 1 / sigma^2, nothing left out, no errors yet; slots up to a whole
-/// packet are filled.
+/// Weights by their mean, nothing left out, no errors yet; slots up to a whole packet are filled.
 template <typename Scalar>
-void finish_columns(PoseColumns<Scalar>& columns, std::size_t begin, std::size_t end, bool sigmas,
-                    double scale) noexcept {
-  const Scalar normal = static_cast<Scalar>(1 / columns.mean_weight), factor = static_cast<Scalar>(scale);
+void finish_columns(PoseColumns<Scalar>& columns, std::size_t begin, std::size_t end) noexcept {
+  const Scalar normal = static_cast<Scalar>(1 / columns.mean_weight);
   for (std::size_t i = begin; i < end; ++i) {
-    const Scalar given = columns.information[i];
-    columns.information[i] = sigmas ? factor / (given * given) : factor * given;
     columns.weight[i] *= normal;
     columns.active[i] = columns.weight[i];
     columns.error[i] = Scalar(0);
@@ -108,6 +104,7 @@ void load_columns(const PoseObservations<Input>& observations, const Camera& cam
     return values.empty() ? otherwise : static_cast<double>(values[i]);
   };
   const double widest = has_sigmas ? 1e6 : 1e12;
+  const Scalar factor = static_cast<Scalar>(1 / (fu * fu));
   std::size_t mono = 0, stereo = columns.stereo_begin;
   double sum = 0, sum_sq = 0;
   for (std::size_t i = 0; i < n; ++i) {
@@ -130,7 +127,8 @@ void load_columns(const PoseObservations<Input>& observations, const Camera& cam
     columns.z[slot] = static_cast<Scalar>(z);
     columns.u[slot] = static_cast<Scalar>((u - cu) * fu), columns.v[slot] = static_cast<Scalar>((v - cv) * fv);
     columns.u_right[slot] = static_cast<Scalar>((right - cu) * fu);
-    columns.information[slot] = static_cast<Scalar>(given);
+    const Scalar s = static_cast<Scalar>(given);
+    columns.information[slot] = has_sigmas ? factor / (s * s) : factor * s;
     columns.weight[slot] = static_cast<Scalar>(w);
     columns.index[slot] = static_cast<std::uint32_t>(i);
     sum += w, sum_sq += w * w;
@@ -142,8 +140,8 @@ void load_columns(const PoseObservations<Input>& observations, const Camera& cam
   if (result.used == 0) return;
   result.effective = sum / sum_sq * sum;
   columns.mean_weight = sum / result.used;
-  finish_columns(columns, 0, mono, has_sigmas, 1 / (fu * fu));
-  finish_columns(columns, columns.stereo_begin, stereo, has_sigmas, 1 / (fu * fu));
+  finish_columns(columns, 0, mono);
+  finish_columns(columns, columns.stereo_begin, stereo);
 }
 
 }  // namespace CFP_ISA

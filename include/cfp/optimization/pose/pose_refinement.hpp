@@ -35,12 +35,14 @@ template <typename Scalar, typename Input, typename Camera>
 [[nodiscard]] PoseResult refine_pose(const PoseObservations<Input>& observations, const Camera& camera,
                                      const SE3<double>& T_cam_world, const PoseOptions& options,
                                      PoseWorkspace<Scalar>& workspace, span<char> inliers = {}) {
-  CFP_ASSERT(!invalid_field(options));
+  const PoseObservations<Input>& o = observations;
+  CFP_ASSERT(!invalid_field(options) && o.pixels.size() == o.points.size());
+  CFP_ASSERT(detail::fits(o.points.size(), inliers, o.weights, o.sigmas, o.inverse_sigmas_sq, o.depths, o.u_right));
   PoseResult result;
   result.T_cam_world = T_cam_world;
   std::fill(inliers.begin(), inliers.end(), char(0));
-  if (!detail::has_valid_shape(observations, inliers) || !is_rigid_motion(T_cam_world) ||
-      !detail::is_usable_camera(camera)) {
+  const bool twice = (!o.sigmas.empty() && !o.inverse_sigmas_sq.empty()) || (!o.depths.empty() && !o.u_right.empty());
+  if (twice || !is_rigid_motion(T_cam_world) || !detail::is_usable_camera(camera)) {
     if (!is_finite(T_cam_world.rotation.sum() + T_cam_world.translation.sum())) result.T_cam_world = SE3<double>();
     result.status = SolverStatus::invalid_input;
     return result;
@@ -48,7 +50,7 @@ template <typename Scalar, typename Input, typename Camera>
   const SE3<double> start{normalized_rotation(T_cam_world.rotation), Vector3<double>::Zero()};
   const Vector3<double> centre = -(start.rotation.transpose() * T_cam_world.translation);
   detail::PoseModel<Scalar, Camera> model{camera, options, {}, {}, {}};
-  detail::load_columns(observations, camera, centre, workspace, model.columns, result);
+  detail::load_columns(o, camera, centre, workspace, model.columns, result);
   if (result.used < options.min_observations) {
     const bool no_weight = result.used == 0 && result.zero_weight > 0 && result.invalid == 0;
     result.status = no_weight ? SolverStatus::no_weight : SolverStatus::not_enough_data;
@@ -58,10 +60,19 @@ template <typename Scalar, typename Input, typename Camera>
   detail::NormalEquations<6> equations;
   result.status = detail::run_rounds(model, start, result, pose, equations);
   result.evaluations = model.evaluations;
-  detail::PoseInliers agreed;
+  int rows = 0;       // of the inliers: two of a pixel, three with a depth
+  double agreed = 0;  // the inliers' weight in the last round
   if (is_solved(result.status)) {
-    agreed = detail::count_inliers(options, model.columns, result, inliers);
-    const bool untested = result.inliers < result.used && agreed.rows < options.min_inlier_rows;
+    detail::for_each_observation(model.columns, options, [&](std::size_t i, bool inlier) {
+      if (!inlier) return;
+      ++result.inliers;
+      rows += i < model.columns.stereo_begin ? 2 : 3;
+      result.chi2 += static_cast<double>(model.columns.weight[i] * model.columns.error[i]);
+      agreed += static_cast<double>(model.columns.active[i]);
+      if (!inliers.empty()) inliers[model.columns.index[i]] = 1;
+    });
+    result.chi2 *= model.columns.mean_weight;
+    const bool untested = result.inliers < result.used && rows < options.min_inlier_rows;
     if (untested || result.inliers < options.min_observations) result.status = SolverStatus::not_enough_inliers;
   }
   if (!is_solved(result.status)) {
@@ -70,7 +81,7 @@ template <typename Scalar, typename Input, typename Camera>
     return result;
   }
   result.T_cam_world = {pose.rotation, pose.translation - pose.rotation * centre};
-  const double scale = model.influence > 0 ? agreed.weight / model.influence : 1.0;
+  const double scale = model.influence > 0 ? agreed / model.influence : 1.0;
   const Matrix6<double> H = equations.H.selfadjointView<Eigen::Upper>();
   result.information = H * model.columns.mean_weight * scale;
   return result;

@@ -67,50 +67,19 @@ int keep_inliers(const PoseOptions& options, PoseColumns<Scalar>& columns, bool&
   return count;
 }
 
-struct PoseInliers {
-  int rows = 0;       // two of a pixel, three with a depth
-  double weight = 0;  // in the last round
-};
-
-/// Counts and marks the inliers by the stored errors, and sums their w s.
-template <typename Scalar>
-PoseInliers count_inliers(const PoseOptions& options, const PoseColumns<Scalar>& columns, PoseResult& result,
-                          span<char> inliers) noexcept {
-  PoseInliers out;
-  double chi2_sum = 0;
-  for_each_observation(columns, options, [&](std::size_t i, bool inlier) {
-    result.inliers += inlier ? 1 : 0;
-    out.rows += inlier ? (i < columns.stereo_begin ? 2 : 3) : 0;
-    chi2_sum += inlier ? static_cast<double>(columns.weight[i] * columns.error[i]) : 0.0;
-    out.weight += inlier ? static_cast<double>(columns.active[i]) : 0.0;
-    if (!inliers.empty()) inliers[columns.index[i]] = inlier ? 1 : 0;
-  });
-  result.chi2 = chi2_sum * columns.mean_weight;
-  return out;
-}
-
-/// When a round ends. Gauss-Newton until a step fails.
-template <typename Scalar>
-[[nodiscard]] LevenbergMarquardtOptions round_options(const PoseOptions& options, bool hands_over, int used) noexcept {
-  LevenbergMarquardtOptions round;
-  round.max_iterations = options.max_iterations;
-  round.initial_damping = round.min_damping = 0;
-  round.rejected_damping = 1e-3;
-  round.max_damping = 1e8;
-  round.min_relative_decrease = static_cast<double>(std::numeric_limits<Scalar>::epsilon());
-  round.min_absolute_decrease =
-      hands_over ? (std::max)(options.min_decrease, options.handover_decrease * used) : options.min_decrease;
-  return round;
-}
-
 /// Runs the rounds from a start at the origin; afterwards model and equations belong to the pose.
 template <typename Scalar, typename Camera>
 SolverStatus run_rounds(PoseModel<Scalar, Camera>& model, const SE3<double>& start, PoseResult& result,
                         SE3<double>& pose, NormalEquations<6>& equations) noexcept {
-  using Problem = DenseLeastSquares<6, SE3<double>, PoseModel<Scalar, Camera>>;
   const PoseOptions& options = model.options;
   constexpr double min_pivot =
       (std::max)(static_cast<double>(std::numeric_limits<Scalar>::epsilon()), Tolerance<double>::degenerate);
+  LevenbergMarquardtOptions steps;  // Gauss-Newton until a step fails
+  steps.max_iterations = options.max_iterations;
+  steps.initial_damping = steps.min_damping = 0;
+  steps.rejected_damping = 1e-3;
+  steps.max_damping = 1e8;
+  steps.min_relative_decrease = static_cast<double>(std::numeric_limits<Scalar>::epsilon());
   SolverStatus status = SolverStatus::not_enough_data;
   pose = start;
   for (std::size_t r = 0; r < options.round_count; ++r) {
@@ -120,9 +89,11 @@ SolverStatus run_rounds(PoseModel<Scalar, Camera>& model, const SE3<double>& sta
     if (r > 0 && options.from_start && !changed && options.rounds[r] == model.round) continue;
     model.round = options.rounds[r];
     const bool hands_over = !options.from_start && r + 1 < options.round_count;
-    Problem problem(model, options.from_start ? start : pose, min_pivot);
-    const LeastSquaresResult solved =
-        minimize_least_squares(problem, round_options<Scalar>(options, hands_over, result.used));
+    steps.min_absolute_decrease =
+        hands_over ? (std::max)(options.min_decrease, options.handover_decrease * result.used) : options.min_decrease;
+    DenseLeastSquares<6, SE3<double>, PoseModel<Scalar, Camera>> problem(model, options.from_start ? start : pose,
+                                                                         min_pivot);
+    const LeastSquaresResult solved = minimize_least_squares(problem, steps);
     ++result.rounds;
     status = solved.status;
     if (!is_solved(status)) return status;
@@ -133,13 +104,6 @@ SolverStatus run_rounds(PoseModel<Scalar, Camera>& model, const SE3<double>& sta
       (void)model.linearize(pose, equations);  // the last trial was refused
   }
   return status;
-}
-
-template <typename Input>
-[[nodiscard]] bool has_valid_shape(const PoseObservations<Input>& o, [[maybe_unused]] span<char> inliers) noexcept {
-  CFP_ASSERT(o.pixels.size() == o.points.size());
-  CFP_ASSERT(fits(o.points.size(), inliers, o.weights, o.sigmas, o.inverse_sigmas_sq, o.depths, o.u_right));
-  return (o.sigmas.empty() || o.inverse_sigmas_sq.empty()) && (o.depths.empty() || o.u_right.empty());
 }
 
 }  // namespace CFP_ISA
