@@ -255,6 +255,10 @@ TEMPLATE_TEST_CASE("After a first call the stage allocates nothing and repeats i
   const cfp::FrameOptions options;
   CHECK(cfp_test::allocations_in([&] { run.coarse(options); }) == 0);
   CHECK(run.state.static_probability == before);
+  // Later a box may hold all that the frame has.
+  for (auto& box : run.scene.boxes) box = {0, 0, 640, 480};
+  CHECK(cfp_test::allocations_in([&] { run.coarse(options); }) == 0);
+  CHECK(run.state.report.outside == 0);
 }
 
 TEST_CASE("The flow at a keypoint's place is the score of the next pair in its box, with a depth or without",

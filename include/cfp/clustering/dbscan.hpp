@@ -48,7 +48,9 @@ struct DbscanWorkspace {
   std::vector<std::uint32_t> neighbours;
   std::vector<int> labels;  // of sorted values
 
-  void reserve(std::size_t n) { index.reserve(n), values.reserve(n), neighbours.reserve(n), labels.reserve(n); }
+  void reserve(std::size_t n) {
+    sorted.reserve(n), index.reserve(n), values.reserve(n), neighbours.reserve(n), labels.reserve(n);
+  }
 };
 
 namespace detail {
@@ -153,9 +155,8 @@ DbscanResult dbscan_sorted(span<const non_deduced<Scalar>> values, const DbscanO
 /// share a cluster. A border point (not core, but within eps of a core point) joins its nearest core point; of two
 /// equally near ones the lower value (which leaves no choice: equal values are core together and share their cluster).
 /// So the labels depend on the values alone and not on their order. Distances are differences as rounded in Scalar; eps
-/// is rounded to Scalar. NaN and infinite values are noise. O(n log n); deterministic; allocates only
-/// when the workspace grows. Departure: the original lets a border point join the cluster that happens to find it
-/// first.
+/// is rounded to Scalar. NaN and infinite values are noise. O(n log n); deterministic; allocates only when the
+/// workspace grows. Departure: the original lets a border point join the cluster that happens to find it first.
 template <typename Scalar>
 DbscanResult dbscan(span<const non_deduced<Scalar>> values, const DbscanOptions& options,
                     DbscanWorkspace<Scalar>& workspace, span<int> labels) {

@@ -34,7 +34,10 @@ template <typename Camera, typename Scalar>
 void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& workspace, BundleResult& result) {
   const BundleIndex& index = workspace.index;
   const std::size_t poses = index.caller_pose.size();
-  index.eliminate_poses ? reserve_schur<6>(index, workspace.schur) : reserve_schur<3>(index, workspace.schur);
+  if (index.eliminate_poses)
+    reserve_schur<6>(index, workspace.schur);
+  else
+    reserve_schur<3>(index, workspace.schur);
   result.free_poses = index.free_poses;
   result.adjusted_points = index.points;
   result.factor_blocks = workspace.schur.envelope.blocks;
