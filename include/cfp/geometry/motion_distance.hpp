@@ -64,19 +64,15 @@ template <typename Camera, typename Scalar>
     a *= per_variance, b *= per_variance, c *= per_variance;
   }
   const Real rank_two = a * c - b * b;  // not below 0 but for rounding
-  const Real per_det = Real(1) / (Real(1) + a + c + (rank_two > Real(0) ? rank_two : Real(0)));
-  a += Real(1), c += Real(1);
-  using V = Vector2<Real>;
-  const V r = pair.r.template cast<Real>(), along = pair.along.template cast<Real>();
-  const auto times_inverse = [&](const V& v) {
-    return V((c * v[0] - b * v[1]) * per_det, (a * v[1] - b * v[0]) * per_det);
+  const Real det = Real(1) + a + c + (rank_two > Real(0) ? rank_two : Real(0));
+  const auto adjugate = [&](Real x, Real y) {
+    return (Real(1) + c) * x * x - Real(2) * b * x * y + (Real(1) + a) * y * y;
   };
-  // Sherman and Morrison: the inverse of W + kappa J J^T takes r its part along J but for 1 / (1 + kappa J^T W^-1 J).
-  const V along_w = times_inverse(along);
-  const Real spread = Real(pair.sigma_z) / Real(sigma_px), kappa = spread * spread;
-  const Real explained = r.dot(along_w), length_sq = along.dot(along_w);
+  // W + kappa J J^T has the adjugate of W plus kappa times that of J J^T: sums of squares, however large kappa is.
+  const Real rx(pair.r[0]), ry(pair.r[1]), jx(pair.along[0]), jy(pair.along[1]);
+  const Real spread = Real(pair.sigma_z) / Real(sigma_px), kappa = spread * spread, across = jx * ry - jy * rx;
   const Scalar distance_sq =
-      static_cast<Scalar>(r.dot(times_inverse(r)) - explained * explained * (kappa / (Real(1) + kappa * length_sq)));
+      static_cast<Scalar>((adjugate(rx, ry) + kappa * across * across) / (det + kappa * adjugate(jx, jy)));
   const Scalar distance = sqrt(distance_sq > Scalar(0) ? distance_sq : Scalar(0));
   return has_distance(distance) && is_finite(distance_sq) ? distance : none;
 }

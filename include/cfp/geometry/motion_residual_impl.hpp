@@ -100,10 +100,10 @@ PairTerm add_pair(const MotionResidual<Scalar>& pair, double sigma_px, const Vec
       e[q] -= M[q][k] * moved[k];
     }
   }
-  const double kept = 1 / (1 + j[0] * j[0] + j[1] * j[1]), explained = j[0] * e[0] + j[1] * e[1];
-  const double distance_sq = (std::max)(e[0] * e[0] + e[1] * e[1] - explained * explained * kept, 0.0);
+  const double kept = 1 / (1 + j[0] * j[0] + j[1] * j[1]), across = j[0] * e[1] - j[1] * e[0];
+  const double distance_sq = (e[0] * e[0] + e[1] * e[1] + across * across) * kept;
+  if (!is_finite(distance_sq)) return {};
   const double root = 1 / (1 + distance_sq / loss_sq), w = root * root;
-  if (!is_finite(w)) return {};
   for (int a = 0; a < 6; ++a) {
     const double share = (j[0] * M[0][a] + j[1] * M[1][a]) * kept;
     const double m0 = w * (M[0][a] - j[0] * share), m1 = w * (M[1][a] - j[1] * share);

@@ -6,15 +6,14 @@
 #include <cmath>
 
 #include "cfp/core/numeric.hpp"
-#include "cfp/core/types.hpp"
 #include "cfp/math/cubic.hpp"
 
 namespace cfp::detail {
 
-// (u, v, w); T is a scalar, or an array that holds one for each of two points or lines.
-template <typename T>
+// The point or line (u, v, w).
+template <typename Real>
 struct Triple {
-  T u, v, w;
+  Real u, v, w;
 };
 
 // p^T C p for p = (u, v, w), C symmetric.
@@ -25,28 +24,8 @@ struct Conic {
 
 inline namespace CFP_ISA {
 
-// One number for each of two points or lines. Each operation is evaluated by itself: Eigen's expressions of several
-// would each be compiled in every host's unit.
 template <typename Real>
-struct Pair {
-  Eigen::Array<Real, 2, 1> both;
-
-  Pair() noexcept = default;
-  Pair(const Eigen::Array<Real, 2, 1>& values) noexcept : both(values) {}
-  Pair(Real first, Real second) noexcept : both(first, second) {}
-  Real operator[](int i) const noexcept { return both[i]; }
-  friend Pair operator+(const Pair& x, const Pair& y) noexcept { return {x.both + y.both}; }
-  friend Pair operator-(const Pair& x, const Pair& y) noexcept { return {x.both - y.both}; }
-  friend Pair operator*(const Pair& x, const Pair& y) noexcept { return {x.both * y.both}; }
-  friend Pair operator/(const Pair& x, const Pair& y) noexcept { return {x.both / y.both}; }
-  friend Pair operator*(Real f, const Pair& x) noexcept { return Pair(f, f) * x; }
-  friend Pair operator/(Real f, const Pair& x) noexcept { return Pair(f, f) / x; }
-  friend Pair operator-(const Pair& x, Real f) noexcept { return x - Pair(f, f); }
-  friend Pair sqrt(const Pair& x) noexcept { return {x.both.sqrt()}; }
-};
-
-template <typename T>
-[[nodiscard]] CFP_INLINE T squared_norm(const Triple<T>& x) noexcept {
+[[nodiscard]] CFP_INLINE Real squared_norm(const Triple<Real>& x) noexcept {
   return x.u * x.u + x.v * x.v + x.w * x.w;
 }
 
@@ -59,21 +38,19 @@ struct P3PEquations {
   Real e01, e02, e12;  // squared distances of the rays' ends
 
   // The squared edges 01, 02 and 12 minus what they should be.
-  template <typename T>
-  [[nodiscard]] CFP_INLINE Triple<T> residual(const Triple<T>& p) const noexcept {
-    const T w1 = p.w + p.u, w2 = p.w + p.v, difference = p.u - p.v;
+  [[nodiscard]] CFP_INLINE Triple<Real> residual(const Triple<Real>& p) const noexcept {
+    const Real w1 = p.w + p.u, w2 = p.w + p.v, difference = p.u - p.v;
     return {p.u * p.u + e01 * p.w * w1 - a, p.v * p.v + e02 * p.w * w2 - b,
             difference * difference + e12 * w1 * w2 - Real(1)};
   }
 
   // The Newton step from p with residual r, to be subtracted: the Jacobian is [A 0 B; 0 C D; E F G].
-  template <typename T>
-  [[nodiscard]] CFP_INLINE Triple<T> step(const Triple<T>& p, const Triple<T>& r) const noexcept {
-    const T w1 = p.w + p.u, w2 = p.w + p.v, twice = Real(2) * (p.u - p.v);
-    const T A = Real(2) * p.u + e01 * p.w, B = e01 * (p.w + w1);
-    const T C = Real(2) * p.v + e02 * p.w, D = e02 * (p.w + w2);
-    const T E = e12 * w2 + twice, F = e12 * w1 - twice, G = e12 * (w1 + w2);
-    const T minor = C * G - D * F, inverse = Real(1) / (A * minor - B * C * E);
+  [[nodiscard]] CFP_INLINE Triple<Real> step(const Triple<Real>& p, const Triple<Real>& r) const noexcept {
+    const Real w1 = p.w + p.u, w2 = p.w + p.v, twice = Real(2) * (p.u - p.v);
+    const Real A = Real(2) * p.u + e01 * p.w, B = e01 * (p.w + w1);
+    const Real C = Real(2) * p.v + e02 * p.w, D = e02 * (p.w + w2);
+    const Real E = e12 * w2 + twice, F = e12 * w1 - twice, G = e12 * (w1 + w2);
+    const Real minor = C * G - D * F, inverse = Real(1) / (A * minor - B * C * E);
     return {inverse * (minor * r.u + B * (F * r.v - C * r.w)),
             inverse * (D * (E * r.u - A * r.w) + (A * G - B * E) * r.v),
             inverse * (A * (C * r.w - F * r.v) - C * E * r.u)};
@@ -116,7 +93,7 @@ struct P3PEquations {
 // The lines l, m of the degenerate conic C = l m^T + m l^T, up to scale: its adjugate is -(l x m)(l x m)^T, and
 // C + hat(l x m) has rank one. False when they are not real.
 template <typename Real>
-[[nodiscard]] CFP_INLINE bool line_pair(const Conic<Real>& C, Triple<Pair<Real>>& lines) noexcept {
+[[nodiscard]] CFP_INLINE bool line_pair(const Conic<Real>& C, Triple<Real> (&lines)[2]) noexcept {
   const Real a01 = C.uw * C.vw - C.uv * C.ww, a02 = C.uv * C.vw - C.vv * C.uw, a12 = C.uv * C.uw - C.uu * C.vw;
   const Real a00 = C.vv * C.ww - C.vw * C.vw, a11 = C.uu * C.ww - C.uw * C.uw, a22 = C.uu * C.vv - C.uv * C.uv;
   Triple<Real> v{a02, a12, a22};
@@ -137,9 +114,8 @@ template <typename Real>
   const bool last_row = (std::max)(std::abs(wu), std::abs(wv)) > most;
   const Real diagonal = uu * uu - vv * vv, other = uv * uv - vu * vu;
   const bool column = diagonal > other, row = diagonal + other > Real(0);
-  lines.u = {last_column ? uw : column ? uu : uv, last_row ? wu : row ? uu : vu};
-  lines.v = {last_column ? vw : column ? vu : vv, last_row ? wv : row ? uv : vv};
-  lines.w = {last_column ? ww : column ? wu : wv, last_row ? ww : row ? uw : vw};
+  lines[0] = last_column ? Triple<Real>{uw, vw, ww} : column ? Triple<Real>{uu, vu, wu} : Triple<Real>{uv, vv, wv};
+  lines[1] = last_row ? Triple<Real>{wu, wv, ww} : row ? Triple<Real>{uu, uv, uw} : Triple<Real>{vu, vv, vw};
   return true;
 }
 
@@ -147,45 +123,39 @@ template <typename Real>
 template <typename Real>
 [[nodiscard]] CFP_INLINE int p3p_depths(const P3PEquations<Real>& q, Triple<Real> (&solutions)[4]) noexcept {
   const Real s = q.degenerate_conic(), scale = Real(1) / (Real(1) + std::abs(s));
-  Triple<Pair<Real>> l;
-  if (!line_pair(q.pencil(scale, s * scale), l)) return 0;
+  Triple<Real> lines[2];
+  if (!line_pair(q.pencil(scale, s * scale), lines)) return 0;
 
   // Where both lines meet C1 or C2: points (-lw lu, -lw lv, n), the nearest to the origin of the plane w = 1, plus
   // t (-lv, lu, 0); qa t^2 + 2 qb t + qc = 0.
   const bool second = std::abs(s) < Real(1);
   const Conic<Real> C = q.pencil(second ? Real(0) : Real(1), second ? Real(1) : Real(0));
-  const Pair<Real> n = l.u * l.u + l.v * l.v;
-  const Pair<Real> gu = C.uu * l.u + C.uv * l.v, gv = C.uv * l.u + C.vv * l.v, g = l.u * gu + l.v * gv;
-  const Pair<Real> qa = (C.uu + C.vv) * n - g;
-  const Pair<Real> qb = n * (C.vw * l.u - C.uw * l.v) - l.w * (l.u * gv - l.v * gu);
-  const Pair<Real> qc = l.w * (l.w * g - Real(2) * n * (C.uw * l.u + C.vw * l.v)) + C.ww * n * n;
-  const Pair<Real> square = qb * qb, product = qa * qc, discriminant = square - product;
-
   int count = 0;
-  for (int i = 0; i < 2; ++i) {
+  for (const Triple<Real>& l : lines) {
+    const Real n = l.u * l.u + l.v * l.v;
+    const Real gu = C.uu * l.u + C.uv * l.v, gv = C.uv * l.u + C.vv * l.v, g = l.u * gu + l.v * gv;
+    const Real qa = (C.uu + C.vv) * n - g;
+    const Real qb = n * (C.vw * l.u - C.uw * l.v) - l.w * (l.u * gv - l.v * gu);
+    const Real qc = l.w * (l.w * g - Real(2) * n * (C.uw * l.u + C.vw * l.v)) + C.ww * n * n;
+    const Real square = qb * qb, product = qa * qc, discriminant = square - product;
     // A slightly negative discriminant is a double root after rounding; the polish tells.
-    if (!(discriminant[i] > Real(-1e-8) * (square[i] + std::abs(product[i])))) continue;
-    const Real root = std::sqrt((std::max)(discriminant[i], Real(0))), sum = -(qb[i] + std::copysign(root, qb[i]));
-    const Pair<Real> t = Pair<Real>(sum, qc[i]) / Pair<Real>(qa[i], sum);
-    const Real lu = l.u[i], lv = l.v[i], lw = l.w[i];
-    Triple<Pair<Real>> p{-lv * t - lw * lu, lu * t - lw * lv, Pair<Real>(n[i], n[i])};
-    const Pair<Real> w1 = p.w + p.u, w2 = p.w + p.v;
-    const Pair<Real> unit = Real(1) / sqrt((p.u - p.v) * (p.u - p.v) + q.e12 * w1 * w2);
-    p = {p.u * unit, p.v * unit, p.w * unit};
-    const Triple<Pair<Real>> change = q.step(p, q.residual(p));
-    const Pair<Real> change_sq = squared_norm(change);
-    for (int k = 0; k < 2; ++k) {
+    if (!(discriminant > Real(-1e-8) * (square + std::abs(product)))) continue;
+    const Real root = std::sqrt((std::max)(discriminant, Real(0))), sum = -(qb + std::copysign(root, qb));
+    for (const Real t : {sum / qa, qc / sum}) {
       Triple<Real>& x = solutions[count];
-      x = {p.u[k], p.v[k], p.w[k]};
+      x = {-l.v * t - l.w * l.u, l.u * t - l.w * l.v, n};
+      const Real difference = x.u - x.v;
+      const Real unit = Real(1) / std::sqrt(difference * difference + q.e12 * (x.w + x.u) * (x.w + x.v));
+      x = {x.u * unit, x.v * unit, x.w * unit};
+      const Triple<Real> change = q.step(x, q.residual(x));
       // The equations are quadratic: what a step leaves is of the order of its square.
-      if (change_sq[k] < Real(1e-20)) {
-        x = {x.u - change.u[k], x.v - change.v[k], x.w - change.w[k]};
+      if (squared_norm(change) < Real(1e-20)) {
+        x = {x.u - change.u, x.v - change.v, x.w - change.w};
       } else if (!q.polish(x)) {
         continue;
       }
       // A point in the camera's centre is on no ray.
-      if (!(x.w + (std::min)(x.u, x.v) > Real(1e-12) && x.w > Real(1e-12))) continue;
-      ++count;
+      if (x.w + (std::min)(x.u, x.v) > Real(1e-12) && x.w > Real(1e-12)) ++count;
     }
   }
   return count;

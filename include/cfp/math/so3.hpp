@@ -8,6 +8,7 @@
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/types.hpp"
+#include "cfp/math/matrix3.hpp"
 
 namespace cfp {
 inline namespace CFP_ISA {
@@ -67,24 +68,19 @@ template <typename Scalar>
 template <typename Scalar>
 [[nodiscard]] Vector4<Scalar> quaternion(const Matrix3<Scalar>& R) noexcept {
   using std::sqrt;
-  Vector4<Scalar> q;
-  // The largest of the four numbers is computed from the diagonal, the others by division by it (Shepperd 1978).
-  Eigen::Index i = 3;
-  if (!(R.trace() > Scalar(0))) i = R(1, 1) > R(0, 0) ? (R(2, 2) > R(1, 1) ? 2 : 1) : (R(2, 2) > R(0, 0) ? 2 : 0);
-  if (i == 3) {
-    q[3] = Scalar(0.5) * sqrt(R.trace() + Scalar(1));
-    const Scalar scale = Scalar(0.25) / q[3];
-    for (Eigen::Index j = 0; j < 3; ++j) q[j] = scale * (R((j + 2) % 3, (j + 1) % 3) - R((j + 1) % 3, (j + 2) % 3));
-    return q;
+  Matrix4<Scalar> Q;  // 4 q q^T
+  Q(3, 3) = Scalar(1) + R.trace();
+  Eigen::Index largest = 3;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const Eigen::Index j = (i + 1) % 3, k = (i + 2) % 3;
+    Q(i, i) = Scalar(1) + R(i, i) - R(j, j) - R(k, k);
+    Q(i, j) = Q(j, i) = R(j, i) + R(i, j);
+    Q(i, 3) = Q(3, i) = R(k, j) - R(j, k);
+    if (Q(i, i) > Q(largest, largest)) largest = i;
   }
-  const Eigen::Index j = (i + 1) % 3, k = (i + 2) % 3;
-  q[i] = Scalar(0.5) * sqrt(R(i, i) - R(j, j) - R(k, k) + Scalar(1));
-  const Scalar scale = Scalar(0.25) / q[i];
-  q[j] = scale * (R(j, i) + R(i, j));
-  q[k] = scale * (R(k, i) + R(i, k));
-  q[3] = scale * (R(k, j) - R(j, k));
-  if (q[3] < Scalar(0)) q = -q;
-  return q;
+  // The column of the largest number: no small one is divided by (Shepperd 1978).
+  const Vector4<Scalar> q = Q.col(largest) * (Scalar(0.5) / sqrt(Q(largest, largest)));
+  return q[3] < Scalar(0) ? Vector4<Scalar>(-q) : q;
 }
 
 /// log: rotation matrix to rotation vector with angle in [0, pi] (at pi one of the two axes). Goes through the
@@ -127,21 +123,10 @@ template <typename Scalar>
   return so3_series(w, b, c);
 }
 
-/// The inverse of so3_left_jacobian for |w| < 2 pi: I - hat(w)/2 + d hat(w)^2, d = (1 - (t/2) cot(t/2)) / t^2.
+/// For |w| < 2 pi.
 template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> so3_left_jacobian_inverse(const Vector3<Scalar>& w) noexcept {
-  using std::cos;
-  using std::sin;
-  using std::sqrt;
-  const Scalar t2 = w.squaredNorm();
-  Scalar d;
-  if (t2 > Scalar(1e-2)) {
-    const Scalar half = Scalar(0.5) * sqrt(t2);
-    d = (Scalar(1) - half * cos(half) / sin(half)) / t2;
-  } else {
-    d = Scalar(1) / Scalar(12) + t2 / Scalar(720) * (Scalar(1) + t2 / Scalar(42) * (Scalar(1) + t2 / Scalar(40)));
-  }
-  return so3_series(w, Scalar(-0.5), d);
+  return inverse(so3_left_jacobian(w));
 }
 
 /// The rotation of R's normalised quaternion: to first order the nearest one to an R that is nearly a rotation. Removes
