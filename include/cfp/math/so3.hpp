@@ -123,7 +123,7 @@ template <typename Scalar>
   return so3_series(w, b, c);
 }
 
-/// For |w| < 2 pi.
+/// The inverse of so3_left_jacobian, for |w| < 2 pi.
 template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> so3_left_jacobian_inverse(const Vector3<Scalar>& w) noexcept {
   return inverse(so3_left_jacobian(w));
