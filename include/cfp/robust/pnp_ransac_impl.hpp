@@ -90,27 +90,14 @@ struct PnpProblem {
   }
 
   [[nodiscard]] double cost(const Model& pose, double bound) const noexcept {
-    using Lane = Eigen::Array<float, 8, 1>;
-    const Matrix3<float> R = pose.rotation.template cast<float>();
-    const Vector3<float> t = pose.translation.template cast<float>();
-    const double stop = bound * limit;
-    double sum = 0;
-    for (std::size_t first = 0; first < in.size; first += in.block) {
-      Lane cost = Lane::Zero();
-      for (std::size_t i = first; i < first + in.block; i += 8) {
-        const auto load = [&](std::size_t row) { return Eigen::Map<const Lane>(in.fast_row(row) + i); };
-        const Lane wx = load(X), wy = load(Y), wz = load(Z);
-        const auto moved = [&](int r) -> Lane { return R(r, 0) * wx + R(r, 1) * wy + R(r, 2) * wz + t[r]; };
-        // A depth that is not positive becomes a tiny one: a point behind the camera then is far off, as it has to be.
-        const Lane inverse = (moved(2).max)(1e-9F).inverse();
-        const Lane dx = moved(0) * inverse - load(ray_x), dy = moved(1) * inverse - load(ray_y);
-        const Lane u = load(s11) * dx + load(s12) * dy, v = load(s22) * dy;
-        cost += load(observation_weight_row) * ((u * u + v * v).min)(static_cast<float>(limit));
-      }
-      sum += static_cast<double>(cost.sum());
-      if (!(sum < stop)) break;
-    }
-    return sum / limit;
+    using P = simd::Packet<float>;
+    const SE3<float> draft = pose.template cast<float>();
+    const P most(static_cast<float>(limit));
+    const auto cost = [&](std::size_t i) {
+      const P d2 = LinearReprojection<P>(in, draft, i).distance_sq;
+      return P::load(in.template column<float>(observation_weight_row) + i) * select(d2 < most, d2, most);
+    };
+    return bounded_sum<float>(in.size, bound * limit, cost) / limit;
   }
 
   void refine(T scale, int max_steps, Model& pose) const {
