@@ -128,24 +128,19 @@ struct PnpProblem {
   // sample has up to four poses, three times as many for what the refinement adds: mismatches alone on a small object
   // then have a pose in one call of a hundred.
   [[nodiscard]] bool outdoes_chance(const Model& pose, std::size_t samples, bool weighed) const noexcept {
-    using P = simd::Packet<T>;
-    const P zero(T(0)), edge(limit), ring_from(9 * limit), ring_to(36 * limit);
     enum { all, squares, near, ring, area, x, y, xx, xy, yy, count };
-    P sums[count];
-    std::fill(sums, sums + count, zero);
-    for (std::size_t i = 0; i < in.size; i += P::lanes) {
-      const auto load = [&](std::size_t row) { return P::load(in.row(row) + i); };
-      const P weight = load(observation_weight_row), w = weighed ? weight : select(zero < weight, P(T(1)), zero);
-      const P distance_sq = LinearReprojection<P>(in, pose, i).distance_sq, wx = w * load(ray_x), wy = w * load(ray_y);
-      sums[all] += w, sums[squares] += w * w;
-      sums[near] += select(distance_sq <= edge, w, zero);
-      sums[ring] += select(both(ring_from < distance_sq, distance_sq <= ring_to), w, zero);
-      sums[area] += w * load(s11) * load(s22);
-      sums[x] += wx, sums[y] += wy;
-      sums[xx] += wx * load(ray_x), sums[xy] += wx * load(ray_y), sums[yy] += wy * load(ray_y);
+    T sum[count] = {};
+    for (std::size_t i = 0; i < in.size; ++i) {
+      const auto of = [&](std::size_t row) { return in.row(row)[i]; };
+      const T w = weighed ? of(observation_weight_row) : T(1), wx = w * of(ray_x), wy = w * of(ray_y);
+      const T distance_sq = LinearReprojection<T>(in, pose, i).distance_sq;
+      sum[all] += w, sum[squares] += w * w;
+      if (distance_sq <= limit) sum[near] += w;
+      if (distance_sq > 9 * limit && distance_sq <= 36 * limit) sum[ring] += w;
+      sum[area] += w * of(s11) * of(s22);
+      sum[x] += wx, sum[y] += wy;
+      sum[xx] += wx * of(ray_x), sum[xy] += wx * of(ray_y), sum[yy] += wy * of(ray_y);
     }
-    T sum[count];
-    std::transform(sums, sums + count, sum, [](const P& lanes) { return reduce_add(lanes); });
     // In units of which a sample's three have one each on average.
     const T unit = sum[squares] / sum[all], n = sum[all] / unit, inliers = sum[near] / unit;
     const auto mean = [&](int k) { return sum[k] / sum[all]; };
