@@ -36,11 +36,11 @@ template <typename Real>
   return motion;
 }
 
-/// motion_distance, with the 36 values of the motion's covariance; null: it is exact.
+/// motion_distance under T_cur_prev with the covariance of `motion`; null: it is exact.
 template <typename Camera, typename Scalar>
 [[nodiscard]] Scalar distance_under(const Vector2<Scalar>& pixel_prev, const Scalar& depth_prev,
                                     const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
-                                    const AtLeastDouble<Scalar>* covariance, const Camera& camera,
+                                    const UncertainMotion<AtLeastDouble<Scalar>>* motion, const Camera& camera,
                                     const Scalar& sigma_px, const MotionDistanceOptions& options) noexcept {
   using std::sqrt;
   using Real = AtLeastDouble<Scalar>;
@@ -49,19 +49,11 @@ template <typename Camera, typename Scalar>
   if (!expected_residual(pixel_prev, depth_prev, pixel_cur, T_cur_prev, camera, options, pair)) return none;
   // W = I + A with A = M C M^T / sigma^2, and its inverse.
   Real a(0), b(0), c(0);
-  if (covariance != nullptr) {
-    const Real per_variance = Real(1) / (Real(sigma_px) * Real(sigma_px));
-    Real first[6] = {}, second[6] = {};  // the rows of M C
-    for (int i = 0; i < 6; ++i) {
-      for (int k = 0; k < 6; ++k) first[k] += Real(pair.M[0][i]) * covariance[6 * i + k];
-      for (int k = 0; k < 6; ++k) second[k] += Real(pair.M[1][i]) * covariance[6 * i + k];
-    }
-    for (int k = 0; k < 6; ++k) {
-      a += first[k] * Real(pair.M[0][k]);
-      b += first[k] * Real(pair.M[1][k]);
-      c += second[k] * Real(pair.M[1][k]);
-    }
-    a *= per_variance, b *= per_variance, c *= per_variance;
+  if (motion != nullptr) {
+    const Real per_sigma = Real(1) / Real(sigma_px);
+    const Eigen::Matrix<Real, 6, 2> M = pair.M.transpose().template cast<Real>() * per_sigma,
+                                    CM = motion->covariance.lazyProduct(M);
+    a = M.col(0).dot(CM.col(0)), b = M.col(0).dot(CM.col(1)), c = M.col(1).dot(CM.col(1));
   }
   const Real rank_two = a * c - b * b;  // not below 0 but for rounding
   const Real det = Real(1) + a + c + (rank_two > Real(0) ? rank_two : Real(0));
@@ -102,8 +94,8 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
                                      const MotionDistanceOptions& options) noexcept {
   auto precise = motion.template cast<detail::AtLeastDouble<Scalar>>();
   if (!is_valid_depth(depth_prev)) precise = detail::at_unknown_depth(precise, options.unknown_depth);
-  return detail::distance_under<Camera, Scalar>(pixel_prev, depth_prev, pixel_cur, motion.T_cur_prev,
-                                                precise.covariance.data(), camera, sigma_px, options);
+  return detail::distance_under<Camera, Scalar>(pixel_prev, depth_prev, pixel_cur, motion.T_cur_prev, &precise, camera,
+                                                sigma_px, options);
 }
 
 /// motion_distance of every pair. `depths_prev` may be empty: none is known. Sizes must agree. Allocates nothing.
@@ -121,8 +113,7 @@ void motion_distances(const PointSpan<non_deduced<Scalar>, 2>& prev, span<const 
     const Scalar depth = depths_prev.empty() ? Scalar(0) : depths_prev[i];
     const auto& uncertain = is_valid_depth(depth) ? precise : without_depth;
     out[i] = detail::distance_under<Camera, Scalar>(prev[i], depth, cur[i], motion.T_cur_prev,
-                                                    exact ? nullptr : uncertain.covariance.data(), camera, sigma_px,
-                                                    options);
+                                                    exact ? nullptr : &uncertain, camera, sigma_px, options);
   }
 }
 

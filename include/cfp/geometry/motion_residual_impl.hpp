@@ -15,13 +15,13 @@
 
 namespace cfp::detail {
 
-/// A flow pair against the camera's motion.
+/// A flow pair against the camera's motion. For local use: alignment depends on flags.
 template <typename Scalar>
 struct MotionResidual {
-  Vector2<Scalar> r;      // pixel_cur - project(p), px
-  Vector2<Scalar> along;  // J = d project / d z, px/m
-  Scalar sigma_z;         // of the depth, m
-  Scalar M[2][6];         // d project / d xi
+  Vector2<Scalar> r;              // pixel_cur - project(p), px
+  Vector2<Scalar> along;          // J = d project / d z, px/m
+  Scalar sigma_z;                 // of the depth, m
+  Eigen::Matrix<Scalar, 2, 6> M;  // d project / d xi
 };
 
 /// What a pair says of a motion, in units of the noise.
@@ -46,12 +46,8 @@ template <typename Camera, typename Scalar>
   if (!camera.project(point, projected, &jacobian)) return false;
   out.r = pixel_cur - projected;
   out.along = jacobian * turned;
-  // The rows of the Jacobian, and what turning the point about the camera makes of them.
-  for (int row = 0; row < 2; ++row) {
-    const Vector3<Scalar> by_point(jacobian(row, 0), jacobian(row, 1), jacobian(row, 2)),
-        turning = cross(point, by_point);
-    for (int i = 0; i < 3; ++i) out.M[row][i] = by_point[i], out.M[row][i + 3] = turning[i];
-  }
+  out.M.template leftCols<3>() = jacobian;
+  for (int row = 0; row < 2; ++row) out.M.template block<1, 3>(row, 3) = cross(point, jacobian.row(row)).transpose();
   return true;
 }
 
@@ -91,24 +87,18 @@ template <typename Scalar>
 PairTerm add_pair(const MotionResidual<Scalar>& pair, double sigma_px, const Vector6<double>& moved,
                   NormalEquations<6>& sums) noexcept {
   constexpr double loss_sq = 32;  // 4 sigma per coordinate
-  double r[2], e[2], j[2], M[2][6];
-  for (int q = 0; q < 2; ++q) {
-    e[q] = r[q] = static_cast<double>(pair.r[q]) / sigma_px;
-    j[q] = static_cast<double>(pair.along[q] * pair.sigma_z) / sigma_px;
-    for (int k = 0; k < 6; ++k) {
-      M[q][k] = static_cast<double>(pair.M[q][k]) / sigma_px;
-      e[q] -= M[q][k] * moved[k];
-    }
-  }
+  const Eigen::Matrix<double, 2, 6> M = pair.M.template cast<double>() / sigma_px;
+  const Vector2<double> r = pair.r.template cast<double>() / sigma_px, e = r - M.lazyProduct(moved);
+  const Vector2<double> j = (pair.along * pair.sigma_z).template cast<double>() / sigma_px;
   const double kept = 1 / (1 + j[0] * j[0] + j[1] * j[1]), across = j[0] * e[1] - j[1] * e[0];
   const double distance_sq = (e[0] * e[0] + e[1] * e[1] + across * across) * kept;
   if (!is_finite(distance_sq)) return {};
   const double root = 1 / (1 + distance_sq / loss_sq), w = root * root;
   for (int a = 0; a < 6; ++a) {
-    const double share = (j[0] * M[0][a] + j[1] * M[1][a]) * kept;
-    const double m0 = w * (M[0][a] - j[0] * share), m1 = w * (M[1][a] - j[1] * share);
+    const double share = (j[0] * M(0, a) + j[1] * M(1, a)) * kept;
+    const double m0 = w * (M(0, a) - j[0] * share), m1 = w * (M(1, a) - j[1] * share);
     sums.g[a] -= m0 * r[0] + m1 * r[1];
-    for (int b = a; b < 6; ++b) sums.H(a, b) += m0 * M[0][b] + m1 * M[1][b];
+    for (int b = a; b < 6; ++b) sums.H(a, b) += m0 * M(0, b) + m1 * M(1, b);
   }
   return {w, distance_sq, 1 + kept};
 }

@@ -130,7 +130,7 @@ void load_pairs(const PointPairs<Scalar>& input, double cell_px, PairArrays& pai
   share_weights(pairs, cell_px * pairs.factor);
   constexpr std::size_t enough = PairArrays::enough;
   for (std::size_t k = 0; k < 5 * enough && pairs.size > enough; ++k)
-    pairs.thinned[k] = pairs.fast_row(k / enough)[thinned_index(pairs, k % enough)];
+    pairs.thinned[k] = pairs.column<float>(k / enough)[thinned_index(pairs, k % enough)];
 }
 
 }  // namespace CFP_ISA

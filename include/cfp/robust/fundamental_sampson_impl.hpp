@@ -57,18 +57,11 @@ template <typename T>
   using P = simd::Packet<T>;
   const Matrix3<T> f = F.template cast<T>();
   const P spread(static_cast<T>(scale)), tiny(T(1e-30));
-  double sum = 0;
-  for (std::size_t block = 0; block < in.size; block += PairArrays::block) {
-    P cost(T(0));
-    for (std::size_t i = block; i < block + PairArrays::block; i += P::lanes) {
-      const SampsonPacket<T> pair(in, i, f);
-      const P e2 = pair.e * pair.e;
-      cost = multiply_add(P::load(in.row[score_weight] + i), e2 / multiply_add(spread, pair.n2, e2 + tiny), cost);
-    }
-    sum += static_cast<double>(reduce_add(cost));
-    if (!(sum < bound)) break;
-  }
-  return sum;
+  return bounded_sum<T>(in.size, bound, [&](std::size_t i) {
+    const SampsonPacket<T> pair(in, i, f);
+    const P e2 = pair.e * pair.e;
+    return P::load(in.row[score_weight] + i) * (e2 / multiply_add(spread, pair.n2, e2 + tiny));
+  });
 }
 
 // Squared Sampson distances of all pairs, scaled pixels, into `out` of the arrays' capacity; NaN where there is none,

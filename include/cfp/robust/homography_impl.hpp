@@ -38,19 +38,19 @@ template <typename T>
 // Sum of w min(d^2 / limit, 1), d the transfer distance.
 template <typename T>
 [[nodiscard]] double transfer_cost(const PairColumns<T>& in, const Matrix3<double>& H, double limit) noexcept {
-  using Lane = Eigen::Array<T, 8, 1>;
+  using P = simd::Packet<T>;
   const Matrix3<T> h = H.template cast<T>();
-  double sum = 0;
-  for (std::size_t i = 0; i < in.size; i += 8) {
-    const auto load = [&](std::size_t row) { return Eigen::Map<const Lane>(in.row[row] + i); };
-    const Lane x = load(prev_x), y = load(prev_y), z = h(2, 0) * x + h(2, 1) * y + h(2, 2);
+  const P most(static_cast<T>(limit)), tiny(T(1e-30));
+  const auto cost = [&](std::size_t i) {
+    const auto load = [&](std::size_t row) { return P::load(in.row[row] + i); };
+    const P x = load(prev_x), y = load(prev_y);
+    const auto mapped = [&](int r) { return multiply_add(P(h(r, 0)), x, multiply_add(P(h(r, 1)), y, P(h(r, 2)))); };
     // Multiplied out by z, so that a point mapped to infinity is an outlier and not a NaN.
-    const Lane dx = h(0, 0) * x + h(0, 1) * y + h(0, 2) - load(cur_x) * z;
-    const Lane dy = h(1, 0) * x + h(1, 1) * y + h(1, 2) - load(cur_y) * z;
-    const Lane d2 = (dx * dx + dy * dy) / (z * z + T(1e-30));
-    sum += static_cast<double>((load(score_weight) * (d2.min)(static_cast<T>(limit))).sum());
-  }
-  return sum / limit;
+    const P z = mapped(2), dx = mapped(0) - load(cur_x) * z, dy = mapped(1) - load(cur_y) * z;
+    const P d2 = (dx * dx + dy * dy) / multiply_add(z, z, tiny);
+    return load(score_weight) * select(d2 < most, d2, most);
+  };
+  return bounded_sum<T>(in.size, std::numeric_limits<double>::infinity(), cost) / limit;
 }
 
 // The homography of four pairs: each image's four points are a projective basis. False when three lie on a line.

@@ -135,7 +135,7 @@ struct LinearReprojection {
   P inverse_z, x, y, u, v, distance_sq;
 
   LinearReprojection(const ObservationArrays& in, const SE3<T>& pose, std::size_t i) noexcept {
-    const auto load = [&](std::size_t row) { return simd::load<P>(in.row(row) + i); };
+    const auto load = [&](std::size_t row) { return simd::load<P>(in.template column<T>(row) + i); };
     const P wx = load(X), wy = load(Y), wz = load(Z);
     const auto moved = [&](int r) -> P {
       return P(pose.rotation(r, 0)) * wx + P(pose.rotation(r, 1)) * wy + P(pose.rotation(r, 2)) * wz +

@@ -90,27 +90,14 @@ struct PnpProblem {
   }
 
   [[nodiscard]] double cost(const Model& pose, double bound) const noexcept {
-    using Lane = Eigen::Array<float, 8, 1>;
-    const Matrix3<float> R = pose.rotation.template cast<float>();
-    const Vector3<float> t = pose.translation.template cast<float>();
-    const double stop = bound * limit;
-    double sum = 0;
-    for (std::size_t first = 0; first < in.size; first += in.block) {
-      Lane cost = Lane::Zero();
-      for (std::size_t i = first; i < first + in.block; i += 8) {
-        const auto load = [&](std::size_t row) { return Eigen::Map<const Lane>(in.fast_row(row) + i); };
-        const Lane wx = load(X), wy = load(Y), wz = load(Z);
-        const auto moved = [&](int r) -> Lane { return R(r, 0) * wx + R(r, 1) * wy + R(r, 2) * wz + t[r]; };
-        // A depth that is not positive becomes a tiny one: a point behind the camera then is far off, as it has to be.
-        const Lane inverse = (moved(2).max)(1e-9F).inverse();
-        const Lane dx = moved(0) * inverse - load(ray_x), dy = moved(1) * inverse - load(ray_y);
-        const Lane u = load(s11) * dx + load(s12) * dy, v = load(s22) * dy;
-        cost += load(observation_weight_row) * ((u * u + v * v).min)(static_cast<float>(limit));
-      }
-      sum += static_cast<double>(cost.sum());
-      if (!(sum < stop)) break;
-    }
-    return sum / limit;
+    using P = simd::Packet<float>;
+    const SE3<float> draft = pose.template cast<float>();
+    const P most(static_cast<float>(limit));
+    const auto cost = [&](std::size_t i) {
+      const P d2 = LinearReprojection<P>(in, draft, i).distance_sq;
+      return P::load(in.template column<float>(observation_weight_row) + i) * select(d2 < most, d2, most);
+    };
+    return bounded_sum<float>(in.size, bound * limit, cost) / limit;
   }
 
   void refine(T scale, int max_steps, Model& pose) const {
@@ -141,24 +128,19 @@ struct PnpProblem {
   // sample has up to four poses, three times as many for what the refinement adds: mismatches alone on a small object
   // then have a pose in one call of a hundred.
   [[nodiscard]] bool outdoes_chance(const Model& pose, std::size_t samples, bool weighed) const noexcept {
-    using P = simd::Packet<T>;
-    const P zero(T(0)), edge(limit), ring_from(9 * limit), ring_to(36 * limit);
     enum { all, squares, near, ring, area, x, y, xx, xy, yy, count };
-    P sums[count];
-    std::fill(sums, sums + count, zero);
-    for (std::size_t i = 0; i < in.size; i += P::lanes) {
-      const auto load = [&](std::size_t row) { return P::load(in.row(row) + i); };
-      const P weight = load(observation_weight_row), w = weighed ? weight : select(zero < weight, P(T(1)), zero);
-      const P distance_sq = LinearReprojection<P>(in, pose, i).distance_sq, wx = w * load(ray_x), wy = w * load(ray_y);
-      sums[all] += w, sums[squares] += w * w;
-      sums[near] += select(distance_sq <= edge, w, zero);
-      sums[ring] += select(both(ring_from < distance_sq, distance_sq <= ring_to), w, zero);
-      sums[area] += w * load(s11) * load(s22);
-      sums[x] += wx, sums[y] += wy;
-      sums[xx] += wx * load(ray_x), sums[xy] += wx * load(ray_y), sums[yy] += wy * load(ray_y);
+    T sum[count] = {};
+    for (std::size_t i = 0; i < in.size; ++i) {
+      const auto of = [&](std::size_t row) { return in.row(row)[i]; };
+      const T w = weighed ? of(observation_weight_row) : T(1), wx = w * of(ray_x), wy = w * of(ray_y);
+      const T distance_sq = LinearReprojection<T>(in, pose, i).distance_sq;
+      sum[all] += w, sum[squares] += w * w;
+      if (distance_sq <= limit) sum[near] += w;
+      if (distance_sq > 9 * limit && distance_sq <= 36 * limit) sum[ring] += w;
+      sum[area] += w * of(s11) * of(s22);
+      sum[x] += wx, sum[y] += wy;
+      sum[xx] += wx * of(ray_x), sum[xy] += wx * of(ray_y), sum[yy] += wy * of(ray_y);
     }
-    T sum[count];
-    std::transform(sums, sums + count, sum, [](const P& lanes) { return reduce_add(lanes); });
     // In units of which a sample's three have one each on average.
     const T unit = sum[squares] / sum[all], n = sum[all] / unit, inliers = sum[near] / unit;
     const auto mean = [&](int k) { return sum[k] / sum[all]; };

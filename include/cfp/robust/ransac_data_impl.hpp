@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <vector>
 
 #include "cfp/core/span.hpp"
 #include "cfp/optimization/least_squares.hpp"
 #include "cfp/robust/ransac.hpp"
+#include "cfp/simd/packet.hpp"
 
 namespace cfp::detail {
 
@@ -25,9 +27,12 @@ struct RansacColumns {
   std::vector<double> exact;
   std::vector<float> fast;
 
-  [[nodiscard]] const double* row(std::size_t r) const noexcept { return exact.data() + r * capacity; }
+  template <typename T>
+  [[nodiscard]] const T* column(std::size_t r) const noexcept {
+    return std::get<const std::vector<T>&>(std::tie(exact, fast)).data() + r * capacity;
+  }
+  [[nodiscard]] const double* row(std::size_t r) const noexcept { return column<double>(r); }
   [[nodiscard]] double* row(std::size_t r) noexcept { return exact.data() + r * capacity; }
-  [[nodiscard]] const float* fast_row(std::size_t r) const noexcept { return fast.data() + r * capacity; }
   [[nodiscard]] span<const double> weights() const noexcept { return {row(Rows - 1), size}; }
 
   void begin(std::size_t most) {
@@ -53,6 +58,20 @@ void finish(RansacColumns<Rows>& columns) noexcept {
   for (std::size_t i = 0; i < columns.size; ++i) columns.total_weight += weight[i] /= largest;
   std::transform(columns.exact.begin(), columns.exact.end(), columns.fast.begin(),
                  [](double x) { return static_cast<float>(x); });
+}
+
+// The sum of term(i), i = 0, lanes, 2 lanes, … below `size`; some value above `bound` as soon as the sum exceeds it.
+template <typename T, typename Term>
+[[nodiscard]] double bounded_sum(std::size_t size, double bound, const Term& term) noexcept {
+  using P = simd::Packet<T>;
+  constexpr std::size_t block = RansacColumns<1>::block;
+  double sum = 0;
+  for (std::size_t first = 0; first < size && sum < bound; first += block) {
+    P part(T(0));
+    for (std::size_t i = first; i < first + block; i += P::lanes) part += term(i);
+    sum += static_cast<double>(reduce_add(part));
+  }
+  return sum;
 }
 
 // Takes at most max_steps that each lower the model's cost by more than `tolerance` of it. Returns the cost, infinite
