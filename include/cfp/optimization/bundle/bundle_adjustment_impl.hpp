@@ -29,6 +29,31 @@ struct BundleWorkspace {
 namespace cfp::detail {
 inline namespace CFP_ISA {
 
+/// Sizes the arrays; the envelope holds the blocks of the reduced system that some eliminated pose or point fills.
+template <int E, int K = 9 - E>
+void reserve_schur(const BundleIndex& index, BundleSchur& schur) {
+  BlockEnvelope& envelope = schur.envelope;
+  const std::size_t kept = K == 6 ? index.free_poses : index.points, eliminated = index.eliminated_part.back();
+  envelope.first.resize(kept);
+  for (std::size_t row = 0; row < kept; ++row) envelope.first[row] = row;
+  for (std::size_t i = 0; i < eliminated; ++i) {
+    const std::size_t begin = index.slot_begin[i];
+    for (std::size_t s = begin; s < index.slot_begin[i + 1]; ++s) {
+      const std::size_t row = BundleKind<K>::slot(index, s);
+      if (row < kept) envelope.first[row] = (std::min)(envelope.first[row], BundleKind<K>::slot(index, begin));
+    }
+  }
+  number_blocks(envelope);
+  for (std::vector<double>& blocks : schur.blocks) blocks.resize(BundleKind<K>::block * envelope.blocks);
+  for (std::vector<double>& side : schur.right_side) side.resize(BundleKind<K>::size * kept);
+  schur.triangles.resize(BundleKind<E>::system * eliminated);
+  schur.couplings.resize(18 * index.slots.size());
+  schur.coupled.resize(index.slots.size());
+  schur.coupled_end.resize(eliminated);
+  schur.pose_steps.resize(6 * index.free_poses);
+  schur.point_steps.resize(3 * index.points);
+}
+
 /// Sizes every array and copies the poses and points that take part.
 template <typename Camera, typename Scalar>
 void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& workspace, BundleResult& result) {
