@@ -61,10 +61,11 @@ template <typename Camera, typename Scalar>
     return (Real(1) + c) * x * x - Real(2) * b * x * y + (Real(1) + a) * y * y;
   };
   // W + kappa J J^T has the adjugate of W plus kappa times that of J J^T: sums of squares, however large kappa is.
-  const Real rx(pair.r[0]), ry(pair.r[1]), jx(pair.along[0]), jy(pair.along[1]);
-  const Real spread = Real(pair.sigma_z) / Real(sigma_px), kappa = spread * spread, across = jx * ry - jy * rx;
-  const Scalar distance_sq =
-      static_cast<Scalar>((adjugate(rx, ry) + kappa * across * across) / (det + kappa * adjugate(jx, jy)));
+  const Vector2<Real> r = pair.r.template cast<Real>(), along = pair.along.template cast<Real>();
+  const Real spread = Real(pair.sigma_z) / Real(sigma_px), kappa = spread * spread,
+             across = along[0] * r[1] - along[1] * r[0];
+  const Scalar distance_sq = static_cast<Scalar>((adjugate(r[0], r[1]) + kappa * across * across) /
+                                                 (det + kappa * adjugate(along[0], along[1])));
   const Scalar distance = sqrt(distance_sq > Scalar(0) ? distance_sq : Scalar(0));
   return has_distance(distance) && is_finite(distance_sq) ? distance : none;
 }
