@@ -70,6 +70,27 @@ TEST_CASE("The homography of a plane is found, and holds most pairs; a room has 
   }
 }
 
+TEST_CASE("An F that fits a plane alone becomes the one of the points off it", "[robust]") {
+  cfp::Random random(86, "degeneracy");
+  cfp_test::TwoViewOptions options = options_of(cfp_test::SceneShape::volume_and_plane, 0.2, 0.1);
+  options.plane_share = 0.85, options.noise_px = 0.1;
+  for (int trial = 0; trial < 10; ++trial) {
+    Checked checked(random, options);
+    checked.check.find_homography(200);
+    REQUIRE(checked.check.dominant);
+    // hat(e) H is an F of every pair on the plane, whatever the epipole e.
+    const cfp::Vector3<double> wrong_epipole = cfp_test::random_direction(random);
+    cfp::RansacCandidate<Matrix3<double>> candidate;
+    candidate.model = (cfp::hat(wrong_epipole) * checked.check.H).normalized();
+    const Matrix3<double> truth = cfp_test::scaled_fundamental(checked.scene.F, checked.pairs.scaling);
+    const auto off = [&](const Matrix3<double>& F) { return 1 - std::abs(F.cwiseProduct(truth).sum()); };
+    REQUIRE(off(candidate.model) > 1e-3);
+    checked.search.measure_noise(candidate.model);
+    checked.check.complete_from_plane(candidate);
+    CHECK(off(candidate.model) < 1e-4);
+  }
+}
+
 TEST_CASE("Fewer than four pairs have no homography", "[robust]") {
   cfp::Random random(82, "degeneracy");
   for (const std::size_t few : {0U, 1U, 2U, 3U}) {
