@@ -84,10 +84,10 @@ TEST_CASE("An F that fits a plane alone becomes the one of the points off it", "
     candidate.model = (cfp::hat(wrong_epipole) * checked.check.H).normalized();
     const Matrix3<double> truth = cfp_test::scaled_fundamental(checked.scene.F, checked.pairs.scaling);
     const auto off = [&](const Matrix3<double>& F) { return 1 - std::abs(F.cwiseProduct(truth).sum()); };
-    REQUIRE(off(candidate.model) > 1e-3);
+    REQUIRE(off(candidate.model) > 1e-2);
     checked.search.measure_noise(candidate.model);
     checked.check.complete_from_plane(candidate);
-    CHECK(off(candidate.model) < 1e-4);
+    CHECK(off(candidate.model) < 1e-3);
   }
 }
 
