@@ -60,19 +60,10 @@ template <typename Scalar, typename Input, typename Camera>
   detail::NormalEquations<6> equations;
   result.status = detail::run_rounds(model, start, result, pose, equations);
   result.evaluations = model.evaluations;
-  int rows = 0;       // of the inliers: two of a pixel, three with a depth
-  double agreed = 0;  // the inliers' weight in the last round
+  detail::PoseInliers agreed;
   if (is_solved(result.status)) {
-    detail::for_each_observation(model.columns, options, [&](std::size_t i, bool inlier) {
-      if (!inlier) return;
-      ++result.inliers;
-      rows += i < model.columns.stereo_begin ? 2 : 3;
-      result.chi2 += static_cast<double>(model.columns.weight[i] * model.columns.error[i]);
-      agreed += static_cast<double>(model.columns.active[i]);
-      if (!inliers.empty()) inliers[model.columns.index[i]] = 1;
-    });
-    result.chi2 *= model.columns.mean_weight;
-    const bool untested = result.inliers < result.used && rows < options.min_inlier_rows;
+    agreed = detail::count_inliers(options, model.columns, result, inliers);
+    const bool untested = result.inliers < result.used && agreed.rows < options.min_inlier_rows;
     if (untested || result.inliers < options.min_observations) result.status = SolverStatus::not_enough_inliers;
   }
   if (!is_solved(result.status)) {
@@ -81,7 +72,7 @@ template <typename Scalar, typename Input, typename Camera>
     return result;
   }
   result.T_cam_world = {pose.rotation, pose.translation - pose.rotation * centre};
-  const double scale = model.influence > 0 ? agreed / model.influence : 1.0;
+  const double scale = model.influence > 0 ? agreed.weight / model.influence : 1.0;
   const Matrix6<double> H = equations.H.selfadjointView<Eigen::Upper>();
   result.information = H * model.columns.mean_weight * scale;
   return result;

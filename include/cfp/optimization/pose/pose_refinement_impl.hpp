@@ -67,6 +67,28 @@ int keep_inliers(const PoseOptions& options, PoseColumns<Scalar>& columns, bool&
   return count;
 }
 
+struct PoseInliers {
+  int rows = 0;       // two of a pixel, three with a depth
+  double weight = 0;  // in the last round
+};
+
+/// Counts and marks the inliers by the stored errors, and sums their w s.
+template <typename Scalar>
+PoseInliers count_inliers(const PoseOptions& options, const PoseColumns<Scalar>& columns, PoseResult& result,
+                          span<char> inliers) noexcept {
+  PoseInliers found;
+  for_each_observation(columns, options, [&](std::size_t i, bool inlier) {
+    if (!inlier) return;
+    ++result.inliers;
+    found.rows += i < columns.stereo_begin ? 2 : 3;
+    found.weight += static_cast<double>(columns.active[i]);
+    result.chi2 += static_cast<double>(columns.weight[i] * columns.error[i]);
+    if (!inliers.empty()) inliers[columns.index[i]] = 1;
+  });
+  result.chi2 *= columns.mean_weight;
+  return found;
+}
+
 /// Runs the rounds from a start at the origin; afterwards model and equations belong to the pose.
 template <typename Scalar, typename Camera>
 SolverStatus run_rounds(PoseModel<Scalar, Camera>& model, const SE3<double>& start, PoseResult& result,
