@@ -64,7 +64,7 @@ template <typename Scalar>
 static void instantiate_geometry() noexcept {
   use(&cfp::is_proper<Scalar>);
   use(&cfp::area<Scalar>);
-  use(&cfp::contains<Scalar>);
+  use(static_cast<bool (*)(const cfp::Box<Scalar>&, Scalar, Scalar)>(&cfp::contains<Scalar>));
   use(&cfp::intersection<Scalar>);
   use(&cfp::iou<Scalar>);
   use(&cfp::clip<Scalar>);
@@ -204,6 +204,7 @@ template class cfp::StaticProbability<cfp::RadialTangentialCamera<double>>;
 template <typename Scalar>
 static void instantiate_frame() noexcept {
   use(&cfp::detections_of<Scalar>);
+  use(static_cast<bool (*)(const cfp::LabelImage&, Scalar, Scalar)>(&cfp::contains<Scalar>));
   use(&cfp::label_at<Scalar>);
   use(&cfp::match_descriptors<Scalar>);
   use(&cfp::match_by_map_point<std::vector<const int*>>);

@@ -4,6 +4,7 @@
 
 #include <limits>
 
+#include "cfp/core/span.hpp"
 #include "cfp/core/types.hpp"
 #include "cfp/math/normal_equations.hpp"
 #include "cfp/math/se3.hpp"
