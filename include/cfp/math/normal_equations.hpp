@@ -54,13 +54,11 @@ template <int N>
   return true;
 }
 
-// The inverse of H + damping diag H by Cholesky of the matrix scaled to a unit diagonal. False where
-// solve_normal_equations is.
+// The inverse of the Cholesky factor of H + damping diag H, scaled to a unit diagonal: by `scale` on either side. False
+// where solve_normal_equations is.
 template <int N>
-[[nodiscard]] bool invert_damped(const Eigen::Matrix<double, N, N>& H, double damping, double tolerance,
-                                 Eigen::Matrix<double, N, N>& inverse) noexcept {
-  double scale[static_cast<std::size_t>(N)];
-  Eigen::Matrix<double, N, N> T;
+[[nodiscard]] bool invert_scaled(const Eigen::Matrix<double, N, N>& H, double damping, double tolerance,
+                                 Eigen::Matrix<double, N, 1>& scale, Eigen::Matrix<double, N, N>& T) noexcept {
   for (int r = 0; r < N; ++r) {
     if (!(H(r, r) > 0) || !is_finite(H(r, r))) return false;
     scale[r] = 1 / std::sqrt(H(r, r));
@@ -70,14 +68,9 @@ template <int N>
   if (!invert_triangle(T)) return false;
   double spread = 0;  // a row of the inverse triangle is v over the root of its pivot
   for (int r = 0; r < N; ++r) {
-    double row = 0;
-    for (int c = 0; c <= r; ++c) {
-      row += std::abs(T(r, c));
-      double sum = 0;
-      for (int k = r; k < N; ++k) sum += T(k, r) * T(k, c);
-      inverse(r, c) = inverse(c, r) = scale[r] * sum * scale[c];
-    }
-    spread = (std::max)(spread, row);
+    double sum = 0;
+    for (int c = 0; c <= r; ++c) sum += std::abs(T(r, c));
+    spread = (std::max)(spread, sum);
   }
   return tolerance * spread * spread < 1;
 }
@@ -97,11 +90,17 @@ template <int N>
 [[nodiscard]] bool solve_normal_equations(const Eigen::Matrix<double, N, N>& H, const Eigen::Matrix<double, N, 1>& g,
                                           double damping, double tolerance,
                                           Eigen::Matrix<double, N, 1>& step) noexcept {
-  Eigen::Matrix<double, N, N> inverse;
-  if (!detail::invert_damped(H, damping, tolerance, inverse)) return false;
+  Eigen::Matrix<double, N, 1> scale, reduced;
+  Eigen::Matrix<double, N, N> T;
+  if (!detail::invert_scaled(H, damping, tolerance, scale, T)) return false;
   for (int r = 0; r < N; ++r) {
-    step[r] = 0;
-    for (int c = 0; c < N; ++c) step[r] -= inverse(r, c) * g[c];
+    reduced[r] = 0;
+    for (int c = 0; c <= r; ++c) reduced[r] += T(r, c) * scale[c] * g[c];
+  }
+  for (int r = 0; r < N; ++r) {
+    double sum = 0;
+    for (int k = r; k < N; ++k) sum += T(k, r) * reduced[k];
+    step[r] = -scale[r] * sum;
   }
   return step.allFinite();
 }
@@ -111,7 +110,17 @@ template <int N>
 template <int N>
 [[nodiscard]] bool invert_normal_equations(const Eigen::Matrix<double, N, N>& H, double tolerance,
                                            Eigen::Matrix<double, N, N>& inverse) noexcept {
-  return detail::invert_damped(H, 0, tolerance, inverse) && inverse.allFinite();
+  Eigen::Matrix<double, N, 1> scale;
+  Eigen::Matrix<double, N, N> T;
+  if (!detail::invert_scaled(H, 0, tolerance, scale, T)) return false;
+  for (int r = 0; r < N; ++r) {
+    for (int c = 0; c <= r; ++c) {
+      double sum = 0;
+      for (int k = r; k < N; ++k) sum += T(k, r) * T(k, c);
+      inverse(r, c) = inverse(c, r) = scale[r] * sum * scale[c];
+    }
+  }
+  return inverse.allFinite();
 }
 
 }  // namespace CFP_ISA
