@@ -134,11 +134,15 @@ template <typename Scalar>
     for (int i = 0; i < count; ++i)
       values[4 + i] = detail::element(distortion, distortion.rows == 1 ? 0 : i, distortion.rows == 1 ? i : 0);
   }
+  for (const double value : values) {
+    if (!is_finite(static_cast<Scalar>(value))) return Status::invalid_input;
+  }
   const PinholeCamera<double> pinhole{values[0], values[1], values[2], values[3]};
   const Matrix3<double> K = pinhole.matrix();
-  for (int i = 0; i < 9; ++i) {
-    const bool same = detail::element(camera_matrix, i / 3, i % 3) == K(i / 3, i % 3);
-    if (!same || !is_finite(static_cast<Scalar>(values[i]))) return Status::invalid_input;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      if (detail::element(camera_matrix, row, column) != K(row, column)) return Status::invalid_input;
+    }
   }
   if (!(static_cast<Scalar>(pinhole.fx) > 0 && static_cast<Scalar>(pinhole.fy) > 0)) return Status::invalid_input;
   const RadialTangentialCamera<double> read{values[0], values[1], values[2], values[3], values[4],

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
+#include <type_traits>
 #include <vector>
 
 #include "cfp/core/span.hpp"
@@ -29,7 +29,10 @@ struct RansacColumns {
 
   template <typename T>
   [[nodiscard]] const T* column(std::size_t r) const noexcept {
-    return std::get<const std::vector<T>&>(std::tie(exact, fast)).data() + r * capacity;
+    if constexpr (std::is_same_v<T, double>)
+      return exact.data() + r * capacity;
+    else
+      return fast.data() + r * capacity;
   }
   [[nodiscard]] const double* row(std::size_t r) const noexcept { return column<double>(r); }
   [[nodiscard]] double* row(std::size_t r) noexcept { return exact.data() + r * capacity; }
