@@ -53,7 +53,7 @@ inline namespace CFP_ISA {
 ///
 /// During the search d is linearised by the camera's Jacobian at the measured pixel: exact for a pinhole camera, to
 /// first order in d for any other; the final inliers use the camera itself. The search stops early when the weighted
-/// share of inliers gives the confidence. Works in double, scores in float.
+/// share of inliers gives the confidence. Scores and optimises locally in float, the rest in double.
 ///
 /// A pose is found only where more observations lie near their projections than chance would put there: with nothing
 /// but mismatches on an object of 40 to 160 px, eight inliers or more come up by chance. Points on a line, or in one
@@ -84,7 +84,7 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
   result.iterations = search.iterations;
   result.status = RansacStatus::no_consensus;
   if (!(search.best.cost < observations.total_weight)) return result;
-  problem.refine(problem.limit, 10, search.best.model);  // the scale of the loss near the inliers' spread
+  problem.refine<double>(problem.limit, 10, search.best.model);  // the scale of the loss near the inliers' spread
 
   SE3<double> T = search.best.model;
   T.translation -= T.rotation * Vector3<double>(observations.origin[0], observations.origin[1], observations.origin[2]);

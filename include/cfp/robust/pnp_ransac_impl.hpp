@@ -25,8 +25,9 @@ struct ReprojectionModel {
   const ObservationArrays& in;
   T scale;
 
-  T linearize(const SE3<T>& pose, NormalEquations<6>& out) const noexcept {
+  double linearize(const SE3<double>& state, NormalEquations<6>& out) const noexcept {
     using P = simd::Packet<T>;
+    const SE3<T> pose = state.cast<T>();
     const P one(T(1)), zero(T(0)), per_scale(1 / scale), far(T(25));  // beyond it the weight is below 0.0015
     P cost = zero, g[6], H[6][6];
     for (int r = 0; r < 6; ++r) {
@@ -35,7 +36,7 @@ struct ReprojectionModel {
     }
     for (std::size_t i = 0; i < in.size; i += P::lanes) {
       const LinearReprojection<P> at(in, pose, i);
-      const auto load = [&](std::size_t row) { return P::load(in.row(row) + i); };
+      const auto load = [&](std::size_t row) { return P::load(in.template column<T>(row) + i); };
       const P w = load(observation_weight_row), e = at.distance_sq * per_scale, s = one / (one + e);
       const auto near = e < far;
       cost += w * simd::select(near, e * s, P(T(25.0 / 26)));
@@ -52,13 +53,13 @@ struct ReprojectionModel {
       }
     }
     for (int r = 0; r < 6; ++r) {
-      out.g[r] = reduce_add(g[r]);
-      for (int c = r; c < 6; ++c) out.H(r, c) = reduce_add(H[r][c]);
+      out.g[r] = static_cast<double>(reduce_add(g[r]));
+      for (int c = r; c < 6; ++c) out.H(r, c) = static_cast<double>(reduce_add(H[r][c]));
     }
-    return reduce_add(cost);
+    return static_cast<double>(reduce_add(cost));
   }
-  [[nodiscard]] SE3<T> moved(const SE3<T>& pose, const Vector6<T>& step) const noexcept {
-    SE3<T> out = se3_exp<T>(step) * pose;
+  [[nodiscard]] SE3<double> moved(const SE3<double>& pose, const Vector6<double>& step) const noexcept {
+    SE3<double> out = se3_exp(step) * pose;
     out.rotation = normalized_rotation(out.rotation);
     return out;
   }
@@ -100,14 +101,15 @@ struct PnpProblem {
     return bounded_sum<float>(in.size, bound * limit, cost) / limit;
   }
 
+  template <typename Real>
   void refine(T scale, int max_steps, Model& pose) const {
-    cfp::detail::refine<6>(ReprojectionModel<T>{in, scale}, max_steps, 1e-4, pose);
+    cfp::detail::refine<6>(ReprojectionModel<Real>{in, static_cast<Real>(scale)}, max_steps, 1e-4, pose);
   }
 
   // A wide loss: four squared thresholds.
   void optimize(RansacCandidate<Model>& candidate) const {
     RansacCandidate<Model> refined = candidate;
-    refine(4 * limit, 3, refined.model);
+    refine<float>(4 * limit, 3, refined.model);
     refined.cost = cost(refined.model, candidate.cost);
     if (refined.cost < candidate.cost) candidate = refined;
   }
