@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
@@ -23,8 +24,9 @@ inline namespace CFP_ISA {
 
 template <typename Scalar>
 [[nodiscard]] constexpr bool is_proper(const Box<Scalar>& box) noexcept {
-  return is_finite(box.x1) && is_finite(box.y1) && is_finite(box.x2) && is_finite(box.y2) && box.x1 < box.x2 &&
-         box.y1 < box.y2;
+  constexpr Scalar infinity = std::numeric_limits<Scalar>::infinity();
+  return -infinity < box.x1 && box.x1 < box.x2 && box.x2 < infinity &&  // false for NaN
+         -infinity < box.y1 && box.y1 < box.y2 && box.y2 < infinity;
 }
 
 /// Area in px^2; 0 for an improper box, infinite when the product overflows.
@@ -52,8 +54,9 @@ template <typename Scalar>
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar iou(const Box<Scalar>& a, const Box<Scalar>& b) noexcept {
   const Scalar common = area(intersection(a, b));
-  const Scalar united = area(a) + area(b) - common;
-  return common > Scalar(0) && is_finite(united) ? clamp_probability(common / united) : Scalar(0);
+  if (!(common > Scalar(0))) return Scalar(0);
+  const Scalar united = a.width() * a.height() + b.width() * b.height() - common;
+  return is_finite(united) ? clamp_probability(common / united) : Scalar(0);
 }
 
 /// The part of the box inside the image [0, image_width] x [0, image_height]; improper when it lies outside or the
