@@ -75,6 +75,44 @@ inline void lift(const Vector3<double>& d, const double* M, int columns, double*
   }
 }
 
+/// C = W L^-T and C y of a pose and a point at offset d, from N, of what is eliminated: L^-1 and y.
+template <int K, typename Triangle, typename Y>
+CFP_INLINE void couple(const double (&N)[9], const Vector3<double>& d, const Triangle& triangle, const Y& y,
+                       Eigen::Map<Eigen::Matrix<double, K, 9 - K>> C, Eigen::Map<Eigen::Matrix<double, K, 1>> sum) {
+  if constexpr (K == 6) {
+    double M[9], v[3] = {}, lifted[6];
+    for (int e = 0; e < 9; ++e) {
+      M[e] = 0;
+      for (int c = 0; c <= e / 3; ++c) M[e] += N[3 * (e % 3) + c] * triangle(e / 3, c);
+      v[e % 3] += M[e] * y[e / 3];
+    }
+    lift(d, M, 3, C.data());
+    lift(d, v, 1, lifted);
+    for (int e = 0; e < 6; ++e) sum[e] += lifted[e];
+  } else {
+    Eigen::Matrix<double, 6, 3> W;
+    lift(d, N, 3, W.data());
+    C = W.transpose().lazyProduct(triangle.transpose());
+    sum += C.lazyProduct(y);
+  }
+}
+
+/// target -= C_b C_a^T, d the offset of C_a.
+template <int K>
+CFP_INLINE void subtract_product(const Eigen::Map<const Eigen::Matrix<double, K, 9 - K>>& C_b,
+                                 const Eigen::Matrix<double, K, 9 - K>& C_a, const Vector3<double>& d,
+                                 Eigen::Map<Eigen::Matrix<double, K, K>> target) {
+  if constexpr (K == 6) {  // C = [M; hat(d) M]: half of the block follows from the other
+    const Eigen::Matrix<double, 6, 3> T = C_b.lazyProduct(C_a.template topRows<3>().transpose());
+    target.template leftCols<3>() -= T;
+    target.col(3) -= T.col(2) * d.y() - T.col(1) * d.z();
+    target.col(4) -= T.col(0) * d.z() - T.col(2) * d.x();
+    target.col(5) -= T.col(1) * d.x() - T.col(0) * d.y();
+  } else {
+    target.noalias() -= C_b.lazyProduct(C_a.transpose());
+  }
+}
+
 /// The share of one part of what is eliminated in the reduced system; part 0 starts from the blocks of what is kept.
 /// False when a damped block is not positive definite, which only rounding or overflow can cause.
 template <int E, int K = 9 - E>
@@ -119,39 +157,15 @@ template <int E, int K = 9 - E>
         for (int e = 0; e < 9; ++e) N[e] += slot[symmetric[e / 3][e % 3]];
         if (s + 1 == index.slot_begin[i + 1] || Kept::slot(index, s + 1) != k) break;
       }
-      if constexpr (K == 6) {
-        double M[9], v[3] = {}, sum[6];
-        for (int e = 0; e < 9; ++e) {
-          M[e] = 0;
-          for (int c = 0; c <= e / 3; ++c) M[e] += N[3 * (e % 3) + c] * triangle(e / 3, c);
-          v[e % 3] += M[e] * y[e / 3];
-        }
-        lift(d, M, 3, coupling(end).data());
-        lift(d, v, 1, sum);
-        for (int e = 0; e < 6; ++e) right_side(k)[e] += sum[e];
-      } else {
-        Eigen::Matrix<double, 6, 3> W;
-        lift(d, N, 3, W.data());
-        coupling(end) = W.transpose().lazyProduct(triangle.transpose());
-        right_side(k) += coupling(end).lazyProduct(y);
-      }
+      couple<K>(N, d, triangle, y, coupling(end), right_side(k));
     }
     schur.coupled_end[i] = end;
     for (std::size_t a = begin; a < end; ++a) {
       const Coupling right = coupling(a);
       const Vector3<double> d = K == 6 ? offset(state, schur.coupled[a], i) : offset(state, i, schur.coupled[a]);
-      for (std::size_t b = a; b < end; ++b) {
-        Eigen::Map<typename Kept::Matrix> target = block(schur.coupled[b], schur.coupled[a]);
-        if constexpr (K == 6) {  // C = [M; hat(d) M]: half of the block follows from the other
-          const Coupling T = coupling(b).lazyProduct(right.template topRows<3>().transpose());
-          target.template leftCols<3>() -= T;
-          target.col(3) -= T.col(2) * d.y() - T.col(1) * d.z();
-          target.col(4) -= T.col(0) * d.z() - T.col(2) * d.x();
-          target.col(5) -= T.col(1) * d.x() - T.col(0) * d.y();
-        } else {
-          target.noalias() -= coupling(b).lazyProduct(right.transpose());
-        }
-      }
+      for (std::size_t b = a; b < end; ++b)
+        subtract_product<K>(Eigen::Map<const Coupling>(schur.couplings.data() + 18 * b), right, d,
+                            block(schur.coupled[b], schur.coupled[a]));
     }
   }
   return true;
