@@ -35,7 +35,7 @@ inline namespace CFP_ISA {
 
 /// At depth z. False for a pixel without a ray or a point behind the current camera.
 template <typename Camera, typename Scalar>
-[[nodiscard]] bool motion_residual(const Vector2<Scalar>& pixel_prev, const Scalar& z, const Vector2<Scalar>& pixel_cur,
+[[nodiscard]] CFP_INLINE bool motion_residual(const Vector2<Scalar>& pixel_prev, const Scalar& z, const Vector2<Scalar>& pixel_cur,
                                    const SE3<Scalar>& T_cur_prev, const Camera& camera,
                                    MotionResidual<Scalar>& out) noexcept {
   Vector3<Scalar> ray;
@@ -53,7 +53,7 @@ template <typename Camera, typename Scalar>
 
 /// At the measured depth, or at the mean of an unknown one.
 template <typename Camera, typename Scalar>
-[[nodiscard]] bool expected_residual(const Vector2<Scalar>& pixel_prev, const Scalar& depth_prev,
+[[nodiscard]] CFP_INLINE bool expected_residual(const Vector2<Scalar>& pixel_prev, const Scalar& depth_prev,
                                      const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
                                      const Camera& camera, const MotionDistanceOptions& options,
                                      MotionResidual<Scalar>& out) noexcept {
