@@ -40,7 +40,7 @@ template <typename Scalar>
 
 /// epipolar_distance for an F of unit_scale, whose line_noise is given.
 template <typename Scalar>
-[[nodiscard]] Scalar scaled_epipolar_distance(const Matrix3<Scalar>& F, const Vector3<Scalar>& noise,
+[[nodiscard]] CFP_INLINE Scalar scaled_epipolar_distance(const Matrix3<Scalar>& F, const Vector3<Scalar>& noise,
                                               const Vector2<Scalar>& x_prev, const Vector2<Scalar>& x_cur) noexcept {
   using std::abs;
   using std::sqrt;
