@@ -11,6 +11,10 @@
 // or moving with 0.05, 0.15 and 0.5 m/s: keypoints above 0.5 on who walks / below 0.5 on what stands / below 0.5 on the
 // wall.
 //
+// One camera and a host's motion, whose errors have the sigmas that it says, or five times these: in the room of
+// `holes` without its depths, who walks across or along holding `walker` of the pairs: frames in which the motion is
+// refused / keypoints above 0.5 on who walks / below 0.5 on the rest.
+//
 //   cfp_unreported_study [frames, default 50] [seed, default 7] | --smoke
 #include <array>
 #include <cmath>
@@ -45,9 +49,14 @@ struct Counts {
 
 enum class Part : std::uint8_t { room, thing, person };
 
-// Keypoints that have the weight asked for: on the person above 0.5, elsewhere below.
+// Keypoints that have the weight asked for: on the person above 0.5, elsewhere below. Frames of a refused motion.
 struct Judged {
-  Counts person, thing, room;
+  Counts person, thing, room, refused;
+};
+
+// Sigmas of a motion that a host hands over, and by how many of them it errs.
+struct Host {
+  double sigma_m = 0, sigma_rad = 0, errors = 1;
 };
 
 class Frames {
@@ -56,7 +65,7 @@ class Frames {
 
   void make() {
     previous.clear(), current.clear(), keypoints.clear(), flow_depths.clear(), depths.clear(), part.clear();
-    const cfp::SE3<double> T_cur_prev = motion();
+    T_cur_prev = motion();
     const double step = (random_.uniform() < 0.5 ? 0.8 : -0.8) / 30;
     const V3 shift(scene_.person == Path::across ? step : 0, 0, scene_.person == Path::along ? step : 0);
     person_ = V3(random_.uniform(-0.6, 0.6), 0, random_.uniform(1.5, 2.5));
@@ -84,6 +93,7 @@ class Frames {
   }
 
   cfp::PinholeCamera<double> camera{525, 525, 320, 240};
+  cfp::SE3<double> T_cur_prev;
   std::vector<std::array<double, 2>> previous, current, keypoints;
   std::vector<double> flow_depths, depths;
   std::vector<Part> part;
@@ -134,7 +144,15 @@ class Frames {
   double thing_ = 0;
 };
 
-Judged judge(const Scene& scene, const cfp::UnreportedOptions& unreported, int frames, std::uint64_t seed) {
+cfp::UncertainMotion<double> seen_by(const Host& host, const cfp::SE3<double>& T_cur_prev, cfp::Random& random) {
+  cfp::Vector6<double> error;
+  for (int k = 0; k < 6; ++k) error[k] = host.errors * (k < 3 ? host.sigma_m : host.sigma_rad) * random.normal();
+  return {cfp::se3_exp(error) * T_cur_prev, host.sigma_m, host.sigma_rad};
+}
+
+// With a host: one camera, no depths.
+Judged judge(const Scene& scene, const cfp::UnreportedOptions& unreported, int frames, std::uint64_t seed,
+             const Host* host = nullptr) {
   cfp::Random random(seed, "unreported study");
   Frames made(scene, random);
   cfp::FrameOptions options;
@@ -150,7 +168,12 @@ Judged judge(const Scene& scene, const cfp::UnreportedOptions& unreported, int f
     frame.depths = made.depths;
     frame.detections = nobody;
     frame.flow = {made.previous, made.current, made.flow_depths};
-    const auto weight = probability.coarse(frame).weight;
+    if (host != nullptr) {
+      frame.depths = frame.flow.previous_depths = {};
+      frame.T_cur_prev = seen_by(*host, made.T_cur_prev, random);
+    }
+    const auto [weight, known, report] = probability.coarse(frame);
+    if (k >= 3) judged.refused.right += report.motion_refused ? 1 : 0, ++judged.refused.all;
     for (std::size_t i = 0; k >= 3 && i < weight.size(); ++i) {
       const bool person = made.part[i] == Part::person;
       Counts& counts = person ? judged.person : made.part[i] == Part::thing ? judged.thing : judged.room;
@@ -199,6 +222,19 @@ void print_one_camera(Scene scene, const cfp::UnreportedOptions& options, int fr
     add(judged.room, room);
   }
   std::printf(" %.0f / %.1f / %.1f |", percent(walking), percent(thing), percent(room));
+}
+
+void print_host(Scene scene, const Host& host, int frames, std::uint64_t seed) {
+  Counts refused, walking, room;
+  for (const Path camera : {Path::rests, Path::across, Path::along, Path::turns}) {
+    for (const Path person : {Path::across, Path::along}) {
+      scene.camera = camera, scene.person = person;
+      if (camera == person) continue;  // as something near that stands
+      const Judged judged = judge(scene, {}, frames, seed, &host);
+      add(judged.refused, refused), add(judged.person, walking), add(judged.room, room);
+    }
+  }
+  std::printf(" %.0f / %.0f / %.1f |", percent(refused), percent(walking), percent(room));
 }
 
 }  // namespace
@@ -254,6 +290,22 @@ int main(int argc, char** argv) {
           options.nearer_than_room = nearer, options.max_parallax = limit;
           print_one_camera({place, 0, 0, noise_px, 0, camera}, options, frames, stream);
         }
+        std::printf("\n");
+      }
+    }
+  }
+
+  std::printf("\none camera, a host's motion: %% refused / above 0.5 of who walks / below 0.5 of the room\n\n");
+  std::printf("| walker | noise px | errors | 0.1 mm, 0.05 mrad | 0.2, 0.1 | 0.5, 0.2 | 1, 0.5 | 3, 1 |\n");
+  std::printf("|--:|--:|--:|--:|--:|--:|--:|--:|\n");
+  for (const double walker : {0.0, 0.1, 0.2}) {
+    for (const double noise_px : {0.2, 0.4}) {
+      for (const double errors : {1.0, 5.0}) {
+        if (smoke && (noise_px > 0.2 || errors > 1)) continue;
+        std::printf("| %.1f | %.1f | %.0f |", walker, noise_px, errors);
+        for (const auto& [m, rad] : std::array<std::pair<double, double>, 5>{
+                 {{1e-4, 5e-5}, {2e-4, 1e-4}, {5e-4, 2e-4}, {1e-3, 5e-4}, {3e-3, 1e-3}}})
+          print_host({Place::holes, 0, walker, noise_px, 0.3 / 30}, {m, rad, errors}, frames, stream);
         std::printf("\n");
       }
     }

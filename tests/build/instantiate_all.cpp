@@ -213,6 +213,7 @@ static void instantiate_frame() noexcept {
   use(&cfp::estimate_camera_motion<Scalar>);
   use(&cfp::refine_camera_motion<Scalar>);
   use(&cfp::joined<Scalar>);
+  use(&cfp::relative_motion<Scalar, Eigen::Matrix<Scalar, 12, 12>>);
   use(&cfp::robust_sigma<Scalar>);
   use(&cfp::remember_objects<Scalar>);
   use(&cfp::frame_health<Scalar>);

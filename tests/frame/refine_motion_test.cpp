@@ -116,6 +116,20 @@ TEST_CASE("A motion that errs by more than it says is contradicted, and counts f
   }
 }
 
+TEST_CASE("A right motion is not contradicted by somebody who walks", "[frame][refine_motion]") {
+  cfp::Random random(9, "refine motion");
+  int refused = 0;
+  constexpr int runs = 40;
+  for (int i = 0; i < runs; ++i) {
+    const cfp::SE3<double> T = cfp_test::random_motion(0.02, 0.02, random);
+    const FlatFlow f = flat_flow(200, T, 0.4, random, 40, {0.03, 0, 0});
+    const cfp::UncertainMotion<double> prior(with_error(T, 5e-4, 2e-4, random), 5e-4, 2e-4);
+    refused += refine_flat(prior, f).contradicted ? 1 : 0;
+  }
+  CAPTURE(refused);
+  CHECK(refused <= runs / 10);
+}
+
 TEST_CASE("An exact motion stays, and the noise of the pairs is measured", "[frame][refine_motion]") {
   cfp::Random random(4, "exact");
   for (const double t : {0.0, 0.05}) {

@@ -71,7 +71,7 @@ struct Frame {
 /// What the host's optimiser made of the coarse weights.
 struct PoseEstimate {
   SE3<double> T_cur_prev;   ///< maps points of camera k-1 into camera k
-  std::size_t inliers = 0;  ///< N_BA: observations that the pose rests on
+  std::size_t inliers = 0;  ///< N_BA: observations that the pose rests on; of a filter: the tracks that it weighed
 };
 
 }  // namespace cfp

@@ -17,9 +17,9 @@ namespace cfp {
 inline namespace CFP_ISA {
 
 /// The matches of two frames whose keypoints observe the same map points, for hosts that keep a map point per keypoint:
-/// current and last hold pointers of any kind, one per keypoint, null where there is no map point. match[i] becomes the
-/// index in last of what current[i] points to, or no_match; of several the lowest. O(n log n); `scratch` is
-/// overwritten.
+/// current and last hold pointers of any kind, one per keypoint, null where there is no map point, or ids above 0.
+/// match[i] becomes the index in last of what current[i] points to, or no_match; of several the lowest. O(n log n);
+/// `scratch` is overwritten.
 template <typename Pointers>
 void match_by_map_point(const Pointers& current, const Pointers& last, std::vector<std::int32_t>& scratch,
                         std::vector<std::int32_t>& match) {

@@ -149,11 +149,12 @@ inline namespace CFP_ISA {
 /// over the pairs of the undistorted image that `outside` marks as on no object: xi_0 and C the host's motion and its
 /// covariance, r, J and sigma_z of motion_distance, where a depth is unknown at the one that fits best, rho Geman and
 /// McClure's loss at four times the noise, which is measured. The length of the translation is then the host's, as one
-/// camera cannot tell it. Where the result is farther from the host's motion than one in a thousand, C grows until it
-/// is not (apart_sq / 6 times), and all begins again: `contradicted`. Unknown with fewer than options.min_pairs pairs,
-/// where less than min_inlier_share of them agree, where C has no inverse, or if even the larger C is contradicted. An
-/// exact motion (C = 0) stays, and the noise of the pairs is measured. O(pairs); allocates `distances` alone. Not in
-/// the paper (cfp_object_motion_study).
+/// camera cannot tell it. A result that is farther from the host's motion than one in a thousand may follow what moves
+/// and nobody reported: if the host's leaves at most 1.2 times its noise, the host's is returned as it came
+/// (cfp_unreported_study). If not, C grows until they agree (apart_sq / 6 times), and all begins again: `contradicted`.
+/// Unknown with fewer than options.min_pairs pairs, where less than min_inlier_share of them agree, where C has no
+/// inverse, or if even the larger C is contradicted. An exact motion (C = 0) stays, and the noise of the pairs is
+/// measured. O(pairs); allocates `distances` alone. Not in the paper (cfp_object_motion_study).
 template <typename Scalar>
 [[nodiscard]] RefinedMotion<Scalar> refine_camera_motion(UncertainMotion<double> prior, const FlowPairs<Scalar>& flow,
                                                          span<const char> outside, const PinholeCamera<Scalar>& camera,
@@ -166,6 +167,12 @@ template <typename Scalar>
   motion.contradicted =
       motion.known ? motion.apart_sq > detail::most_motion_distance_sq : outside.size() - inside >= options.min_pairs;
   if (!motion.known || !motion.contradicted) return motion;
+  const UncertainMotion<double> exact(prior.T_cur_prev);
+  RefinedMotion<Scalar> as_given = detail::refine_from(exact, flow, outside, camera, options, 1, distances);
+  if (as_given.known && as_given.sigma_px <= Scalar(1.2) * motion.sigma_px) {
+    static_cast<UncertainMotion<Scalar>&>(as_given) = prior.template cast<Scalar>();
+    return as_given;
+  }
   prior.covariance *= motion.apart_sq / 6;
   motion = refine();
   motion.contradicted = true;

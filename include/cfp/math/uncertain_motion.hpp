@@ -46,6 +46,25 @@ struct TimedMotion {
 
 inline namespace CFP_ISA {
 
+/// The motion between two poses of one camera whose errors have this joint covariance, 12 x 12: of (xi_prev, xi_cur) in
+/// exp(xi) T_cam_world, in the order and units of UncertainMotion. To first order
+///
+///   J C J^T,  J = (-Ad(T_cur_prev), 1).
+///
+/// A position p + dp in the world and a rotation R_cam_world = exp(-theta) R, as in OpenVINS and VINS-Mono, give
+/// xi = -(R dp, theta); T_world_cam exp(zeta) gives xi = -zeta; xi of a body gives Ad(T_cam_body) xi of its camera.
+template <typename Scalar, typename Covariance>
+[[nodiscard]] UncertainMotion<Scalar> relative_motion(const SE3<Scalar>& T_prev_world, const SE3<Scalar>& T_cur_world,
+                                                      const Eigen::MatrixBase<Covariance>& joint_covariance) noexcept {
+  UncertainMotion<Scalar> motion(T_cur_world * T_prev_world.inverse());
+  Eigen::Matrix<Scalar, 6, 12> J;
+  J.template leftCols<6>() = -adjoint(motion.T_cur_prev);
+  J.template rightCols<6>().setIdentity();
+  const Eigen::Matrix<Scalar, 6, 12> JC = J.lazyProduct(joint_covariance);
+  motion.covariance = JC.lazyProduct(J.transpose());
+  return motion;
+}
+
 /// The motion in the next time_s of a camera that keeps its velocity but for an acceleration, the standard deviation of
 /// each coordinate of which is given; how it turns may change at will. Both times above 0.
 template <typename Scalar>
