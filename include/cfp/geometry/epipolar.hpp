@@ -41,7 +41,8 @@ template <typename Scalar>
 /// epipolar_distance for an F of unit_scale, whose line_noise is given.
 template <typename Scalar>
 [[nodiscard]] CFP_INLINE Scalar scaled_epipolar_distance(const Matrix3<Scalar>& F, const Vector3<Scalar>& noise,
-                                              const Vector2<Scalar>& x_prev, const Vector2<Scalar>& x_cur) noexcept {
+                                                         const Vector2<Scalar>& x_prev,
+                                                         const Vector2<Scalar>& x_cur) noexcept {
   using std::abs;
   using std::sqrt;
   const Vector3<Scalar> line = F.col(0) * x_prev.x() + F.col(1) * x_prev.y() + F.col(2);

@@ -39,9 +39,10 @@ template <typename Real>
 /// motion_distance under T_cur_prev with the covariance of `motion`; null: it is exact.
 template <typename Camera, typename Scalar>
 [[nodiscard]] CFP_INLINE Scalar distance_under(const Vector2<Scalar>& pixel_prev, const Scalar& depth_prev,
-                                    const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
-                                    const UncertainMotion<AtLeastDouble<Scalar>>* motion, const Camera& camera,
-                                    const Scalar& sigma_px, const MotionDistanceOptions& options) noexcept {
+                                               const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
+                                               const UncertainMotion<AtLeastDouble<Scalar>>* motion,
+                                               const Camera& camera, const Scalar& sigma_px,
+                                               const MotionDistanceOptions& options) noexcept {
   using std::sqrt;
   using Real = AtLeastDouble<Scalar>;
   const Scalar none = Scalar(no_distance<double>);

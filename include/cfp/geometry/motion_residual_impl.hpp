@@ -35,9 +35,9 @@ inline namespace CFP_ISA {
 
 /// At depth z. False for a pixel without a ray or a point behind the current camera.
 template <typename Camera, typename Scalar>
-[[nodiscard]] CFP_INLINE bool motion_residual(const Vector2<Scalar>& pixel_prev, const Scalar& z, const Vector2<Scalar>& pixel_cur,
-                                   const SE3<Scalar>& T_cur_prev, const Camera& camera,
-                                   MotionResidual<Scalar>& out) noexcept {
+[[nodiscard]] CFP_INLINE bool motion_residual(const Vector2<Scalar>& pixel_prev, const Scalar& z,
+                                              const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
+                                              const Camera& camera, MotionResidual<Scalar>& out) noexcept {
   Vector3<Scalar> ray;
   if (!camera.unproject(pixel_prev, ray)) return false;
   const Vector3<Scalar> turned = T_cur_prev.rotation * ray, point = turned * z + T_cur_prev.translation;
@@ -54,9 +54,9 @@ template <typename Camera, typename Scalar>
 /// At the measured depth, or at the mean of an unknown one.
 template <typename Camera, typename Scalar>
 [[nodiscard]] CFP_INLINE bool expected_residual(const Vector2<Scalar>& pixel_prev, const Scalar& depth_prev,
-                                     const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
-                                     const Camera& camera, const MotionDistanceOptions& options,
-                                     MotionResidual<Scalar>& out) noexcept {
+                                                const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
+                                                const Camera& camera, const MotionDistanceOptions& options,
+                                                MotionResidual<Scalar>& out) noexcept {
   const bool measured = is_valid_depth(depth_prev);
   const Scalar z = measured ? depth_prev : Scalar(1 / options.unknown_depth.inverse_mean);
   out.sigma_z = measured ? Scalar(options.depth_noise.sigma_m(static_cast<double>(z)))

@@ -20,9 +20,10 @@ inline namespace CFP_ISA {
 
 /// d_T = || pixel_cur - project(T_cur_prev * depth_prev * ray(pixel_prev)) ||, depth along z in metres.
 template <typename Camera, typename Scalar>
-[[nodiscard]] CFP_INLINE Scalar reprojection_distance(const Vector2<Scalar>& pixel_prev, const non_deduced<Scalar>& depth_prev,
-                                           const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
-                                           const Camera& camera) noexcept {
+[[nodiscard]] CFP_INLINE Scalar reprojection_distance(const Vector2<Scalar>& pixel_prev,
+                                                      const non_deduced<Scalar>& depth_prev,
+                                                      const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
+                                                      const Camera& camera) noexcept {
   using std::sqrt;
   Vector3<Scalar> ray = Vector3<Scalar>::Zero();
   Vector2<Scalar> projected = Vector2<Scalar>::Zero();
