@@ -34,6 +34,7 @@
 #include "cfp/frame/explain.hpp"
 #include "cfp/frame/flow_model.hpp"
 #include "cfp/frame/frame.hpp"
+#include "cfp/frame/frame_interval.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
 #include "cfp/frame/health.hpp"

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "cfp/frame/frame_interval.hpp"
 #include "cfp/frame/static_probability.hpp"
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/interop/opencv.hpp"
