@@ -25,6 +25,7 @@
 #include <utility>
 #include <vector>
 
+#include "../../tests/support/moving_flow.hpp"
 #include "cfp/core/random.hpp"
 #include "cfp/frame/static_probability.hpp"
 
@@ -145,9 +146,8 @@ class Frames {
 };
 
 cfp::UncertainMotion<double> seen_by(const Host& host, const cfp::SE3<double>& T_cur_prev, cfp::Random& random) {
-  cfp::Vector6<double> error;
-  for (int k = 0; k < 6; ++k) error[k] = host.errors * (k < 3 ? host.sigma_m : host.sigma_rad) * random.normal();
-  return {cfp::se3_exp(error) * T_cur_prev, host.sigma_m, host.sigma_rad};
+  const auto error = cfp_test::random_motion(host.errors * host.sigma_m, host.errors * host.sigma_rad, random);
+  return {error * T_cur_prev, host.sigma_m, host.sigma_rad};
 }
 
 // With a host: one camera, no depths.

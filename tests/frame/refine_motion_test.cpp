@@ -43,9 +43,7 @@ FlatFlow flat_flow(int n, const cfp::SE3<double>& T, double noise_px, cfp::Rando
 
 /// T with an error of these standard deviations.
 cfp::SE3<double> with_error(const cfp::SE3<double>& T, double sigma_m, double sigma_rad, cfp::Random& random) {
-  cfp::Vector6<double> error;
-  for (int k = 0; k < 6; ++k) error[k] = (k < 3 ? sigma_m : sigma_rad) * random.normal();
-  return cfp::se3_exp(error) * T;
+  return cfp_test::random_motion(sigma_m, sigma_rad, random) * T;
 }
 
 double angle_between(const cfp::SE3<double>& a, const cfp::SE3<double>& b) {

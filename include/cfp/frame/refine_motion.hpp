@@ -170,7 +170,7 @@ template <typename Scalar>
   const UncertainMotion<double> exact(prior.T_cur_prev);
   RefinedMotion<Scalar> as_given = detail::refine_from(exact, flow, outside, camera, options, 1, distances);
   if (as_given.known && as_given.sigma_px <= Scalar(1.2) * motion.sigma_px) {
-    static_cast<UncertainMotion<Scalar>&>(as_given) = prior.template cast<Scalar>();
+    as_given.covariance = prior.covariance.template cast<Scalar>();
     return as_given;
   }
   prior.covariance *= motion.apart_sq / 6;

@@ -54,7 +54,7 @@ template <typename Scalar>
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar iou(const Box<Scalar>& a, const Box<Scalar>& b) noexcept {
   const Scalar common = area(intersection(a, b));
-  if (!(common > Scalar(0))) return Scalar(0);
+  if (!(common > Scalar(0))) return Scalar(0);  // else both are proper
   const Scalar united = a.width() * a.height() + b.width() * b.height() - common;
   return is_finite(united) ? clamp_probability(common / united) : Scalar(0);
 }

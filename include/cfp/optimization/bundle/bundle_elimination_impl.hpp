@@ -99,7 +99,7 @@ CFP_INLINE void couple(const double (&N)[9], const Vector3<double>& d, const Tri
 
 /// target -= C_b C_a^T, d the offset of C_a.
 template <int K>
-CFP_INLINE void subtract_product(const Eigen::Map<const Eigen::Matrix<double, K, 9 - K>>& C_b,
+CFP_INLINE void subtract_product(const Eigen::Map<Eigen::Matrix<double, K, 9 - K>>& C_b,
                                  const Eigen::Matrix<double, K, 9 - K>& C_a, const Vector3<double>& d,
                                  Eigen::Map<Eigen::Matrix<double, K, K>> target) {
   if constexpr (K == 6) {  // C = [M; hat(d) M]: half of the block follows from the other
@@ -164,8 +164,7 @@ template <int E, int K = 9 - E>
       const Coupling right = coupling(a);
       const Vector3<double> d = K == 6 ? offset(state, schur.coupled[a], i) : offset(state, i, schur.coupled[a]);
       for (std::size_t b = a; b < end; ++b)
-        subtract_product<K>(Eigen::Map<const Coupling>(schur.couplings.data() + 18 * b), right, d,
-                            block(schur.coupled[b], schur.coupled[a]));
+        subtract_product<K>(coupling(b), right, d, block(schur.coupled[b], schur.coupled[a]));
     }
   }
   return true;
