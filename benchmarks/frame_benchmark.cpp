@@ -1,9 +1,9 @@
 // What runs once per frame, as a whole, with the spread of single calls: the first and second stage on a frame of about
 // 1000 keypoints, 3 boxes of people and 500 optical-flow pairs (images and the optical flow itself excluded), with the
-// fundamental matrix given, with the camera's motion from the pairs' depths, with that of a host (3 mm, 1 mrad) refined
-// by pairs without depths, and with none of these: 0.5 px of noise on a base of 3 cm has no F, so that RANSAC is
-// followed by the motion up to scale. 16 frames rotate. Quality: `auc` of K after both stages for static against moving
-// keypoints inside boxes.
+// fundamental matrix given, with the camera's motion from the pairs' depths or those of the keypoints next to them,
+// with that of a host (3 mm, 1 mrad) refined by pairs without depths, and with none of these: 0.5 px of noise on a base
+// of 3 cm has no F, so that RANSAC is followed by the motion up to scale. 16 frames rotate. Quality: `auc` of K after
+// both stages for static against moving keypoints inside boxes.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ namespace {
 constexpr std::size_t frames = 16, flow_pairs = 500;
 
 enum class Stages { coarse, fine, both };
-enum class Given { nothing, depths, fundamental, motion };
+enum class Given { nothing, depths, keypoint_depths, fundamental, motion };
 
 template <typename Scalar>
 struct Frame {
@@ -71,7 +71,8 @@ std::vector<Frame<Scalar>> make_frames() {
 template <typename Scalar, Stages stages, Given given>
 void frame(benchmark::State& state) {
   std::vector<Frame<Scalar>> all = make_frames<Scalar>();
-  const cfp::FrameOptions options;
+  cfp::FrameOptions options;
+  if (given != Given::keypoint_depths) options.coarse.flow_depth_radius_px = 0;
   const auto run = [&](Frame<Scalar>& f) {
     if (stages != Stages::fine) f.coarse(options, given);
     if (stages != Stages::coarse) f.fine(options);
@@ -110,6 +111,7 @@ void frame(benchmark::State& state) {
 
 BENCHMARK(frame<float, Stages::both, Given::nothing>)->Unit(benchmark::kMicrosecond);
 BENCHMARK(frame<float, Stages::both, Given::depths>)->Unit(benchmark::kMicrosecond);
+BENCHMARK(frame<float, Stages::both, Given::keypoint_depths>)->Unit(benchmark::kMicrosecond);
 BENCHMARK(frame<float, Stages::both, Given::fundamental>)->Unit(benchmark::kMicrosecond);
 BENCHMARK(frame<float, Stages::both, Given::motion>)->Unit(benchmark::kMicrosecond);
 BENCHMARK(frame<double, Stages::both, Given::nothing>)->Unit(benchmark::kMicrosecond);

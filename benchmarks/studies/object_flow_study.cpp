@@ -55,6 +55,7 @@ struct Candidate {
   std::string name;
   std::function<void(const cv::Mat& previous, const Image& before, const Image& now, Pairs& pairs)> track;
   double edge_px = 0;
+  std::optional<double> of_keypoints_px{};  // the pairs come without depths: CoarseOptions::flow_depth_radius_px
   std::vector<double> flow_ms{}, object_ms{}, total_ms{};
   std::vector<float> score{};
   std::vector<char> is_static{};
@@ -152,6 +153,10 @@ std::vector<Candidate> candidates() {
     all.push_back(tracker("  no depth " + std::to_string(int(edge_px)) + " px from edges", {}));
     all.back().edge_px = edge_px;
   }
+  for (const double radius_px : {0.0, 1.0, 3.0, 5.0, 8.0, 12.0}) {
+    all.push_back(tracker("  depths of keypoints in " + std::to_string(int(radius_px)) + " px", {}));
+    all.back().of_keypoints_px = radius_px;
+  }
   return all;
 }
 
@@ -187,7 +192,7 @@ void add_masks(const cv::Mat& labels, int grow_px, Image& image) {
 }
 
 void judge(std::vector<Candidate>& all, const std::vector<Image>& images, const cfp::PinholeCamera<float>& camera) {
-  const cfp::FrameOptions options;
+  cfp::FrameOptions options;
   cfp::FrameState<float> state;
   for (std::size_t k = 0; k < images.size(); ++k) {
     for (std::size_t turn = 0; turn < all.size(); ++turn) {
@@ -201,15 +206,25 @@ void judge(std::vector<Candidate>& all, const std::vector<Image>& images, const 
       }
       c.track(images[k - 1].gray, images[k - 1], images[k], pairs);
       const double tracked = processor_ms();
-      cfp::Frame<float> frame;
-      std::vector<float> depths_m(pairs.first.size());
       const Image& before = images[k - 1];
-      if (before.depth.empty())
-        depths_m.clear();
-      else
-        cfp::sample_depth(before.depth, cfp::view(pairs.first), before.metres_per_unit, depths_m, c.edge_px);
-      frame.flow = {cfp::view(pairs.first), cfp::view(pairs.second), depths_m};
+      const auto depths_at = [&](const cfp::PointSpan<float, 2>& pixels) {
+        std::vector<float> depths_m(before.depth.empty() ? 0 : pixels.size());
+        if (!depths_m.empty()) cfp::sample_depth(before.depth, pixels, before.metres_per_unit, depths_m, c.edge_px);
+        return depths_m;
+      };
+      cfp::Frame<float> last, frame;
+      frame.timestamp_s = 1.0 / 30;
+      std::vector<float> depths_m = depths_at(c.of_keypoints_px ? cfp::view(before.keypoints) : cfp::view(pairs.first));
+      frame.flow = {cfp::view(pairs.first), cfp::view(pairs.second)};
+      if (c.of_keypoints_px) {
+        last.keypoints = cfp::view(before.keypoints);
+        last.depths = depths_m;
+        options.coarse.flow_depth_radius_px = *c.of_keypoints_px;
+      } else {
+        frame.flow.previous_depths = depths_m;
+      }
       if (!images[k].mask.empty()) frame.labels = cfp::label_view(images[k].mask);
+      cfp::begin_frame(last, state);
       cfp::begin_frame(frame, state);
       for (const Person& person : images[k].people) {
         cfp::TrackedBox<float> box;

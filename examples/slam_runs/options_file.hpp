@@ -34,6 +34,7 @@ void for_each_option(Options& o, const Visit& visit) {
   visit("probability.tracker.min_score", p.tracker.min_score);
   visit("probability.tracker.birth_threshold", p.tracker.birth_threshold);
   visit("probability.coarse.flow_radius_px", p.coarse.flow_radius_px);
+  visit("probability.coarse.flow_depth_radius_px", p.coarse.flow_depth_radius_px);
   visit("probability.coarse.unreported.radius_px", p.coarse.unreported.radius_px);
   visit("probability.coarse.flow.camera_acceleration_m_s2", p.coarse.flow.camera_acceleration_m_s2);
   visit("probability.coarse.flow.motion.min_sigma_px", p.coarse.flow.motion.min_sigma_px);

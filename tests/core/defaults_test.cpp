@@ -30,6 +30,7 @@ TEST_CASE("The defaults of the flow and of objects", "[core]") {
   const cfp::FrameOptions frame;
   const cfp::CoarseOptions& o = frame.coarse;
   CHECK((o.use_object_probability && o.use_depth_foreground && o.soft_background && o.flow_radius_px == 10));
+  CHECK(o.flow_depth_radius_px == 5);
   CHECK((o.unreported.radius_px == 60 && o.unreported.depth_share == 0.1));
   CHECK((o.unreported.pairs == 3 && o.unreported.max_share == 0.4 && o.unreported.min_known_depths == 0.5));
   const cfp::UnknownDepth& room = o.unreported.nearer_than_room;

@@ -28,7 +28,7 @@ struct Street {
     }
     depths.assign(pixels.size(), 3.0F);
     frame.flow.current = frame.flow.previous = pixels;
-    frame.flow.previous_depths = depths;
+    state.flow_depths = depths;
     state.report.flow_model = cfp::FlowModelKind::motion;
     state.report.flow_sigma_px = 0.2;
     state.previous.known = true;
@@ -119,9 +119,9 @@ TEST_CASE("Frames without depths, without a motion or with hostile numbers count
   street.state.report.flow_model = cfp::FlowModelKind::fundamental;
   CHECK(street.after(100) == 0);
   street.state.report.flow_model = cfp::FlowModelKind::motion;
-  street.frame.flow.previous_depths = {};
+  street.state.flow_depths.clear();
   CHECK(street.after(100) == 0);
-  street.frame.flow.previous_depths = street.depths;
+  street.state.flow_depths = street.depths;
   street.frame.image_motion = cfp::Matrix3<float>::Constant(std::numeric_limits<float>::quiet_NaN());
   CHECK(street.after(100) == 0);
   street.frame.image_motion.reset();

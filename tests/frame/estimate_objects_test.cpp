@@ -99,7 +99,7 @@ TEST_CASE("A host's motion that errs as it says makes nobody who stands move", "
       cfp::Frame<double> frame = run.frame();
       if (depths) frame.flow.previous_depths = scene.previous_depths;
       frame.T_cur_prev = {cfp::se3_exp(error) * scene.T_cur_prev, sigma_m, sigma_rad};
-      const cfp::FrameReport report = run.coarse({}, frame, scene.camera);
+      const cfp::FrameReport report = run.coarse(cfp_test::by_flow_alone(), frame, scene.camera);
       CHECK(report.unknown_objects == 0);
       CHECK((report.flow_support == cfp::FlowSupport::caller) == (sigma_m == 0));
       return run.state.objects[0].static_probability > cfp::FrameOptions().object_threshold ? 1 : 0;
@@ -517,6 +517,67 @@ TEST_CASE("One camera before a wall tells who walks, and does not take the paral
   CHECK(called(0.03) >= 90);
 }
 
+TEST_CASE("Flow without depths has those of the keypoints next to it in the frame before", "[frame]") {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<std::array<double, 2>> keypoints = {{100, 100}, {104, 100}, {200, 100}, {300, 100}, {nan, 100}};
+  const std::vector<double> depths = {2, 3, -1, nan, 5};
+  const std::vector<std::array<double, 2>> from = {{100, 101}, {103, 100}, {108.9, 100}, {109.1, 100},
+                                                   {200, 100}, {300, 100}, {nan, 100}};
+  const std::vector<double> own(from.size(), 7);
+  cfp::Frame<double> before, frame;
+  before.keypoints = keypoints;
+  before.depths = depths;
+  frame.timestamp_s = 1.0 / 30;
+  frame.flow = {from, from};
+  const auto depths_of_flow = [&](const cfp::FrameOptions& options) {
+    cfp::FrameState<double> state;
+    cfp::begin_frame(before, state);
+    cfp::begin_frame(frame, state);
+    state.boxes.resize(1);
+    cfp::estimate_objects(frame, cfp::PinholeCamera<double>{500, 500, 320, 240}, options, state);
+    return state.flow_depths;
+  };
+  CHECK(depths_of_flow({}) == std::vector<double>{2, 3, 3, -1, -1, -1, -1});
+  CHECK(depths_of_flow(cfp_test::by_flow_alone()).empty());
+  cfp::FrameOptions as_printed;
+  as_printed.coarse.flow.use_depth = false;
+  CHECK(depths_of_flow(as_printed).empty());
+  frame.fundamental = cfp::Matrix3<double>::Zero();
+  CHECK(depths_of_flow({}).empty());
+  frame.fundamental.reset();
+  frame.flow.previous_depths = own;
+  CHECK(depths_of_flow({}) == own);
+  frame.flow.previous_depths = {};
+  before.depths = {};
+  CHECK(depths_of_flow({}).empty());
+}
+
+TEST_CASE("Who walks along the camera's path is told by the depths of keypoints, not by epipolar lines", "[frame]") {
+  const auto called_static = [](const cfp::FrameOptions& options) {
+    int count = 0;
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      DynamicScene<double> scene = make_dynamic_scene<double>({}, seed);
+      scene.T_cur_prev.rotation.setIdentity();
+      scene.T_cur_prev.translation = {-0.03, 0, 0};
+      cfp::Random random(seed, "along");
+      scene.keypoints.clear(), scene.previous_keypoints.clear(), scene.depths.clear(), scene.match.clear();
+      for (int i = 0; i < 300; ++i)
+        add_pair(scene, {random.uniform(0, 640), random.uniform(0, 480)}, random.uniform(3.5, 5), 0, 0.2, random);
+      for (int i = 0; i < 60; ++i)
+        add_pair(scene, {random.uniform(250, 350), random.uniform(100, 400)}, random.uniform(2, 2.3), 0.03, 0.2,
+                 random);
+      scene.previous_depths = scene.depths;
+      scene.boxes = {{245, 95, 365, 405}};
+      FrameRun<double> run(scene);
+      run.coarse(options);
+      count += run.state.objects[0].static_probability > options.object_threshold ? 1 : 0;
+    }
+    return count;
+  };
+  CHECK(called_static({}) == 0);
+  CHECK(called_static(cfp_test::by_flow_alone()) > 15);
+}
+
 TEST_CASE("A person who fills the view of a camera without depths is unknown, not at rest", "[frame]") {
   cfp_test::DynamicSceneOptions crowded;
   crowded.people = 1;
@@ -524,7 +585,7 @@ TEST_CASE("A person who fills the view of a camera without depths is unknown, no
   crowded.wall_points = 25;
   FrameRun<double> run(make_dynamic_scene<double>(crowded, 1));
   run.scene.boxes = {{-100, -100, 900, 700}};
-  const cfp::FrameReport report = run.coarse({}, run.frame(), run.scene.camera);
+  const cfp::FrameReport report = run.coarse(cfp_test::by_flow_alone());
   CHECK(report.flow_model == cfp::FlowModelKind::none);
   CHECK(report.flow_support == cfp::FlowSupport::none);
   CHECK(report.unknown_objects == 1);

@@ -15,6 +15,7 @@ TEST_CASE("Frame options outside their range are named by their whole path", "[f
   };
   CHECK(named([](auto& o) { o.coarse.flow.ransac.confidence = 2; }) == "coarse.flow.ransac.confidence");
   CHECK(named([](auto& o) { o.coarse.flow_radius_px = -1; }) == "coarse.flow_radius_px");
+  CHECK(named([](auto& o) { o.coarse.flow_depth_radius_px = -1; }) == "coarse.flow_depth_radius_px");
   CHECK(named([](auto& o) { o.coarse.unreported.radius_px = -1; }) == "coarse.unreported.radius_px");
   CHECK(named([](auto& o) { o.coarse.unreported.depth_share = -1; }) == "coarse.unreported.depth_share");
   CHECK(named([](auto& o) { o.coarse.unreported.pairs = 0; }) == "coarse.unreported.pairs");

@@ -35,7 +35,7 @@ TEMPLATE_TEST_CASE("Moving people: their points get 0, points outside 1, the bac
                    double) {
   const DynamicScene<TestType> scene = make_dynamic_scene<TestType>(quiet(), 1);
   FrameRun<TestType> run(scene);
-  const cfp::FrameReport result = run.coarse({});
+  const cfp::FrameReport result = run.coarse(cfp_test::by_flow_alone());
   CHECK(result.flow_model == cfp::FlowModelKind::fundamental);
   CHECK(result.flow_support == cfp::FlowSupport::outside_pairs);
   CHECK(result.unknown_objects == 0);
@@ -162,13 +162,13 @@ TEST_CASE("A camera without depths that only turns or rests judges people by its
     options.translation_m = 0;
     options.rotation_rad = rotation;
     FrameRun<double> moving(make_dynamic_scene<double>(options, 6));
-    CHECK(moving.coarse({}).flow_model == cfp::FlowModelKind::motion_up_to_scale);
+    cfp::FrameOptions without = cfp_test::by_flow_alone();
+    CHECK(moving.coarse(without).flow_model == cfp::FlowModelKind::motion_up_to_scale);
     for (const cfp::ObjectProbability& object : moving.state.objects) CHECK(object.static_probability < 0.5);
     options.person_motion_m = 0;
     FrameRun<double> still(make_dynamic_scene<double>(options, 6));
-    still.coarse({});
+    still.coarse(without);
     for (const cfp::ObjectProbability& object : still.state.objects) CHECK(object.static_probability > 0.9);
-    cfp::FrameOptions without;
     without.coarse.flow.use_motion_up_to_scale = false;
     const cfp::FrameReport unknown = still.coarse(without);
     CHECK(unknown.unknown_objects == 2);

@@ -190,6 +190,7 @@ TEST_CASE("The flow at a keypoint's place tells the part of a person that moves 
   });
 
   frame.flow.previous_depths = {};  // one camera
+  options.coarse.flow_depth_radius_px = 0;
   run.coarse(options, frame, run.scene.camera);
   REQUIRE(run.state.report.flow_model == cfp::FlowModelKind::motion_up_to_scale);
   std::array<int, 2> right{}, all{};

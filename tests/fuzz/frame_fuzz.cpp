@@ -55,6 +55,7 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
                        &options.min_creation_probability,
                        &options.min_inlier_weight,
                        &options.coarse.flow_radius_px,
+                       &options.coarse.flow_depth_radius_px,
                        &options.coarse.unreported.radius_px,
                        &options.coarse.unreported.depth_share,
                        &options.coarse.unreported.max_share,

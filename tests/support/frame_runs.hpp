@@ -20,6 +20,13 @@ inline cfp::FrameOptions by_objects_alone() {
   return options;
 }
 
+/// Flow without depths has none, whatever the keypoints have.
+inline cfp::FrameOptions by_flow_alone() {
+  cfp::FrameOptions options;
+  options.coarse.flow_depth_radius_px = 0;
+  return options;
+}
+
 template <typename Scalar>
 struct FrameRun {
   explicit FrameRun(DynamicScene<Scalar> s) : scene(std::move(s)), m(scene.keypoints.size(), Scalar(1)) {

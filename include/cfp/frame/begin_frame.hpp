@@ -62,6 +62,7 @@ void begin_frame(const Frame<Scalar>& frame, FrameState<Scalar>& state) {
   state.box.assign(n, no_box);
   state.match.assign(n, no_match);
   state.flow_probability.assign(n, Scalar(-1));
+  state.flow_depths.clear();
   state.flow_distances.clear();
   for (std::size_t i = 0; i < n; ++i) {
     const auto& [x, y] = state.current.keypoints[i];

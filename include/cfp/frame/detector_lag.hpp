@@ -53,8 +53,8 @@ class DetectorLag {
     const double kept = dt > 0 && is_finite(dt) ? std::exp(-dt / options_.memory_s) : 1;
     boxes_ *= kept;
     for (double& sum : scores_) sum *= kept;
-    const bool judged = state.report.flow_model == FlowModelKind::motion &&
-                        state.flow_distances.size() == frame.flow.previous_depths.size();
+    const bool judged =
+        state.report.flow_model == FlowModelKind::motion && state.flow_distances.size() == state.flow_depths.size();
     for (std::size_t b = 0; judged && b < state.boxes.size(); ++b) {
       const TrackedBox<Scalar>& box = state.boxes[b];
       const Vector2<Scalar> rate = image_rate(box, frame, static_cast<Scalar>(dt));
@@ -107,7 +107,7 @@ class DetectorLag {
     for (std::size_t i = 0; i < state.flow_distances.size(); ++i) {
       const Scalar distance = state.flow_distances[i];
       if (!contains(box, frame.flow.current(i, 0) - by.x(), frame.flow.current(i, 1) - by.y()) ||
-          !has_distance(distance) || !is_valid_depth(frame.flow.previous_depths[i]))
+          !has_distance(distance) || !is_valid_depth(state.flow_depths[i]))
         continue;
       ++pairs;
       sum += distance > Scalar(6) * sigma ? 1 : distance < Scalar(3) * sigma ? -1 : 0;

@@ -39,7 +39,7 @@ void label_margin(const Box<Scalar>& box, const ForegroundResult& separated, con
 template <typename Scalar>
 void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
-  const FlowPairs<Scalar>& flow = frame.flow;
+  const FlowPairs<Scalar> flow{frame.flow.previous, frame.flow.current, state.flow_depths};
   const std::size_t n = flow.current.size();
   scratch.pair_label.assign(state.boxes.size() * n, PairLabel::outside);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
@@ -125,9 +125,9 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   if (state.boxes.empty() && !looks_for_unreported(options)) return;
 
   FrameScratch<Scalar>& scratch = state.scratch;
+  detail::find_flow_depths(frame, coarse, state);
   const FlowPairs<Scalar> flow{undistorted(camera, frame.flow.previous, scratch.undistorted_previous),
-                               undistorted(camera, frame.flow.current, scratch.undistorted_current),
-                               frame.flow.previous_depths};
+                               undistorted(camera, frame.flow.current, scratch.undistorted_current), state.flow_depths};
   const PinholeCamera<Scalar> pinhole = undistorted_camera(camera);
   detail::label_pairs(frame, options, state);
   const FlowSupport support = detail::mark_outside(n, coarse.flow, scratch);

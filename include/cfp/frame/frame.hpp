@@ -35,8 +35,9 @@ template <typename Scalar>
 struct FlowPairs {
   PointSpan<Scalar, 2> previous;  ///< in frame k-1
   PointSpan<Scalar, 2> current;   ///< in frame k
-  /// Metres along z in frame k-1; not positive or not finite: none there. Empty: none. Where depth does not fit the
-  /// image to the pixel, none is better than what stands at an edge: `edge_px` of sample_depth (opencv_matrices.hpp).
+  /// Metres along z in frame k-1; not positive or not finite: none there. Empty: those of the frame's keypoints that
+  /// lie next to it, see CoarseOptions::flow_depth_radius_px. Where depth does not fit the image to the pixel, none is
+  /// better than what stands at an edge: `edge_px` of sample_depth (opencv_matrices.hpp).
   span<const Scalar> previous_depths = {};
 };
 

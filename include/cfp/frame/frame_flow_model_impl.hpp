@@ -16,6 +16,29 @@
 namespace cfp::detail {
 inline namespace CFP_ISA {
 
+/// Sets state.flow_depths: those of the flow or, where it comes without and is judged by depth, of the keypoints of the
+/// frame before, see CoarseOptions::flow_depth_radius_px.
+template <typename Scalar>
+void find_flow_depths(const Frame<Scalar>& frame, const CoarseOptions& coarse, FrameState<Scalar>& state) {
+  const FlowPairs<Scalar>& flow = frame.flow;
+  const FrameMemory<Scalar>& previous = state.previous;
+  state.flow_depths.assign(flow.previous_depths.begin(), flow.previous_depths.end());
+  const auto radius_px = static_cast<Scalar>(coarse.flow_depth_radius_px);
+  const bool wanted = flow.previous_depths.empty() && coarse.flow.use_depth && !frame.fundamental && radius_px > 0;
+  if (!wanted || !previous.known || previous.depths.empty()) return;
+  PointGrid<Scalar>& grid = state.scratch.grid;
+  const auto is_known = [&](std::size_t j) {
+    const auto& [x, y] = previous.keypoints[j];
+    return is_finite(x) && is_finite(y) && is_valid_depth(previous.depths[j]);
+  };
+  fill_grid(PointSpan<Scalar, 2>(previous.keypoints), is_known, radius_px, grid);
+  for (std::size_t i = 0; i < flow.previous.size(); ++i) {
+    const std::size_t j = nearest(grid, flow.previous(i, 0), flow.previous(i, 1), previous.depths.size(),
+                                  [](const auto&) { return true; });
+    state.flow_depths.push_back(j < previous.depths.size() ? previous.depths[j] : Scalar(-1));
+  }
+}
+
 /// The motion of the flow's depths joined with what the frame before lets expect if the two agree, for a camera that is
 /// pushed keeps no velocity.
 template <typename Scalar>

@@ -55,6 +55,9 @@ struct CoarseOptions {
   /// WeightRule::posterior: a keypoint in a box is judged by the flow pair nearest to it, if one lies within; by
   /// its object else. >= 0; 0: always by its object.
   double flow_radius_px = 10;
+  /// Flow that comes without depths, and without an F of the host, takes them from the frame before: each pair that of
+  /// the nearest keypoint which has one, within this. >= 0; 0: it has none (cfp_object_flow_study).
+  double flow_depth_radius_px = 5;
   UnreportedOptions unreported;
   FlowModelOptions flow;
   ObjectProbabilityOptions object;
@@ -111,6 +114,7 @@ inline namespace CFP_ISA {
 
 [[nodiscard]] inline OptionPath invalid_field(const CoarseOptions& o) noexcept {
   if (!detail::non_negative(o.flow_radius_px)) return "flow_radius_px";
+  if (!detail::non_negative(o.flow_depth_radius_px)) return "flow_depth_radius_px";
   if (const OptionPath field = nested("unreported", invalid_field(o.unreported))) return field;
   if (const OptionPath field = nested("flow", invalid_field(o.flow))) return field;
   if (const OptionPath field = nested("object", invalid_field(o.object))) return field;

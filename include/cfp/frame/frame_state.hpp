@@ -113,6 +113,7 @@ struct FrameState {
   std::vector<std::int32_t> box;                                ///< per keypoint: the box that decides its K, or no_box
   std::vector<std::int32_t> match;                    ///< per keypoint: index in the frame before, or no_match
   std::vector<SecondStageKeypoint<Scalar>> evidence;  ///< per keypoint in a box: what the fine stage knew of it
+  std::vector<Scalar> flow_depths;                    ///< per flow pair: in the frame before, m; empty: none
   std::vector<Scalar> flow_distances;      ///< per flow pair, px, as the flow's model has them; empty: there is none
   std::vector<Scalar> flow_probability;    ///< per keypoint: score of the flow at its place, negative: none; outside of
                                            ///< boxes where it moves alone

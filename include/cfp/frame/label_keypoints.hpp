@@ -33,15 +33,10 @@ void score_flow_at_keypoints(const Frame<Scalar>& frame, const FrameOptions& opt
     if (state.box[i] == no_box) continue;
     const Box<Scalar>& box = state.boxes[static_cast<std::size_t>(state.box[i])].box;
     const auto& [x, y] = state.current.keypoints[i];
-    Scalar nearest_sq = radius_px * radius_px, distance = Scalar(-1);
-    visit_near(grid, x, y, [&, x = x, y = y](const auto& pair) {
-      const Scalar dx = pair.x - x, dy = pair.y - y, apart_sq = dx * dx + dy * dy;
-      if (!(apart_sq < nearest_sq) || !contains(box, pair.x, pair.y)) return false;
-      nearest_sq = apart_sq;
-      distance = state.flow_distances[pair.index];
-      return false;
-    });
-    if (has_distance(distance)) state.flow_probability[i] = object_score(distance, scored);
+    const std::size_t pair =
+        nearest(grid, x, y, state.flow_distances.size(), [&](const auto& p) { return contains(box, p.x, p.y); });
+    if (pair < state.flow_distances.size())
+      state.flow_probability[i] = object_score(state.flow_distances[pair], scored);
   }
 }
 
@@ -149,7 +144,8 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
   }
   report.stray_labels = detail::stray_labels(frame, state);
   detail::score_flow_at_keypoints(frame, options, state);
-  detail::score_flow_outside(frame.flow, options, state);
+  detail::score_flow_outside(FlowPairs<Scalar>{frame.flow.previous, frame.flow.current, state.flow_depths}, options,
+                             state);
   detail::count_labels(state.label, report);
 }
 

@@ -82,5 +82,20 @@ void visit_near(const PointGrid<Scalar>& grid, Scalar x, Scalar y, const Visit& 
   }
 }
 
+/// The index of the nearest point that lies less than the reach from (x, y) and for which take(point) holds, the first
+/// of several; `none` without one.
+template <typename Scalar, typename Take>
+[[nodiscard]] std::size_t nearest(const PointGrid<Scalar>& grid, Scalar x, Scalar y, std::size_t none,
+                                  const Take& take) {
+  Scalar nearest_sq = grid.reach * grid.reach;
+  std::size_t index = none;
+  visit_near(grid, x, y, [&](const auto& p) {
+    const Scalar dx = p.x - x, dy = p.y - y, apart_sq = dx * dx + dy * dy;
+    if (apart_sq < nearest_sq && take(p)) nearest_sq = apart_sq, index = p.index;
+    return false;
+  });
+  return index;
+}
+
 }  // namespace CFP_ISA
 }  // namespace cfp::detail
