@@ -135,7 +135,7 @@ TEST_CASE("The defaults of what a caller hands over and leaves out", "[core]") {
   CHECK((!frame.fundamental && !frame.image_motion));
   CHECK(cfp::PoseEstimate().inliers == 0);
   const cfp::ObjectClass c;
-  CHECK((c.class_id == 0 && c.non_rigid));
+  CHECK((c.class_id == 0 && c.non_rigid && !c.prior));
   const cfp::SecondStageKeypoint<double> k;
   CHECK((k.foreground && !k.matched && k.box_associated));
   CHECK(cfp::PoseStep<double>().dt_s == 0);

@@ -399,3 +399,42 @@ TEST_CASE("A room whose neighbours share no depth keeps its pairs", "[frame][cam
   const auto stays = [](const std::array<double, 3>& point) { return cfp::is_finite(point[0]); };
   CHECK(std::count_if(workspace.points.begin(), workspace.points.end(), stays) == std::ptrdiff_t(f.depths.size()));
 }
+
+TEST_CASE("Before a car the errors of stereo depths hide no motion, and its covariance holds them",
+          "[frame][camera_motion]") {
+  cfp::CameraMotionWorkspace<double> workspace;
+  for (const cfp_test::Stereo& stereo : {cfp_test::Stereo{700, 0.54, 1}, {420, 0.1, 0.2}}) {
+    cfp::CameraMotionOptions options;
+    options.distance.depth_noise = stereo.depth_noise();
+    cfp::Random random(1, "stereo");
+    double sum_sq = 0;
+    constexpr int frames = 40;
+    for (int i = 0; i < frames; ++i) {
+      const cfp_test::MovingFlow flow = cfp_test::make_stereo_flow(stereo, 0.9, 400, random);
+      const cfp::CameraMotion<double> found = flow.estimate(options, workspace, stereo.camera());
+      REQUIRE(found.known);
+      const double error = found.T_cur_prev.translation.z() + 0.9;
+      sum_sq += error * error / found.covariance(2, 2);
+    }
+    CHECK(sum_sq < 5 * frames);  // with depths taken for exact above 15, and most frames without a motion
+  }
+}
+
+TEST_CASE("A motion that too few pairs agree to from where the camera was is searched", "[frame][camera_motion]") {
+  cfp::CameraMotionWorkspace<double> workspace;
+  cfp::Random random(1, "searched");
+  const cfp_test::Stereo stereo{600, 0.54, 0.2};
+  int known = 0, right = 0;
+  for (int i = 0; i < 100; ++i) {
+    cfp_test::MovingFlow flow = cfp_test::make_stereo_flow(stereo, 1, 400, random);
+    for (std::size_t k = 0; k < flow.current.size(); ++k) {  // mistracked
+      if (random.uniform() > 0.48) continue;
+      flow.current[k] = {flow.previous[k][0] + 2 * random.normal(), flow.previous[k][1] + 2 * random.normal()};
+    }
+    const cfp::CameraMotion<double> found = flow.estimate({}, workspace, stereo.camera());
+    known += found.known ? 1 : 0;
+    right += found.known && (found.T_cur_prev.translation - flow.T_cur_prev.translation).norm() < 0.05 ? 1 : 0;
+  }
+  CHECK(right == known);
+  CHECK(known > 88);  // 85 without
+}

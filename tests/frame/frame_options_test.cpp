@@ -35,6 +35,7 @@ TEST_CASE("Frame options outside their range are named by their whole path", "[f
   CHECK(named([](auto& o) { o.min_inlier_weight = 1; }) == "min_inlier_weight");
   CHECK(named([](auto& o) { o.min_creation_probability = -0.1; }) == "min_creation_probability");
   CHECK(named([](auto& o) { o.classes.clear(); }) == "classes");
+  CHECK(named([](auto& o) { o.classes.push_back({2, false, 1.0}); }) == "classes.prior");
 }
 
 TEST_CASE("Variants without the object stage hold for every unknown_object_probability", "[frame]") {

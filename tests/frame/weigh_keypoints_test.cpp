@@ -239,6 +239,28 @@ TEST_CASE("What its depth puts on a person who moves is not at rest where the fl
   CHECK(seen > 100);
 }
 
+TEST_CASE("A class whose objects mostly rest has a prior of its own", "[frame]") {
+  cfp_test::DynamicSceneOptions parked;
+  parked.person_motion_m = 0;
+  FrameRun<double> run(make_dynamic_scene<double>(parked, 77));
+  cfp::FrameOptions people, cars;
+  cars.classes = {{0, true, 0.2}};
+  run.coarse(people);
+  std::size_t seen = 0;
+  for (std::size_t i = 0; i < run.m.size(); ++i) {
+    const double of_people = cfp::unknown_map_point(i, people, run.state),
+                 of_cars = cfp::unknown_map_point(i, cars, run.state);
+    if (run.label(i) != cfp::KeypointLabel::foreground) {
+      CHECK(of_cars == of_people);
+    } else {
+      const double odds = of_cars / (1 - of_cars) * (1 - of_people) / of_people;
+      CHECK_THAT(odds, WithinAbs(0.2 / 0.8 * 0.98 / 0.02, 1e-6));
+      ++seen;
+    }
+  }
+  CHECK(seen > 100);
+}
+
 TEST_CASE("What begins to move more slowly than a match can see loses its weight by its flow, and its map point's",
           "[frame]") {
   const cfp::FrameOptions options;

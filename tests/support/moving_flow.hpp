@@ -35,10 +35,10 @@ struct MovingFlow {
 
   /// The camera's motion as cfp estimates it from all pairs.
   [[nodiscard]] cfp::CameraMotion<double> estimate(const cfp::CameraMotionOptions& options,
-                                                   cfp::CameraMotionWorkspace<double>& workspace) const {
+                                                   cfp::CameraMotionWorkspace<double>& workspace,
+                                                   const cfp::PinholeCamera<double>& camera = flow_camera) const {
     const std::vector<char> outside(depths.size(), 1);
-    return cfp::estimate_camera_motion<double>({previous, current, depths}, outside, {}, flow_camera, options,
-                                               workspace);
+    return cfp::estimate_camera_motion<double>({previous, current, depths}, outside, {}, camera, options, workspace);
   }
   /// By how many pixels that motion moves what is at rest at 2 m, at most.
   [[nodiscard]] double error_px(const cfp::CameraMotion<double>& found) const {
@@ -76,6 +76,35 @@ inline MovingFlow make_moving_flow(const MovingFlowOptions& options, std::size_t
     flow.previous.push_back({p.x(), p.y()});
     flow.current.push_back({q.x(), q.y()});
     flow.depths.push_back(wrong ? random.uniform(0.8, 6) : z + depth_noise.sigma_m(z) * random.normal());
+  }
+  return flow;
+}
+
+/// Depths of a pair of cameras side by side, of which the disparity is measured.
+struct Stereo {
+  double focal_px = 700, baseline_m = 0.54, disparity_noise_px = 0.2;
+
+  [[nodiscard]] cfp::PinholeCamera<double> camera() const { return {focal_px, focal_px, 450, 140}; }
+  [[nodiscard]] cfp::DepthNoise depth_noise() const { return {0, disparity_noise_px / (focal_px * baseline_m), 0}; }
+};
+
+/// Points 5 to 60 m before a car that drives straight ahead; the flow has a noise of 0.15 px.
+inline MovingFlow make_stereo_flow(const Stereo& stereo, double step_m, std::size_t pairs, cfp::Random& random) {
+  const cfp::PinholeCamera<double> camera = stereo.camera();
+  const double disparity_m = stereo.focal_px * stereo.baseline_m;
+  MovingFlow flow;
+  flow.T_cur_prev.translation = {0, 0, -step_m};
+  while (flow.depths.size() < pairs) {
+    const cfp::Vector2<double> p{random.uniform(0, 900), random.uniform(0, 300)};
+    const double z = 5 + 55 * random.uniform() * random.uniform();
+    const double disparity = disparity_m / z + stereo.disparity_noise_px * random.normal();
+    cfp::Vector3<double> ray;
+    cfp::Vector2<double> q;
+    if (disparity < 0.5 || !camera.unproject(p, ray) || !camera.project(flow.T_cur_prev * (z * ray), q)) continue;
+    q += 0.15 * cfp::Vector2<double>{random.normal(), random.normal()};
+    flow.previous.push_back({p.x(), p.y()});
+    flow.current.push_back({q.x(), q.y()});
+    flow.depths.push_back(disparity_m / disparity);
   }
   return flow;
 }

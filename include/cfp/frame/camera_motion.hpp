@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "cfp/core/options.hpp"
@@ -105,11 +106,22 @@ struct PairsWithDepth {
     return flow_sigma(span<Scalar>(distances), 2, options);
   }
 
+  /// The noise of pair i under a motion: what is near is no lever, and where the camera moves the error of a depth
+  /// shows.
+  [[nodiscard]] Scalar sigma_of(std::size_t i, Scalar sigma_px, const SE3<Scalar>& T) const noexcept {
+    const Scalar z = workspace.points[i][2], of_pixel = sigma_px * (std::max)(Scalar(1), near_m / z);
+    MotionResidual<Scalar> pair;
+    if (T.translation.isZero(0) || !motion_residual(flow.previous[i], z, flow.current[i], T, camera, pair))
+      return of_pixel;
+    const Scalar sigma_z = static_cast<Scalar>(options.distance.depth_noise.sigma_m(static_cast<double>(z)));
+    return std::sqrt(of_pixel * of_pixel + sigma_z * sigma_z * pair.along.squaredNorm());
+  }
+
   /// refine_pose from T at a noise; T becomes the result, and the motion has the noise that is left.
   [[nodiscard]] CameraMotion<Scalar> refine(Scalar sigma_px, const PoseOptions& rounds, SE3<double>& T) const {
+    const SE3<Scalar> so_far = T.template cast<Scalar>();
     workspace.sigmas.clear();
-    for (const auto& point : workspace.points)
-      workspace.sigmas.push_back(sigma_px * (std::max)(Scalar(1), near_m / point[2]));
+    for (std::size_t i = 0; i < workspace.points.size(); ++i) workspace.sigmas.push_back(sigma_of(i, sigma_px, so_far));
     PoseObservations<Scalar> observations;
     observations.points = workspace.points;
     observations.pixels = flow.current;
@@ -164,8 +176,11 @@ inline namespace CFP_ISA {
 /// The motion of the camera from the pairs of the undistorted image that `outside` marks as on no object and whose
 /// depth is known and shared by neighbours. Unknown where too few pairs have such a depth or agree. O(pairs).
 ///  1. refine_pose from `start` at the largest noise; then the noise that the pairs show is measured.
-///  2. If that is at most search_above_px, or pnp_ransac finds nothing: refine_pose again, at the noise measured.
-///  3. Else from what pnp_ransac finds by the last round of `pose` alone, at a third of its scale, then at its own; the
+///  2. If that is at most search_above_px, or pnp_ransac finds nothing: refine_pose again, at the noise measured, a
+///  pair's
+///     with what the error of its depth adds under the motion so far.
+///  3. Else, or if too few agreed to the first, from what pnp_ransac finds by the last round of `pose` alone, at a
+///  third of its scale, then at its own; the
 ///     second counts unless the noise grows by more than chance.
 template <typename Scalar>
 [[nodiscard]] CameraMotion<Scalar> estimate_camera_motion(const FlowPairs<Scalar>& flow, span<const char> outside,
@@ -186,12 +201,12 @@ template <typename Scalar>
   const detail::PairsWithDepth<Scalar> pairs{flow, camera, options, workspace, taken, near_m};
   SE3<double> T = start;
   const CameraMotion<Scalar> first = pairs.refine(Scalar(options.max_sigma_px), options.pose, T);
-  if (!first.known) return first;
-  if (!(first.sigma_px > Scalar(options.search_above_px)) || !pairs.search(first.sigma_px, T))
-    return pairs.refine(first.sigma_px, options.pose, T);
+  const Scalar noise_px = first.known ? first.sigma_px : Scalar(options.max_sigma_px);
+  if (!(noise_px > Scalar(options.search_above_px)) || !pairs.search(noise_px, T))
+    return first.known ? pairs.refine(noise_px, options.pose, T) : first;
   // A wide loss would lose what was found again to what moves: a tight one first. The usual one errs less, and counts
   // unless the pairs agree to it less, by more than chance (cfp_camera_motion_study, cfp_object_motion_study).
-  const Scalar found_px = pairs.noise_under(T, first.sigma_px);
+  const Scalar found_px = pairs.noise_under(T, noise_px);
   const CameraMotion<Scalar> tight = pairs.refine(found_px, detail::last_round(options.pose, 1.0 / 3), T);
   if (!tight.known) return tight;
   const CameraMotion<Scalar> usual = pairs.refine(tight.sigma_px, detail::last_round(options.pose, 1), T);

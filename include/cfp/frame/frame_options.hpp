@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <optional>
 #include <vector>
 
 #include "cfp/clustering/depth_foreground_types.hpp"
@@ -21,6 +22,9 @@ namespace cfp {
 struct ObjectClass {
   int class_id = 0;
   bool non_rigid = true;  ///< people, animals: told from the background by depth; rigid: all inside is foreground
+  /// M of a new map point on it, in (0, 1); not set: MapPointOptions::foreground_prior, that of people. Most cars are
+  /// parked: 0.2.
+  std::optional<double> prior = {};
 };
 
 /// The search for what moves and no detector reports, or a box holds in part, under WeightRule::posterior. A keypoint
@@ -131,6 +135,9 @@ inline namespace CFP_ISA {
 
 [[nodiscard]] inline OptionPath invalid_field(const FrameOptions& o) noexcept {
   if (o.use_boxes && o.classes.empty()) return "classes";
+  for (const ObjectClass& c : o.classes) {
+    if (c.prior && !detail::inside_unit_interval(*c.prior)) return nested("classes", OptionPath("prior"));
+  }
   if (!detail::inside_unit_interval(o.object_threshold)) return "object_threshold";
   if (!(o.min_creation_probability >= 0 && o.min_creation_probability <= 1)) return "min_creation_probability";
   if (!(o.min_inlier_weight >= 0 && o.min_inlier_weight < 1)) return "min_inlier_weight";
@@ -139,6 +146,14 @@ inline namespace CFP_ISA {
   if (const OptionPath field = nested("fine", invalid_field(o.fine))) return field;
   if (const OptionPath field = nested("map_point", invalid_field(o.map_point))) return field;
   return nested("health", invalid_field(o.health));
+}
+
+/// What is known of a class of the detector; null: its objects cannot move.
+[[nodiscard]] inline const ObjectClass* find_class(int class_id, const FrameOptions& options) noexcept {
+  for (const ObjectClass& c : options.classes) {
+    if (c.class_id == class_id) return &c;
+  }
+  return nullptr;
 }
 
 /// Whether keypoints in no box are judged by the flow, too.

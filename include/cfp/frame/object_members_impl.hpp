@@ -3,8 +3,6 @@
 /// label_keypoints.hpp, not an interface.
 #pragma once
 
-#include <algorithm>
-
 #include "cfp/clustering/depth_foreground.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
@@ -15,9 +13,8 @@ inline namespace CFP_ISA {
 /// Whether depth tells where an object stands, and what in its box or mask is farther.
 template <typename Scalar>
 [[nodiscard]] bool is_told_by_depth(const TrackedBox<Scalar>& box, const FrameOptions& options) noexcept {
-  return options.coarse.use_depth_foreground &&
-         std::any_of(options.classes.begin(), options.classes.end(),
-                     [&](const ObjectClass& c) { return c.class_id == box.class_id && c.non_rigid; });
+  const ObjectClass* const known = find_class(box.class_id, options);
+  return options.coarse.use_depth_foreground && known != nullptr && known->non_rigid;
 }
 
 /// How the members of an object were found, and what depth says of them.

@@ -35,10 +35,7 @@ void track_boxes(const Frame<Scalar>& frame, const FrameOptions& options, BoxTra
   report.skipped_detections = tracked.skipped;
   const bool blind = ran && frame.detections->size() == tracked.skipped;
   if (ran) report.frames_without_detections = blind ? report.frames_without_detections + 1 : 0;
-  const auto is_other = [&](const auto& object) {
-    return std::none_of(options.classes.begin(), options.classes.end(),
-                        [&](const ObjectClass& c) { return c.class_id == object.class_id; });
-  };
+  const auto is_other = [&](const auto& object) { return find_class(object.class_id, options) == nullptr; };
   if (ran)
     report.other_detections =
         static_cast<std::size_t>(std::count_if(frame.detections->begin(), frame.detections->end(), is_other));

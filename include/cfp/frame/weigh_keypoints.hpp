@@ -64,7 +64,11 @@ template <typename Scalar>
   const bool on_object = is_on_object(i, state);
   if (o.weight != WeightRule::posterior || (state.box[i] == no_box && !on_object)) return Scalar(1);
   const Scalar e = (std::max)(first_stage_evidence(i, options, state), Scalar(0.5));
-  return posterior_probability(Scalar(0.5), e, Scalar(on_object ? o.foreground_prior : o.background_prior), o);
+  const ObjectClass* const known =
+      state.box[i] == no_box ? nullptr
+                             : find_class(state.boxes[static_cast<std::size_t>(state.box[i])].class_id, options);
+  const double foreground = known != nullptr ? known->prior.value_or(o.foreground_prior) : o.foreground_prior;
+  return posterior_probability(Scalar(0.5), e, Scalar(on_object ? foreground : o.background_prior), o);
 }
 
 /// The weight by Bayes' rule, before any fallback. Outside all boxes it is M. In one, and for what is_unreported, E can

@@ -6,9 +6,9 @@
 
 namespace cfp {
 
-/// One standard deviation of a depth measurement, in metres: constant + quadratic (z - nearest)^2. Distances know it;
-/// the camera's motion is estimated from depths as if they were exact, which is too sure of itself from some 0.05 z^2
-/// on.
+/// One standard deviation of a depth measurement, in metres: constant + quadratic (z - nearest)^2. The bias of stereo,
+/// whose depth is one over a disparity, is not in it: the camera's motion from such depths is too sure of itself where
+/// the disparities' noise is a third of most of them or more (cfp_camera_motion_study).
 struct DepthNoise {
   double constant_m = 0.0012;  ///< >= 0
   double quadratic = 0.0019;   ///< 1/m, >= 0; for stereo: constant_m 0, nearest_m 0, quadratic = sigma_disparity_px /
