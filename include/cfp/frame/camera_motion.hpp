@@ -176,12 +176,10 @@ inline namespace CFP_ISA {
 /// The motion of the camera from the pairs of the undistorted image that `outside` marks as on no object and whose
 /// depth is known and shared by neighbours. Unknown where too few pairs have such a depth or agree. O(pairs).
 ///  1. refine_pose from `start` at the largest noise; then the noise that the pairs show is measured.
-///  2. If that is at most search_above_px, or pnp_ransac finds nothing: refine_pose again, at the noise measured, a
-///  pair's
-///     with what the error of its depth adds under the motion so far.
-///  3. Else, or if too few agreed to the first, from what pnp_ransac finds by the last round of `pose` alone, at a
-///  third of its scale, then at its own; the
-///     second counts unless the noise grows by more than chance.
+///  2. If that is at most search_above_px, or pnp_ransac finds nothing: refine_pose again, at the noise measured and
+///     what the errors of the depths add to it under the motion so far.
+///  3. Else, and where too few agreed to the first, from what pnp_ransac finds by the last round of `pose` alone, at a
+///     third of its scale, then at its own; the second counts unless the noise grows by more than chance.
 template <typename Scalar>
 [[nodiscard]] CameraMotion<Scalar> estimate_camera_motion(const FlowPairs<Scalar>& flow, span<const char> outside,
                                                           const SE3<double>& start, const PinholeCamera<Scalar>& camera,

@@ -8,7 +8,7 @@ namespace cfp {
 
 /// One standard deviation of a depth measurement, in metres: constant + quadratic (z - nearest)^2. The bias of stereo,
 /// whose depth is one over a disparity, is not in it: the camera's motion from such depths is too sure of itself where
-/// the disparities' noise is a third of most of them or more (cfp_camera_motion_study).
+/// most disparities are below ten times their noise (cfp_camera_motion_study).
 struct DepthNoise {
   double constant_m = 0.0012;  ///< >= 0
   double quadratic = 0.0019;   ///< 1/m, >= 0; for stereo: constant_m 0, nearest_m 0, quadratic = sigma_disparity_px /
