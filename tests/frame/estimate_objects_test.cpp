@@ -578,6 +578,39 @@ TEST_CASE("Who walks along the camera's path is told by the depths of keypoints,
   CHECK(called_static(cfp_test::by_flow_alone()) > 15);
 }
 
+TEST_CASE("Pairs that are mistracked all over the image make nobody move", "[frame]") {
+  for (const double person_motion_m : {0.0, 0.06}) {
+    cfp_test::DynamicSceneOptions scene_options;
+    scene_options.person_motion_m = person_motion_m;
+    scene_options.pixel_noise_px = 0.2;
+    int as_found = 0, all_counted = 0, objects = 0;
+    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+      DynamicScene<double> scene = make_dynamic_scene<double>(scene_options, seed);
+      cfp::Random random(seed, "mistracked");
+      for (auto& pixel : scene.keypoints) {
+        if (random.uniform() > 0.3) continue;
+        pixel[0] += 15 * random.normal();
+        pixel[1] += 15 * random.normal();
+      }
+      const auto called_static = [&](double max_stray_share) {
+        cfp::FrameOptions options;
+        options.coarse.object.max_stray_share = max_stray_share;
+        FrameRun<double> run(scene);
+        run.coarse(options);
+        int count = 0;
+        for (const cfp::ObjectProbability& o : run.state.objects)
+          count += o.static_probability > options.object_threshold ? 1 : 0;
+        return count;
+      };
+      as_found += called_static(0.4);
+      all_counted += called_static(0);
+      objects += static_cast<int>(scene.boxes.size());
+    }
+    CHECK(as_found == (person_motion_m > 0 ? 0 : objects));
+    CHECK(4 * all_counted < objects);
+  }
+}
+
 TEST_CASE("A person who fills the view of a camera without depths is unknown, not at rest", "[frame]") {
   cfp_test::DynamicSceneOptions crowded;
   crowded.people = 1;

@@ -77,6 +77,7 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
                        &flow.ransac.threshold_px,
                        &object.sigma_px,
                        &object.noise_factor,
+                       &object.max_stray_share,
                        &object.shift_pairs,
                        &object.unknown_object_probability,
                        &fine.min_pose_inliers,

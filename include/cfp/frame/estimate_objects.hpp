@@ -77,13 +77,31 @@ template <typename Scalar>
   return outside_boxes >= options.min_outside_pairs ? FlowSupport::outside_pairs : FlowSupport::background_pairs;
 }
 
+/// The options with the positions that ObjectProbabilityOptions::max_stray_share makes of them; few pairs on no object
+/// tell nothing.
+template <typename Scalar>
+[[nodiscard]] ObjectProbabilityOptions beyond_strays(ObjectProbabilityOptions scored, std::size_t min_outside_pairs,
+                                                     const FrameState<Scalar>& state) noexcept {
+  std::size_t all = 0, stray = 0;
+  for (std::size_t i = 0; i < state.flow_distances.size() && scored.max_stray_share > 0; ++i) {
+    if (state.scratch.outside[i] == 0 || !has_distance(state.flow_distances[i])) continue;
+    ++all;
+    stray += object_score(state.flow_distances[i], scored) < Scalar(0.5) ? 1U : 0U;
+  }
+  if (all < min_outside_pairs) return scored;
+  const double share = (std::min)(static_cast<double>(stray) / static_cast<double>(all), scored.max_stray_share);
+  for (double& position : scored.positions) position += share * (1 - position);
+  return scored;
+}
+
 /// Sets O of every box from the distances of the pairs on its object and, where depths are known, from what they share.
 template <typename Scalar>
 void score_objects(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow, const PinholeCamera<Scalar>& camera,
                    const CoarseOptions& coarse, FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
   const std::size_t n = flow.current.size();
-  const ObjectProbabilityOptions scored = scaled_to_flow(coarse.object, state.report);
+  const ObjectProbabilityOptions scored =
+      beyond_strays(scaled_to_flow(coarse.object, state.report), coarse.flow.min_outside_pairs, state);
   scratch.values.resize(n);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     // What lies behind an object says nothing of it, and a pair on its silhouette may have either depth.

@@ -40,6 +40,10 @@ struct ObjectProbabilityOptions {
   /// The paper's are 0.1, 0.2, 0.3; a seventh of wrong depths or mismatches is then taken for motion
   /// (benchmarks/studies/object_motion_study).
   std::array<double, 3> positions = {0.2, 0.3, 0.4};
+  /// Mistracked pairs and wrong depths are no motion: the positions are those among the pairs that are left without as
+  /// large a share as scores below 1/2 of the pairs on no object, at most this, in [0, 1). 0: none is passed over, as
+  /// printed (cfp_object_motion_study).
+  double max_stray_share = 0.4;
   /// Where depths are known, what the pairs share is judged, too (common_shift): they count as so many independent ones
   /// at most, lest errors that neighbours share look like motion; >= 0. 0: the pairs are judged one by one.
   double shift_pairs = 15;
@@ -74,6 +78,7 @@ inline namespace CFP_ISA {
   if (!is_degrees_of_freedom(o.degrees_of_freedom)) return "degrees_of_freedom";
   if (!detail::positive(o.sigma_px)) return "sigma_px";
   if (!detail::non_negative(o.noise_factor)) return "noise_factor";
+  if (!(o.max_stray_share >= 0 && o.max_stray_share < 1)) return "max_stray_share";
   if (!detail::non_negative(o.shift_pairs)) return "shift_pairs";
   if (!(o.positions[0] > 0 && o.positions[0] <= o.positions[1] && o.positions[1] <= o.positions[2] &&
         o.positions[2] <= 1))
