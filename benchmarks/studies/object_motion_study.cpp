@@ -3,7 +3,7 @@
 // of scoring: AUC; moving people missed at 5 % false alarms, over all and in the worst cell from 0.5 m/s on; static
 // people called moving (O <= O_Th) at each noise; share of the frames in which O is known.
 // "pairs one by one" leaves out what they share, "shared, 5 pairs" and "60 pairs" are other ObjectProbabilityOptions::
-// shift_pairs.
+// shift_pairs, "strays counted" has a max_stray_share of 0.
 // Then the same in a bare room, whose motion says little of a person who is near; "motion taken as exact" leaves its
 // covariance out; "a host's motion" is the true one with errors of 3 mm and 1 mrad, and these as its sigmas, a "wrong"
 // one errs by five times as much as it says. Then with
@@ -209,7 +209,7 @@ struct Way {
 constexpr double host_error_m = 0.003, host_error_rad = 0.001;
 
 std::vector<Way> ways() {
-  std::vector<Way> all(14);
+  std::vector<Way> all(15);
   all[0].name = "as printed";
   all[1].name = "without depths";
   all[2].name = "depth";
@@ -224,10 +224,12 @@ std::vector<Way> ways() {
   all[11].name = "depth, shared, 5 pairs";
   all[12].name = "depth, shared, 60 pairs";
   all[13].name = "depth, a host's wrong motion";
+  all[14].name = "depth, strays counted";
   all[0].options.coarse.flow.use_motion_up_to_scale = false;
   all[0].options.coarse.flow.use_depth = all[1].options.coarse.flow.use_depth = false;
   all[0].options.coarse.object.noise_factor = all[4].options.coarse.object.noise_factor = 0;
   all[0].options.coarse.object.positions = all[3].options.coarse.object.positions = {0.1, 0.2, 0.3};
+  all[0].options.coarse.object.max_stray_share = all[14].options.coarse.object.max_stray_share = 0;
   all[5].options.coarse.use_depth_foreground = false;
   all[6].depth_of_every = 2;
   all[7].given = Given::pairs_as_exact;
