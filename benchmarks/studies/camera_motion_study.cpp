@@ -6,7 +6,7 @@
 // after the search: without it (before 6175e3c) 16 and 41 % were misled by a region of 20 % and a rigid one of 33 % at
 // 0.4 px, with it 6 and 23 % (300 frames). Then with the depths of stereo before a car that drives ahead: frames in
 // which the motion is known, and its error ahead, root mean square, in its own sigmas. Taking depths for exact (before
-// 0.1's 8000614) that was 11 in 64 % of the frames at 420 px, 0.1 m and 0.2 px, and 4.7 at 700 px, 0.54 m and 1 px.
+// 8000614) that was 11 in 64 % of the frames at 420 px, 0.1 m and 0.2 px, and 4.7 at 700 px, 0.54 m and 1 px.
 // Usage: cfp_camera_motion_study [frames | --smoke]
 #include <algorithm>
 #include <array>
