@@ -3,7 +3,6 @@
 // body gives Ad(T_cam_body) xi of its camera (uncertain_motion.hpp).
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <iterator>

@@ -1,8 +1,8 @@
 // cfp in the shape of OpenVINS: the same filter without and with cfp on the same simulated tracks of one camera that
 // moves through a room in which people walk. The glue is cfp_glue.hpp; the host's lines for cfp are marked.
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <map>
 #include <vector>
 
@@ -54,7 +54,7 @@ class Tracks {
     result.sigma_m = 0.002;
     result.sigma_rad = 0.001;
     const auto error = [&](double sigma) {
-      return Eigen::Vector3d(sigma * random_.normal(), sigma * random_.normal(), sigma * random_.normal());
+      return Eigen::Vector3d{sigma * random_.normal(), sigma * random_.normal(), sigma * random_.normal()};
     };
     result.R = cfp::so3_exp(error(result.sigma_rad)) * T.topLeftCorner<3, 3>();
     result.t = T.topRightCorner<3, 1>() + error(result.sigma_m);

@@ -10,6 +10,7 @@
 
 #include "../room.hpp"
 #include "cfp/core/random.hpp"
+#include "cfp/geometry/depth_noise.hpp"
 #include "host.hpp"
 
 class Simulation {
@@ -41,7 +42,7 @@ class Simulation {
       KeyPoint keypoint;
       keypoint.pt = {now[i].x() + mRoom.noise(0.5F), now[i].y() + mRoom.noise(0.5F)};
       frame.mvKeysUn.push_back(keypoint);
-      const float z = now[i].z(), sigma = 0.0012F + 0.0019F * (z - 0.4F) * (z - 0.4F);
+      const float z = now[i].z(), sigma = static_cast<float>(cfp::DepthNoise().sigma_m(static_cast<double>(z)));
       frame.mvDepth.push_back(mRoom.uniform(0, 1) < 0.1F ? -1.0F : z + mRoom.noise(sigma));
       Descriptor descriptor = mDescriptors[i];
       for (int bit = 0; bit < 20; ++bit) descriptor[mRandom.index(32)] ^= std::uint8_t(1U << mRandom.index(8));

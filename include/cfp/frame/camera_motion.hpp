@@ -111,10 +111,10 @@ struct PairsWithDepth {
   [[nodiscard]] Scalar sigma_of(std::size_t i, Scalar sigma_px, const SE3<Scalar>& T) const noexcept {
     const Scalar z = workspace.points[i][2], of_pixel = sigma_px * (std::max)(Scalar(1), near_m / z);
     MotionResidual<Scalar> pair;
-    if (T.translation.isZero(0) || !motion_residual(flow.previous[i], z, flow.current[i], T, camera, pair))
+    if (T.translation.isZero(0) || !expected_residual<PinholeCamera<Scalar>, Scalar>(
+                                       flow.previous[i], z, flow.current[i], T, camera, options.distance, pair))
       return of_pixel;
-    const Scalar sigma_z = static_cast<Scalar>(options.distance.depth_noise.sigma_m(static_cast<double>(z)));
-    return std::sqrt(of_pixel * of_pixel + sigma_z * sigma_z * pair.along.squaredNorm());
+    return std::sqrt(of_pixel * of_pixel + pair.sigma_z * pair.sigma_z * pair.along.squaredNorm());
   }
 
   /// refine_pose from T at a noise; T becomes the result, and the motion has the noise that is left.

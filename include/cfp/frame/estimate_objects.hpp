@@ -39,7 +39,7 @@ void label_margin(const Box<Scalar>& box, const ForegroundResult& separated, con
 template <typename Scalar>
 void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
-  const FlowPairs<Scalar> flow{frame.flow.previous, frame.flow.current, state.flow_depths};
+  const FlowPairs<Scalar> flow = flow_with_depths(frame, state);
   const std::size_t n = flow.current.size();
   scratch.pair_label.assign(state.boxes.size() * n, PairLabel::outside);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
@@ -83,7 +83,7 @@ template <typename Scalar>
 [[nodiscard]] ObjectProbabilityOptions beyond_strays(ObjectProbabilityOptions scored, std::size_t min_outside_pairs,
                                                      const FrameState<Scalar>& state) noexcept {
   std::size_t all = 0, stray = 0;
-  for (std::size_t i = 0; i < state.flow_distances.size() && scored.max_stray_share > 0; ++i) {
+  for (std::size_t i = 0; i < state.flow_distances.size(); ++i) {
     if (state.scratch.outside[i] == 0 || !has_distance(state.flow_distances[i])) continue;
     ++all;
     stray += object_score(state.flow_distances[i], scored) < Scalar(0.5) ? 1U : 0U;

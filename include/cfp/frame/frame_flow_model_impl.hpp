@@ -39,6 +39,12 @@ void find_flow_depths(const Frame<Scalar>& frame, const CoarseOptions& coarse, F
   }
 }
 
+/// The flow of a frame with the depths that are known of it; after find_flow_depths.
+template <typename Scalar>
+[[nodiscard]] FlowPairs<Scalar> flow_with_depths(const Frame<Scalar>& frame, const FrameState<Scalar>& state) noexcept {
+  return {frame.flow.previous, frame.flow.current, state.flow_depths};
+}
+
 /// The motion of the flow's depths joined with what the frame before lets expect if the two agree, for a camera that is
 /// pushed keeps no velocity.
 template <typename Scalar>

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cfp/frame/estimate_objects.hpp"
+#include "cfp/frame/frame_flow_model_impl.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
 #include "cfp/frame/object_members_impl.hpp"
@@ -144,8 +145,7 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
   }
   report.stray_labels = detail::stray_labels(frame, state);
   detail::score_flow_at_keypoints(frame, options, state);
-  detail::score_flow_outside(FlowPairs<Scalar>{frame.flow.previous, frame.flow.current, state.flow_depths}, options,
-                             state);
+  detail::score_flow_outside(detail::flow_with_depths(frame, state), options, state);
   detail::count_labels(state.label, report);
 }
 

@@ -55,6 +55,16 @@ template <typename Scalar>
                                                   is_placed(i, options, state)));
 }
 
+/// M of a new map point on the object of keypoint i: its class's, or that of any object.
+template <typename Scalar>
+[[nodiscard]] double foreground_prior(std::size_t i, const FrameOptions& options,
+                                      const FrameState<Scalar>& state) noexcept {
+  const double of_any = options.map_point.foreground_prior;
+  if (state.box[i] == no_box) return of_any;
+  const auto* const known = find_class(state.boxes[static_cast<std::size_t>(state.box[i])].class_id, options);
+  return known != nullptr ? known->prior.value_or(of_any) : of_any;
+}
+
 /// M of a map point of which nothing is known when keypoint i observes it: 1 outside all boxes where nothing moves and
 /// by the printed rules, else the prior of its label, which what is shown static raises.
 template <typename Scalar>
@@ -64,11 +74,8 @@ template <typename Scalar>
   const bool on_object = is_on_object(i, state);
   if (o.weight != WeightRule::posterior || (state.box[i] == no_box && !on_object)) return Scalar(1);
   const Scalar e = (std::max)(first_stage_evidence(i, options, state), Scalar(0.5));
-  const ObjectClass* const known =
-      state.box[i] == no_box ? nullptr
-                             : find_class(state.boxes[static_cast<std::size_t>(state.box[i])].class_id, options);
-  const double foreground = known != nullptr ? known->prior.value_or(o.foreground_prior) : o.foreground_prior;
-  return posterior_probability(Scalar(0.5), e, Scalar(on_object ? foreground : o.background_prior), o);
+  const double prior = on_object ? foreground_prior(i, options, state) : o.background_prior;
+  return posterior_probability(Scalar(0.5), e, Scalar(prior), o);
 }
 
 /// The weight by Bayes' rule, before any fallback. Outside all boxes it is M. In one, and for what is_unreported, E can
