@@ -58,8 +58,7 @@ class StaticTracks {
     std::unordered_map<std::size_t, Known> known;
     for (std::size_t i = 0; i < ids_.size(); ++i) {
       const float weight = probability_.weight(i, m_[i]);
-      const bool begins = m_[i] < 0 && probability_.may_create_map_point(i);
-      const float m = begins ? probability_.static_probability(i, -1.0F) : probability_.updated_map_point(i, m_[i]);
+      const float m = m_[i] < 0 ? probability_.static_probability(i, -1.0F) : probability_.updated_map_point(i, m_[i]);
       known[ids_[i]] = {m, weight};
     }
     known_.swap(known);
