@@ -95,11 +95,22 @@ template <typename Scalar>
   return {first, (std::max)(first, (std::min)(end, up_to(front + o.behind_m)))};
 }
 
+// The reaches of the window as depths see them whose noise has this standard deviation.
+[[nodiscard]] inline ForegroundOptions seen_through(double sigma_m, ForegroundOptions o) noexcept {
+  if (!is_finite(sigma_m)) return o;
+  for (double* const reach_m :
+       {&o.obstacle_m, &o.before_m, &o.behind_m, &o.first_gap_m, &o.last_gap_m, &o.short_m, &o.half_body_m})
+    *reach_m = std::hypot(*reach_m, 3 * sigma_m);
+  return o;
+}
+
 template <typename Scalar>
 [[nodiscard]] DepthRange person_range(const ForegroundInput<Scalar>& in, const SortedValues<Scalar>& sorted,
-                                      const ForegroundOptions& o, std::vector<double>& odds) {
+                                      const ForegroundOptions& options, std::vector<double>& odds) {
   const span<const Scalar> depths = sorted.values;
-  const std::size_t n = depths.size(), near = position_of_share(o.near_share, n);
+  const std::size_t n = depths.size(), near = position_of_share(options.near_share, n);
+  const double front = static_cast<double>(depths[near]);
+  const ForegroundOptions o = seen_through(in.depth_noise.sigma_m(front), options);
   sum_place_odds(in.pixels, in.box, sorted.index, odds);
   DepthRange best{0, n};
   double most = -1e300;
@@ -112,7 +123,6 @@ template <typename Scalar>
       while (range.last > range.first && static_cast<double>(depths[range.last - 1]) > front + o.short_m) --range.last;
     }
   };
-  const double front = static_cast<double>(depths[near]);
   if (is_valid_depth(in.previous_depth_m))
     offer(static_cast<double>(in.previous_depth_m) - o.half_body_m, o.before_m, near, 0.1);
   offer(front, front, 0, 0.05);

@@ -8,6 +8,7 @@
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/geometry/box.hpp"
+#include "cfp/geometry/depth_noise.hpp"
 
 namespace cfp {
 
@@ -18,6 +19,7 @@ struct ForegroundInput {
   PointSpan<Scalar, 2> pixels;  ///< one per depth, px, finite; empty: unknown. Of use only with `box`.
   Box<Scalar> box;              ///< px; improper: unknown
   Scalar previous_depth_m{};    ///< `depth_m` of the same object's result in the frame before; not positive: unknown
+  DepthNoise depth_noise{0, 0, 0};  ///< of the depths, where it reaches decimetres; the window becomes as much wider
 };
 
 enum class ForegroundRule : std::uint8_t {

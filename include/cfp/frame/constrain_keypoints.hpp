@@ -80,6 +80,15 @@ template <typename Scalar>
   return {static_probability(model, distance_px), confidence, fitted && distance_px >= Scalar(0)};
 }
 
+/// K of a point in the image of which a walker at its depth goes way_px: where that is below D_Th, to see no motion is
+/// the weaker a sign of rest.
+template <typename Scalar>
+[[nodiscard]] Scalar seen_at_rest(Scalar k, Scalar way_px, Scalar threshold_px) noexcept {
+  const Scalar half(0.5);
+  if (!(k > half) || !(way_px < threshold_px)) return k;
+  return half + (k - half) * (way_px / threshold_px) * (way_px / threshold_px);
+}
+
 }  // namespace CFP_ISA
 }  // namespace detail
 
@@ -126,6 +135,9 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
   state.evidence.resize(n);
   const bool posterior = options.map_point.weight == WeightRule::posterior;
   const Scalar threshold = static_cast<Scalar>(options.object_threshold);
+  const Scalar seen_px = projection.status != Status::not_enough_data ? projection.threshold_px : epipolar.threshold_px;
+  const Scalar way_px_m = undistorted_camera(camera).fx *
+                          static_cast<Scalar>(options.fine.least_speed_m_s * detail::elapsed_s(state));
   for (std::size_t i = 0; i < n; ++i) {
     if (state.box[i] == no_box) continue;
     const std::size_t b = static_cast<std::size_t>(state.box[i]);
@@ -138,8 +150,10 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
     keypoint.foreground = state.label[i] == KeypointLabel::foreground;
     keypoint.matched = is_finite(scratch.points[i][0]) && is_finite(scratch.points[i][1]);
     keypoint.box_associated = state.boxes[b].associated;
-    state.static_probability[i] =
-        posterior ? second_stage_evidence(keypoint, threshold) : second_stage_probability(keypoint, threshold);
+    Scalar& k = state.static_probability[i];
+    k = posterior ? second_stage_evidence(keypoint, threshold) : second_stage_probability(keypoint, threshold);
+    if (posterior && way_px_m > Scalar(0) && is_valid_depth(scratch.depths[i]))
+      k = detail::seen_at_rest(k, way_px_m / scratch.depths[i], seen_px);
     ++state.report.constrained;
   }
 }

@@ -75,6 +75,10 @@ struct FineOptions {
   double min_pose_inliers = 10;  ///< Th_BA: least inliers a pose may rest on (ORB-SLAM2's 10), >= 0
   /// t_Th in metres: |t| at or below it skips the epipolar constraint, >= 0. No source in the paper.
   double min_translation_m = 0.005;
+  /// WeightRule::posterior: how slow those may be who count as moving. Where depths tell that somebody of this speed
+  /// goes less than D_Th from one image to the next, K says as much less that a keypoint is at rest: far away and at
+  /// high frame rates who walks looks as who stands. m/s, >= 0; 0: K is as printed.
+  double least_speed_m_s = 0.5;
   ConstraintOptions constraint;     ///< of the projection and of the epipolar lines alike
   DescriptorMatchOptions matching;  ///< of the keypoints in boxes that the host left unmatched
 };
@@ -129,6 +133,7 @@ inline namespace CFP_ISA {
 [[nodiscard]] inline OptionPath invalid_field(const FineOptions& o) noexcept {
   if (!detail::non_negative(o.min_pose_inliers)) return "min_pose_inliers";
   if (!detail::non_negative(o.min_translation_m)) return "min_translation_m";
+  if (!detail::non_negative(o.least_speed_m_s)) return "least_speed_m_s";
   if (const OptionPath field = nested("constraint", invalid_field(o.constraint))) return field;
   return nested("matching", invalid_field(o.matching));
 }

@@ -49,6 +49,7 @@ ObjectMembers find_members(const TrackedBox<Scalar>& box, const PointSpan<Scalar
     scratch.points.push_back({pixels(i, 0), pixels(i, 1)});
   }
   ForegroundInput<Scalar> in{scratch.depths, scratch.points, box.box};
+  in.depth_noise = options.coarse.flow.motion.distance.depth_noise;
   if (state.previous.known) in.previous_depth_m = object_depth(state.previous, box.id);
   return {by_mask, depth_foreground(in, options.coarse.foreground, scratch.foreground, scratch.mask)};
 }
