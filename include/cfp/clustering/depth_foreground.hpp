@@ -109,8 +109,8 @@ template <typename Scalar>
                                       const ForegroundOptions& options, std::vector<double>& odds) {
   const span<const Scalar> depths = sorted.values;
   const std::size_t n = depths.size(), near = position_of_share(options.near_share, n);
-  const double front = static_cast<double>(depths[near]);
-  const ForegroundOptions o = seen_through(in.depth_noise.sigma_m(front), options);
+  const double nearest = static_cast<double>(depths[near]);
+  const ForegroundOptions o = seen_through(in.depth_noise.sigma_m(nearest), options);
   sum_place_odds(in.pixels, in.box, sorted.index, odds);
   DepthRange best{0, n};
   double most = -1e300;
@@ -125,9 +125,9 @@ template <typename Scalar>
   };
   if (is_valid_depth(in.previous_depth_m))
     offer(static_cast<double>(in.previous_depth_m) - o.half_body_m, o.before_m, near, 0.1);
-  offer(front, front, 0, 0.05);
+  offer(nearest, nearest, 0, 0.05);
   const double upper = front_of_upper_half(in.pixels, in.box, sorted, o.upper_share);
-  if (upper > front + o.obstacle_m) offer(upper, o.before_m, 0, 0);
+  if (upper > nearest + o.obstacle_m) offer(upper, o.before_m, 0, 0);
   return best;
 }
 
