@@ -75,13 +75,18 @@ enum class Kind {
   shift,          // a picture moved by whole pixels
   broad_rest_20,  // what moves is 400 x 240 px: somebody close, or several side by side
   broad_turn_20,
-  plane_ahead,  // which the camera comes near to, 0.8 m away
+  plane_ahead,    // which the camera comes near to, 0.8 m away
+  crossing_rest,  // a tenth of the pairs on two people who walk past each other
+  crossing_turn,
+  whole_pixels,  // a rotation by 0.3 degrees, seen by a detector that gives whole pixels
+  corner,        // volume, seen in 128 x 96 px; mismatches end anywhere
   count
 };
-const char* const names[] = {"volume",    "few (20)",    "plane + 20",  "volume + walker", "plane",     "rotation",
-                             "rest",      "rest, 10%",   "rest, 20%",   "rest, 30%",       "turn, 10%", "turn, 20%",
-                             "turn, 30%", "one line",    "two lines",   "one pixel",       "copies",    "random",
-                             "shift",     "rest, broad", "turn, broad", "plane, ahead"};
+const char* const names[] = {
+    "volume",       "few (20)",       "plane + 20",     "volume + walker", "plane",     "rotation",    "rest",
+    "rest, 10%",    "rest, 20%",      "rest, 30%",      "turn, 10%",       "turn, 20%", "turn, 30%",   "one line",
+    "two lines",    "one pixel",      "copies",         "random",          "shift",     "rest, broad", "turn, broad",
+    "plane, ahead", "rest, crossing", "turn, crossing", "whole pixels",    "corner"};
 
 struct Problem {
   std::vector<Pixel> previous, current, exact_previous, exact_current;  // `exact`: 200 points of the static space
@@ -101,6 +106,8 @@ double walker_share(Kind kind) {
   switch (kind) {
     case Kind::walker_rest_10:
     case Kind::walker_turn_10:
+    case Kind::crossing_rest:
+    case Kind::crossing_turn:
       return 0.1;
     case Kind::walker_rest_20:
     case Kind::walker_turn_20:
@@ -118,11 +125,11 @@ double walker_share(Kind kind) {
 
 bool rests(Kind k) {
   return k == Kind::rest || k == Kind::walker_rest_10 || k == Kind::walker_rest_20 || k == Kind::walker_rest_30 ||
-         k == Kind::broad_rest_20;
+         k == Kind::broad_rest_20 || k == Kind::crossing_rest;
 }
 bool turns(Kind k) {
   return k == Kind::rotation || k == Kind::walker_turn_10 || k == Kind::walker_turn_20 || k == Kind::walker_turn_30 ||
-         k == Kind::broad_turn_20;
+         k == Kind::broad_turn_20 || k == Kind::crossing_turn || k == Kind::whole_pixels;
 }
 bool is_plane(Kind k) { return k == Kind::plane || k == Kind::plane_ahead; }
 
@@ -130,7 +137,9 @@ Problem make_problem(Kind kind, double noise, double outliers, double base_m, bo
                      cfp::Random& random) {
   Problem problem;
   cfp::SE3<double> motion;
-  if (!rests(kind)) motion.rotation = cfp::so3_exp<double>(0.035 * cfp_test::random_direction(random));
+  if (!rests(kind))
+    motion.rotation =
+        cfp::so3_exp<double>((kind == Kind::whole_pixels ? 0.005 : 0.035) * cfp_test::random_direction(random));
   if (!rests(kind) && !turns(kind)) motion.translation = base_m * cfp_test::random_direction(random);
   if (kind == Kind::plane_ahead) motion.translation = base_m * Vector3<double>(0.05, 0.03, -1);
   const double plane_m = kind == Kind::plane_ahead ? 0.4 : 1.2;
@@ -139,8 +148,15 @@ Problem make_problem(Kind kind, double noise, double outliers, double base_m, bo
   const bool broad = kind == Kind::broad_rest_20 || kind == Kind::broad_turn_20;
   const double walker_x = random.uniform(0, broad ? 240 : 500), shift_x = random.uniform(3, 9),
                shift_y = random.uniform(-5, 5);
+  const bool crossing = kind == Kind::crossing_rest || kind == Kind::crossing_turn;
+  const double other_x = crossing ? random.uniform(0, 500) : 0;
   const cfp::Box<double> walker_region = broad ? cfp::Box<double>{walker_x, 230, walker_x + 400, 470}
                                                : cfp::Box<double>{walker_x, 60, walker_x + 130, 440};
+  const double corner_x = kind == Kind::corner ? random.uniform(0, 640 - 128) : 0,
+               corner_y = kind == Kind::corner ? random.uniform(0, 480 - 96) : 0;
+  const cfp::Box<double> seen = kind == Kind::corner
+                                    ? cfp::Box<double>{corner_x, corner_y, corner_x + 128, corner_y + 96}
+                                    : cfp::Box<double>{0, 0, 640, 480};
   Vector3<double> line_point[2], line_direction[2];
   for (int k = 0; k < 2; ++k) {
     line_point[k] = Vector3<double>(random.uniform(-0.8, 0.8), random.uniform(-0.5, 0.5), random.uniform(2, 4));
@@ -162,7 +178,9 @@ Problem make_problem(Kind kind, double noise, double outliers, double base_m, bo
       continue;
     }
     const bool walker = i < walkers;
-    const cfp::Box<double> region = walker ? walker_region : cfp::Box<double>{0, 0, 640, 480};
+    const bool other = crossing && walker && i % 2 == 1;
+    cfp::Box<double> region = walker ? walker_region : seen;
+    if (other) region.x1 = other_x, region.x2 = other_x + 130;
     Vector2<double> u(random.uniform(region.x1, region.x2), random.uniform(region.y1, region.y2)), v = u;
     Vector3<double> ray;
     (void)camera.unproject(u, ray);
@@ -173,7 +191,7 @@ Problem make_problem(Kind kind, double noise, double outliers, double base_m, bo
       point = line_point[k] + random.uniform(-2, 2) * line_direction[k];
     }
     if (!observe(point, u, v)) continue;
-    if (walker) v += walk;
+    if (walker) v += other ? Vector2<double>(-walk) : walk;
     if (kind == Kind::shift) v = Vector2<double>(u.x() + std::round(shift_x), u.y() + std::round(shift_y));
     if (kind == Kind::one_pixel && i % 3 != 0) v = Vector2<double>(300, 200);
     if (kind == Kind::random || kind == Kind::copies)
@@ -183,12 +201,16 @@ Problem make_problem(Kind kind, double noise, double outliers, double base_m, bo
     if (mismatch) {
       const double angle = random.uniform(0, 2 * cfp::pi<double>), radius = random.uniform(3, 40);
       v += radius * Vector2<double>(std::cos(angle), std::sin(angle));
+      if (kind == Kind::corner) v = Vector2<double>(random.uniform(0, 640), random.uniform(0, 480));
     }
     problem.previous.push_back({measured(u.x() + noise * random.normal()), measured(u.y() + noise * random.normal())});
     problem.current.push_back({measured(v.x() + noise * random.normal()), measured(v.y() + noise * random.normal())});
+    for (Pixel* const pixel : {&problem.previous.back(), &problem.current.back()}) {
+      if (kind == Kind::whole_pixels) *pixel = {std::round((*pixel)[0]), std::round((*pixel)[1])};
+    }
   }
   while (problem.exact_previous.size() < 200) {
-    Vector2<double> u(random.uniform(0, 640), random.uniform(0, 480)), v(0, 0);
+    Vector2<double> u(random.uniform(seen.x1, seen.x2), random.uniform(seen.y1, seen.y2)), v(0, 0);
     Vector3<double> ray;
     (void)camera.unproject(u, ray);
     if (!observe(ray * random.uniform(0.6, 5), u, v)) continue;
@@ -210,7 +232,7 @@ Problem make_problem(Kind kind, double noise, double outliers, double base_m, bo
                                                              : cfp_test::sampson_distance<double>(F, p, q));
   }
   problem.determined = kind == Kind::volume || kind == Kind::few || kind == Kind::mostly_plane ||
-                       kind == Kind::moving_walker || kind == Kind::one_pixel;
+                       kind == Kind::moving_walker || kind == Kind::one_pixel || kind == Kind::corner;
   problem.moves = !rests(kind) && !turns(kind) && kind != Kind::random && kind != Kind::copies && kind != Kind::shift;
   using S = RansacStatus;
   if (rests(kind)) problem.right_names = {S::no_motion};

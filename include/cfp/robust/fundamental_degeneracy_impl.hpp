@@ -23,7 +23,7 @@ struct DegeneracyCheck {
   FundamentalSearch<T>& search;
   std::vector<T>& scratch;  // of four times the arrays' capacity
   const PairArrays& pairs = search.pairs;
-  Matrix3<T> H = scaled_homography(Matrix3<T>::Identity());
+  Matrix3<T> H = no_motion();
   bool dominant = false;  // H explains half of the pairs
 
   // Transfer distances have two degrees of freedom and the noise of both images: 95 % of chi-squared is there at 3
@@ -100,22 +100,27 @@ struct DegeneracyCheck {
 
   // Whether the F whose noise was measured last is one: its lines explain more than chance does, without any part of
   // the image in which a person may move, too, and without any two lines of points, which leave F undetermined. Against
-  // no motion and against H. least: distinct pairs it has to explain.
-  [[nodiscard]] bool has_parallax(double least) noexcept {
+  // no motion, the rotation that most pairs show, if one does, and H. least: distinct pairs it has to explain.
+  [[nodiscard]] bool has_parallax(const Matrix3<T>& F, const Matrix3<T>* K, double least) noexcept {
+    if (!stands_out(pairs, search.distances_sq, search.wide_limit(), T(least))) return false;
     FundamentalEvidence<T> evidence{search, scratch};
-    if (!evidence.stands_out(least)) return false;
     evidence.stride = (std::max)(pairs.size / PairArrays::enough, std::size_t(1));
     typename FundamentalEvidence<T>::Verdict with_H = evidence.judge(H);
     const bool broad_possible = with_H.broad.evidence < with_H.person.evidence && find_homography_beside(with_H.broad);
     const bool possible = broad_possible || find_homography_beside(with_H.person);
     if (possible) with_H = evidence.judge(H);
-    const auto stands = [&](const typename FundamentalEvidence<T>::Verdict& v, T factor) {
+    Matrix3<T> turn = H;
+    const RansacStatus shown = dominant ? motion_of(K, turn) : RansacStatus::homography;
+    const bool rests = shown == RansacStatus::no_motion, turns = shown == RansacStatus::pure_rotation;
+    const Vector3<T> epipole = epipole_of(F);
+    const auto stands = [&](const typename FundamentalEvidence<T>::Verdict& v, T factor, bool beside_person) {
       if (!(v.distinct >= least && v.all > 11 * factor)) return false;
-      return (!possible || v.person.evidence > 3 * factor) && (!broad_possible || v.broad.evidence > 3 * factor);
+      return (!beside_person || v.person.evidence > 3 * factor) && (!broad_possible || v.broad.evidence > 3 * factor);
     };
     const auto suffices = [&](T factor) {
-      return stands(with_H, factor) && !evidence.rests_on_lines(factor) &&
-             stands(evidence.judge(scaled_homography(Matrix3<T>::Identity())), factor);
+      return stands(with_H, factor, possible) && !evidence.rests_on_lines(factor) &&
+             stands(evidence.judge(no_motion(), rests ? &epipole : nullptr), factor, possible || rests) &&
+             (!turns || stands(evidence.judge(turn, &epipole), factor, true));
     };
     if (evidence.stride == 1) return suffices(1);
     // Some of the pairs are enough where they say it clearly.
@@ -128,7 +133,7 @@ struct DegeneracyCheck {
   // Whether it is two lines of points that speak for the F whose noise was measured last.
   [[nodiscard]] bool rests_on_lines() noexcept {
     FundamentalEvidence<T> evidence{search, scratch};
-    return evidence.judge(scaled_homography(Matrix3<T>::Identity())).all > 11 && evidence.rests_on_lines(1);
+    return evidence.judge(no_motion()).all > 11 && evidence.rests_on_lines(1);
   }
 
   // Looks for the homography of the pairs outside the window of a person, who bends H towards F. H becomes that one,
@@ -137,7 +142,9 @@ struct DegeneracyCheck {
   [[nodiscard]] bool find_homography_beside(const typename FundamentalEvidence<T>::Window& window) noexcept {
     if (search.list.size() < 4) return true;
     const Matrix3<T> before = H;
-    const auto inside = [&](std::size_t i) { return window.contains(pairs.row(prev_x)[i], pairs.row(prev_y)[i]); };
+    const auto inside = [&](std::size_t i) {
+      return window.contains(pairs.extent * pairs.row(prev_x)[i], pairs.extent * pairs.row(prev_y)[i]);
+    };
     PairColumns<float> columns = thinned_columns(pairs);
     std::array<float, PairArrays::enough> weights = {};
     for (std::size_t k = 0; k < columns.size; ++k)
@@ -176,37 +183,34 @@ struct DegeneracyCheck {
     return all > 0 ? both / all : 0;
   }
 
-  // The rotation that fits the rays of H's pairs best, as a homography of scaled pixels. K: intrinsics. Kabsch.
-  [[nodiscard]] Matrix3<T> best_rotation(const Matrix3<T>& K) const noexcept {
-    const Matrix3<T> to_pixels[2] = {unscaling_matrix<T>(pairs.scaling.previous),
-                                     unscaling_matrix<T>(pairs.scaling.current)};
-    const Matrix3<T> K_inverse = inverse(K);
-    Matrix3<T> M = Matrix3<T>::Zero();
-    for (std::size_t i = 0; i < pairs.size; ++i) {
-      if (!holds(i)) continue;
-      const Vector3<T> p = K_inverse * (to_pixels[0] * previous_point<T>(pairs, i)),
-                       q = K_inverse * (to_pixels[1] * current_point<T>(pairs, i));
-      M += search.weights()[i] * q.normalized() * p.normalized().transpose();
-    }
-    const SVD3<T> m = svd(M);
-    return scaled_homography(Matrix3<T>(K * (m.U * m.V.transpose()) * K_inverse));
-  }
   [[nodiscard]] Matrix3<T> scaled_homography(const Matrix3<T>& pixels) const noexcept {
     return scaling_matrix<T>(pairs.scaling.current) * pixels * unscaling_matrix<T>(pairs.scaling.previous);
   }
 
-  // What motion a homography stands for; K: intrinsics or null. The identity, and then the rotation that fits best, is
-  // taken in its place when it explains nine tenths of the same pairs.
-  [[nodiscard]] RansacStatus classify(const Matrix3<T>* K) noexcept {
-    refine_homography(exact_columns(pairs), transfer_noise_limit(), 5, H);
-    const auto replaced_by = [&](const Matrix3<T>& other) {
+  [[nodiscard]] Matrix3<T> no_motion() const noexcept { return scaled_homography(Matrix3<T>::Identity()); }
+
+  // What motion H stands for; K: intrinsics or null. `found` becomes no motion, or the rotation that fits best, where
+  // it explains nine tenths of the pairs that H does.
+  [[nodiscard]] RansacStatus motion_of(const Matrix3<T>* K, Matrix3<T>& found) const noexcept {
+    const auto takes = [&](const Matrix3<T>& other) {
       if (!other.allFinite() || !(explained_by(other) >= 0.9)) return false;
-      H = other;
+      found = other;
       return true;
     };
-    if (replaced_by(scaled_homography(Matrix3<T>::Identity()))) return RansacStatus::no_motion;
+    if (takes(no_motion())) return RansacStatus::no_motion;
     if (K == nullptr) return RansacStatus::homography;
-    return replaced_by(best_rotation(*K)) ? RansacStatus::pure_rotation : RansacStatus::planar;
+    const auto rays = [&](std::size_t i) { return holds(i); };
+    return takes(scaled_homography(fitted_rotation(pairs, *K, rays))) ? RansacStatus::pure_rotation
+                                                                      : RansacStatus::planar;
+  }
+
+  // The same of H refined, which becomes what was found.
+  [[nodiscard]] RansacStatus classify(const Matrix3<T>* K) noexcept {
+    refine_homography(exact_columns(pairs), transfer_noise_limit(), 5, H);
+    Matrix3<T> found = H;
+    const RansacStatus status = motion_of(K, found);
+    H = found;
+    return status;
   }
 };
 

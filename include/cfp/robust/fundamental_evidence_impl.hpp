@@ -27,7 +27,7 @@ inline namespace CFP_ISA {
 // parallax mostly near it: each range of d has a share of its own. T is double.
 template <typename T>
 struct FundamentalEvidence {
-  static constexpr std::size_t cells = 16;              // over the extent of the pairs, either way
+  static constexpr std::size_t cells = 16;              // over the extent of the previous image, either way
   static constexpr std::size_t ranges = 6, shares = 5;  // of d, doubling
   static constexpr T share[shares] = {T(0), T(0.1), T(0.3), T(0.6), T(0.9)};
 
@@ -76,29 +76,13 @@ struct FundamentalEvidence {
   }
   [[nodiscard]] std::size_t range_of(std::size_t k) const noexcept { return static_cast<std::size_t>(range[k]); }
 
-  // Whether more pairs lie near their lines than the pairs up to three times as far let chance put there: the binomial
-  // tail of that has to outdo the number of seven-point samples, C(n, 7), as the best of all their F fits some
-  // mismatches, too. Weights count as Kish's number of equal ones, of which at least `least` must lie near. Source:
-  // Moisan and Stival, "A probabilistic criterion to detect rigid point matches between two images and estimate the
-  // fundamental matrix", IJCV 2004.
-  [[nodiscard]] bool stands_out(T least) const noexcept {
-    const T limit = search.wide_limit();
-    T near = 0, all = 0, n = 0, squares = 0;
-    for (std::size_t i = 0; i < pairs.size; ++i) {
-      n += pairs.row(evidence_weight)[i];
-      squares += pairs.row(evidence_weight)[i] * pairs.row(evidence_weight)[i];
-      near += search.distances_sq[i] <= limit ? pairs.row(evidence_weight)[i] : T(0);
-      all += search.distances_sq[i] <= 9 * limit ? pairs.row(evidence_weight)[i] : T(0);
-    }
-    const T per_weight = n / squares;
-    near *= per_weight, all *= per_weight, n *= per_weight;
-    return near >= least && 3 * near > all && binomial_nats(near, all, T(1) / 3) > 7 * std::log((n - 3) / T(3.38));
-  }
-
   // Of the F whose distances were measured last against H. Some F = [e']x H goes through any two pairs, the loudest if
-  // these are mismatches, and through one of them beside a person: so many say nothing for it.
-  [[nodiscard]] Verdict judge(const Matrix3<T>& H) noexcept {
+  // these are mismatches, and through one of them beside a person: so many say nothing for it. epipole: of the current
+  // image where H is that of the plane at infinity, beside which all that is seen moves towards one side; what moves
+  // the other way, as one of two people who cross does, says nothing. Null otherwise.
+  [[nodiscard]] Verdict judge(const Matrix3<T>& H, const Vector3<T>* epipole = nullptr) noexcept {
     const T distinct = compare(H);
+    if (epipole != nullptr) keep_one_side(H, *epipole);
     T best[ranges];
     leave_out_loudest();
     const T all = nats(best);
@@ -120,7 +104,9 @@ struct FundamentalEvidence {
  private:
   // Fills the arrays; returns how many distinct pairs F explains.
   T compare(const Matrix3<T>& H) noexcept {
-    const T variance = 2 * search.noise_variance + T(1e-4) * pairs.factor * pairs.factor, per_s2 = 1 / (2 * variance);
+    // Rounded to a grid, neighbours err alike, by up to its pitch: what is smaller tells nothing.
+    const T noise = (std::max)(search.noise_variance, T(pairs.grid_sq));
+    const T per_s2 = 1 / (4 * noise + T(2e-4) * pairs.factor * pairs.factor);
     const T limit = search.wide_limit();
     T distinct = 0;
     count = 0;
@@ -142,8 +128,9 @@ struct FundamentalEvidence {
   // The windows without which the pairs say least, each pair with the share of its range.
   void find_windows(const T (&share_of_range)[ranges], Verdict& out) const noexcept {
     LogProduct products[cells][cells];
+    const auto cell = [&](T along) { return cell_of(pairs.extent * along); };
     for (std::size_t k = 0; k < count; ++k)
-      products[cell_of(y[k])][cell_of(x[k])].multiply(1 + share_of_range[range_of(k)] * gain[k]);
+      products[cell(y[k])][cell(x[k])].multiply(1 + share_of_range[range_of(k)] * gain[k]);
     T sums[cells + 1][cells + 1] = {};  // of all cells above and to the left
     for (std::size_t r = 0; r < cells; ++r) {
       for (std::size_t c = 0; c < cells; ++c)
@@ -161,6 +148,21 @@ struct FundamentalEvidence {
     find_least(10, 6, out.broad);
     // One of the many broad windows holds most of little evidence by chance.
     out.broad.evidence += (std::max)(T(16) - out.all / 5, T(0));
+  }
+
+  // q ~ H p + k e, and k has one sign for all that is in front of both cameras: takes away what is far on the other
+  // side. Not what is near: a rotation that was fitted takes the mean parallax with it.
+  void keep_one_side(const Matrix3<T>& H, const Vector3<T>& e) noexcept {
+    T sides[2] = {};
+    const auto side = [&](std::size_t k) {
+      const Vector3<T> p = H * previous_point<T>(pairs, k * stride);
+      return cross(current_point<T>(pairs, k * stride), p).dot(cross(e, p)) > 0;
+    };
+    for (std::size_t k = 0; k < count; ++k) sides[side(k)] += std::clamp(gain[k], T(0), T(1));
+    const bool lesser = sides[1] < sides[0];
+    for (std::size_t k = 0; k < count; ++k) {
+      if (range[k] > 1 && side(k) == lesser) gain[k] = (std::min)(gain[k], T(0));
+    }
   }
 
   void leave_out_loudest() noexcept {

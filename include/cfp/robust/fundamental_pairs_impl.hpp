@@ -28,6 +28,8 @@ struct PairArrays : RansacColumns<pair_rows> {
 
   PairScaling scaling;
   double factor = 0;           // 0: the points of an image coincide, nothing else is set
+  double extent = 1;           // of the previous image's own scale over the common one, which far mismatches stretch
+  double grid_sq = 0;          // squared pitch of the grid that all coordinates lie on, scaled; 0 without one
   double total_shared = 0;     // sum of the weights in the score
   std::vector<float> thinned;  // see thinned_columns
   CellCounts cells[2];
@@ -109,6 +111,20 @@ inline void share_weights(PairArrays& pairs, double cell_size) noexcept {
   }
 }
 
+// The coarsest grid of 4 px to 1/4 px that all coordinates lie on; 0 without one.
+template <typename Scalar>
+[[nodiscard]] double grid_px(const PointPairs<Scalar>& input) {
+  double px = 4;
+  for_each_pair(input, [&](std::size_t, const Vector2<double>& previous, const Vector2<double>& current, double) {
+    const auto off_grid = [&] {
+      const Eigen::Array4d steps = Eigen::Array4d(previous.x(), previous.y(), current.x(), current.y()) / px;
+      return (steps != steps.floor()).any();
+    };
+    while (px > 0 && off_grid()) px = px > 0.25 ? px / 2 : 0;
+  });
+  return px;
+}
+
 // cell_px: of the cells of PairArrays, > 0.
 template <typename Scalar>
 void load_pairs(const PointPairs<Scalar>& input, double cell_px, PairArrays& pairs) {
@@ -121,11 +137,14 @@ void load_pairs(const PointPairs<Scalar>& input, double cell_px, PairArrays& pai
   if (!pairs.scaling.valid()) return;
   pairs.size = 0;
   pairs.factor = std::sqrt(pairs.scaling.previous.factor * pairs.scaling.current.factor);
+  pairs.extent = pairs.scaling.previous.factor / pairs.factor;
   pairs.scaling.previous.factor = pairs.scaling.current.factor = pairs.factor;
   for_each_pair(input, [&](std::size_t i, const Vector2<double>& previous, const Vector2<double>& current, double w) {
     const Vector3<double> p = scaled(pairs.scaling.previous, previous), q = scaled(pairs.scaling.current, current);
     pairs.push(i, {p.x(), p.y(), q.x(), q.y(), w, w, w});
   });
+  const double grid = grid_px(input) * pairs.factor;
+  pairs.grid_sq = grid * grid;
   finish(pairs);
   share_weights(pairs, cell_px * pairs.factor);
   constexpr std::size_t enough = PairArrays::enough;

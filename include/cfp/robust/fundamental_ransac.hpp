@@ -77,7 +77,7 @@ template <typename Scalar>
     if (check.dominant) check.complete_from_plane(found.best);
     search.polish(F, found.confident ? 1 : 4);
     search.collect_inliers();
-    has_F = check.has_parallax(static_cast<double>(options.min_inliers));
+    has_F = check.has_parallax(F, K, static_cast<double>(options.min_inliers));
     if (!has_F && !check.rests_on_lines()) result.status = RansacStatus::no_consensus;
   } else {
     if (is_finite(found.best.cost)) result.status = RansacStatus::no_consensus;

@@ -118,5 +118,23 @@ void refine_homography(const PairColumns<T>& pairs, double scale, int max_steps,
   refine<8>(TransferModel<T>{pairs, scale}, max_steps, 1e-3, H);
 }
 
+// The rotation that fits the rays of the pairs best for which `holds(i)`, as a homography of pixels. K: intrinsics.
+// Kabsch.
+template <typename T, typename Holds>
+[[nodiscard]] Matrix3<T> fitted_rotation(const PairArrays& pairs, const Matrix3<T>& K, const Holds& holds) noexcept {
+  const Matrix3<T> to_pixels[2] = {unscaling_matrix<T>(pairs.scaling.previous),
+                                   unscaling_matrix<T>(pairs.scaling.current)};
+  const Matrix3<T> K_inverse = inverse(K);
+  Matrix3<T> M = Matrix3<T>::Zero();
+  for (std::size_t i = 0; i < pairs.size; ++i) {
+    if (!holds(i)) continue;
+    const Vector3<T> p = K_inverse * (to_pixels[0] * previous_point<T>(pairs, i)),
+                     q = K_inverse * (to_pixels[1] * current_point<T>(pairs, i));
+    M += pairs.row(score_weight)[i] * q.normalized() * p.normalized().transpose();
+  }
+  const SVD3<T> m = svd(M);
+  return K * (m.U * m.V.transpose()) * K_inverse;
+}
+
 }  // namespace CFP_ISA
 }  // namespace cfp::detail

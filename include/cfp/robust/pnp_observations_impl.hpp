@@ -92,28 +92,44 @@ void load_observations(const PointSpan<Scalar, 3>& world, const PointSpan<Scalar
   return true;
 }
 
-// Whether a line holds four and all but two of the points that `counts` accepts: the turn about it rests on too little.
-// The line is sought through the first, the middle and the last of them.
+// Whether a line holds four and all but two of the points that `counts` accepts, to rounding and to what the threshold
+// is at their depth: the turn about it then rests on too little. Of three points one is on it, and of the three that
+// are farthest from that one.
 template <typename Counts>
-[[nodiscard]] bool hang_on_a_line(const ObservationArrays& in, double rounding, const Counts& counts,
-                                  std::vector<double>& scratch) {
+[[nodiscard]] bool hang_on_a_line(const ObservationArrays& in, const SE3<double>& T_cam_world, double threshold_px,
+                                  double rounding, const Counts& counts, std::vector<double>& scratch) {
   scratch.clear();
   for (std::size_t i = 0; i < in.size; ++i) {
     if (counts(i)) scratch.push_back(static_cast<double>(i));
   }
   const std::size_t n = scratch.size();
-  const auto point = [&](std::size_t k) { return in.point(static_cast<std::size_t>(scratch[k])); };
-  const auto is_line = [&](std::size_t from, std::size_t to) {
-    const Vector3<double> start = point(from), along = point(to) - start;
-    double size = along.norm();
-    for (std::size_t k = 0; k < n; ++k) size = (std::max)(size, (point(k) - start).norm());
-    if (!(along.norm() > 0.05 * size)) return false;
+  const auto index = [&](std::size_t k) { return static_cast<std::size_t>(scratch[k]); };
+  const auto is_line = [&](const Vector3<double>& start, const Vector3<double>& along, double size) {
     std::size_t off = 0;
-    for (std::size_t k = 0; k < n; ++k)
-      off += cross(along, Vector3<double>(point(k) - start)).norm() > size * (1e-6 * size + rounding) ? 1U : 0U;
+    for (std::size_t k = 0; k < n && off <= 2; ++k) {
+      const Vector3<double> p = in.point(index(k));
+      const double width = threshold_px * (T_cam_world * p).z() / in.row(s11)[index(k)];
+      off +=
+          cross(along, Vector3<double>(p - start)).norm() > along.norm() * (1e-6 * size + rounding + width) ? 1U : 0U;
+    }
     return off <= 2 && n >= off + 4;
   };
-  return n >= 4 && (is_line(0, n / 2) || is_line(n / 2, n - 1) || is_line(0, n - 1));
+  for (std::size_t a = 0; a < 3 && n >= 4; ++a) {
+    const Vector3<double> start = in.point(index(a * (n - 1) / 2));
+    std::array<Vector3<double>, 3> farthest;  // from there, the farthest last
+    farthest.fill(Vector3<double>::Zero());
+    for (std::size_t k = 0; k < n; ++k) {
+      const Vector3<double> along = in.point(index(k)) - start;
+      for (std::size_t r = 0; r < 3 && along.squaredNorm() > farthest[r].squaredNorm(); ++r) {
+        if (r > 0) farthest[r - 1] = farthest[r];
+        farthest[r] = along;
+      }
+    }
+    for (const Vector3<double>& along : farthest) {
+      if (!along.isZero(0) && is_line(start, along, farthest[2].norm())) return true;
+    }
+  }
+  return false;
 }
 
 // Whether the points that `counts` accepts are in four places at least: any three have a pose.

@@ -57,8 +57,8 @@ inline namespace CFP_ISA {
 ///
 /// A pose is found only where more observations lie near their projections than chance would put there: with nothing
 /// but mismatches on an object of 40 to 160 px, eight inliers or more come up by chance. Points on a line, or in one
-/// place, are degenerate, and so are inliers of which four or more, and all but two, lie on one; those in three places
-/// are no consensus, however many they are.
+/// place, are degenerate, and so are inliers of which four or more, and all but two, lie on one to what threshold_px is
+/// at their depth; those in three places are no consensus, however many they are.
 template <typename Camera, typename Scalar = typename Camera::ScalarType>
 [[nodiscard]] PnpRansacResult<Scalar> pnp_ransac(PointSpan<non_deduced<Scalar>, 3> world,
                                                  PointSpan<non_deduced<Scalar>, 2> pixels,
@@ -98,7 +98,8 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
   };
   detail::report_inliers(observations, is_inlier, options.min_inliers, inlier_mask, result);
   if (result.found() && !detail::four_places(observations, is_inlier)) detail::refuse(inlier_mask, result);
-  if (result.found() && detail::hang_on_a_line(observations, rounding, is_inlier, workspace.sampling)) {
+  if (result.found() && detail::hang_on_a_line(observations, search.best.model, options.threshold_px, rounding,
+                                               is_inlier, workspace.sampling)) {
     detail::refuse(inlier_mask, result);
     result.status = RansacStatus::degenerate;
   }
