@@ -118,7 +118,8 @@ inline void add_run(const std::filesystem::path& folder, const RunRecord& run, C
                float(e.map_point_probability),
                foreground,
                e.match != cfp::no_match,
-               e.associated};
+               e.associated,
+               float(e.visibility)};
     s.map_point = float(e.map_point_probability);
     s.flow = float(e.flow_probability);
     s.placed = e.placed;

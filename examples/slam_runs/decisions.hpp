@@ -71,6 +71,7 @@ void for_each_column(D& d, const Visit& visit) {
   };
   constraint("T", "T_distance_px", "T_threshold_px", "K_T", "T_confidence", e.projection);
   constraint("F", "F_distance_px", "F_threshold_px", "K_F", "F_confidence", e.epipolar);
+  visit("visibility", e.visibility);
 }
 
 // The last enumerator of what a column may hold.

@@ -43,6 +43,7 @@ void for_each_option(Options& o, const Visit& visit) {
   visit("probability.coarse.object.max_stray_share", p.coarse.object.max_stray_share);
   visit("probability.coarse.object.shift_pairs", p.coarse.object.shift_pairs);
   visit("probability.fine.min_translation_m", p.fine.min_translation_m);
+  visit("probability.fine.least_speed_m_s", p.fine.least_speed_m_s);
   visit("probability.fine.constraint.quantile", p.fine.constraint.quantile);
   visit("probability.fine.constraint.steepness", p.fine.constraint.steepness);
   visit("probability.map_point.rate", p.map_point.rate);

@@ -15,8 +15,8 @@
   CFP_LAYOUT(cfp::DbscanResult, invalid)                                 \
   CFP_LAYOUT(cfp::DbscanWorkspace<float>, labels)                        \
   CFP_LAYOUT(cfp::DbscanWorkspace<double>, labels)                       \
-  CFP_LAYOUT(cfp::ForegroundInput<float>, previous_depth_m)              \
-  CFP_LAYOUT(cfp::ForegroundInput<double>, previous_depth_m)             \
+  CFP_LAYOUT(cfp::ForegroundInput<float>, depth_noise)                   \
+  CFP_LAYOUT(cfp::ForegroundInput<double>, depth_noise)             \
   CFP_LAYOUT(cfp::ObjectDepth<float>, depth_m)                           \
   CFP_LAYOUT(cfp::ObjectDepth<double>, depth_m)                          \
   CFP_LAYOUT(cfp::ForegroundOptions, min_points)                         \
@@ -109,8 +109,8 @@
   CFP_LAYOUT(cfp::ConstraintModel<double>, status)                       \
   CFP_LAYOUT(cfp::Evidence<float>, available)                            \
   CFP_LAYOUT(cfp::Evidence<double>, available)                           \
-  CFP_LAYOUT(cfp::SecondStageKeypoint<float>, box_associated)            \
-  CFP_LAYOUT(cfp::SecondStageKeypoint<double>, box_associated)           \
+  CFP_LAYOUT(cfp::SecondStageKeypoint<float>, visibility)                \
+  CFP_LAYOUT(cfp::SecondStageKeypoint<double>, visibility)               \
   CFP_LAYOUT(cfp::MapPointOptions, background_prior)                     \
   CFP_LAYOUT(cfp::ObjectProbabilityOptions, unknown_object_probability)  \
   CFP_LAYOUT(cfp::ObjectProbability, status)                             \

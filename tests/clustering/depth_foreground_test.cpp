@@ -227,6 +227,42 @@ TEST_CASE("A wall beside a person's shoulders is not taken for the person", "[cl
   CHECK(kept(mask, 60, 40) == 0);
 }
 
+TEST_CASE("A person whose depths err by more than he is deep stays whole, and a wall far behind apart",
+          "[clustering]") {
+  cfp::Random random(8, "stereo");
+  std::size_t person = 0, person_as_exact = 0, wall = 0;  // of 1200, 1200 and 800
+  for (int trial = 0; trial < 40; ++trial) {
+    std::vector<double> depths;
+    for (int i = 0; i < 30; ++i) depths.push_back(10 + 0.8 * random.normal());
+    for (int i = 0; i < 20; ++i) depths.push_back(20 + 3.2 * random.normal());
+    cfp::ForegroundInput<double> in{depths, {}, {}, 0};
+    std::vector<char> mask(depths.size());
+    cfp::ForegroundWorkspace<double> workspace;
+    cfp::depth_foreground(in, {}, workspace, mask);
+    person_as_exact += kept(mask, 0, 30);
+    in.depth_noise = {0, 0.008, 0};
+    cfp::depth_foreground(in, {}, workspace, mask);
+    person += kept(mask, 0, 30), wall += 20 - kept(mask, 30, 20);
+  }
+  CHECK(person_as_exact < 720);
+  CHECK(person > 1116);
+  CHECK(wall > 720);
+}
+
+TEST_CASE("A depth noise of infinity or none leaves the window as it is", "[clustering]") {
+  std::vector<double> depths;
+  add_layer(depths, 30, 2, 0.01), add_layer(depths, 30, 4, 0.01);
+  cfp::ForegroundInput<double> in{depths, {}, {}, 0};
+  std::vector<char> mask(depths.size());
+  cfp::ForegroundWorkspace<double> workspace;
+  for (const double constant_m : {0.0, 1e-6, std::numeric_limits<double>::infinity()}) {
+    in.depth_noise = {constant_m, 0, 0};
+    cfp::depth_foreground(in, {}, workspace, mask);
+    CHECK(kept(mask, 0, 30) == 30);
+    CHECK(kept(mask, 30, 30) == 0);
+  }
+}
+
 TEST_CASE("A gap that flying pixels bridge parts a person from a wall, the thin end of the wall does not",
           "[clustering]") {
   std::vector<double> depths;

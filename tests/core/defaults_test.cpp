@@ -55,14 +55,15 @@ TEST_CASE("The defaults of constraints, map points and frames", "[core]") {
   const cfp::FrameOptions o;
   CHECK((o.use_boxes && o.classes.size() == 1 && o.classes[0].class_id == 0 && o.classes[0].non_rigid));
   CHECK((o.object_threshold == 0.9 && o.min_creation_probability == 0.3 && o.min_inlier_weight == 0.1));
-  CHECK((o.fine.enabled && o.fine.min_pose_inliers == 10 && o.fine.min_translation_m == 0.005));
+  CHECK((o.fine.enabled && o.fine.min_pose_inliers == 10 && o.fine.min_translation_m == 0.005 &&
+         o.fine.least_speed_m_s == 0.5));
   const cfp::ConstraintOptions& c = o.fine.constraint;
   CHECK((c.quantile == 0.8 && c.steepness == 5 && c.min_samples == 10));
   CHECK((o.fine.matching.radius_px == 40 && o.fine.matching.max_distance == 50 && o.fine.matching.max_ratio == 0.9));
   const cfp::MapPointOptions& m = o.map_point;
   CHECK((m.policy == cfp::MapPointPolicy::log_odds && m.weight == cfp::WeightRule::posterior && m.rate == 0.2));
   CHECK((m.evidence_limit == 0.02 && m.deletion_threshold == 0.3 && m.mismatch_threshold == 0.5));
-  CHECK((m.constraint_power == 0.5 && m.foreground_prior == 0.02 && m.background_prior == 0.9));
+  CHECK((m.constraint_power == 0.5 && m.foreground_prior == 0.02 && m.background_prior == 0.8));
   CHECK(o.health.min_effective_points == 10);
 }
 

@@ -136,6 +136,7 @@ TEST_CASE("The ends of the ranges of a frame's options", "[core]") {
       CFP_FIELD(O, coarse.foreground.half_body_m, not_negative),
       CFP_FIELD(O, fine.min_pose_inliers, not_negative),
       CFP_FIELD(O, fine.min_translation_m, not_negative),
+      CFP_FIELD(O, fine.least_speed_m_s, not_negative),
       CFP_FIELD(O, fine.constraint.quantile, above_zero),
       CFP_FIELD(O, fine.constraint.steepness, positive),
       CFP_FIELD(O, fine.matching.radius_px, positive),

@@ -119,6 +119,7 @@ TEST_CASE("Every option of a frame is refused by its full, unique name", "[core]
       {"coarse.foreground.min_points", [](auto& o) { o.coarse.foreground.min_points = 0; }},
       {"fine.min_pose_inliers", [&](auto& o) { o.fine.min_pose_inliers = nan; }},
       {"fine.min_translation_m", [&](auto& o) { o.fine.min_translation_m = nan; }},
+      {"fine.least_speed_m_s", [&](auto& o) { o.fine.least_speed_m_s = -1; }},
       {"fine.constraint.quantile", [&](auto& o) { o.fine.constraint.quantile = nan; }},
       {"fine.constraint.steepness", [&](auto& o) { o.fine.constraint.steepness = nan; }},
       {"fine.constraint.min_samples", [](auto& o) { o.fine.constraint.min_samples = 0; }},

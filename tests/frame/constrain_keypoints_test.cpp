@@ -9,6 +9,7 @@
 #include "cfp/geometry/radial_tangential_camera.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
+#include "support/far_walker.hpp"
 #include "support/frame_runs.hpp"
 
 using cfp::KeypointLabel;
@@ -147,6 +148,26 @@ TEST_CASE("Too little translation leaves the projection constraint alone", "[fra
   CHECK(again.fine(any_translation).epipolar.status == cfp::Status::ok);
 }
 
+TEST_CASE("Whose steps would not show earns no weight by standing still, who is near does", "[frame]") {
+  cfp_test::FarWalkerOptions walker;
+  walker.rate_hz = 60, walker.points = 6, walker.across_m_s = 0.6;
+  cfp::FrameOptions as_printed;
+  as_printed.fine.least_speed_m_s = 0;
+  CHECK(cfp_test::mean_of_far_walkers(walker, as_printed, 3).above_half > 0.9);
+  CHECK(cfp_test::mean_of_far_walkers(walker, {}, 3).above_half < 0.15);
+  walker.across_m_s = 0, walker.distance_m = 4;
+  CHECK(cfp_test::mean_of_far_walkers(walker, {}, 3).above_half > 0.9);
+}
+
+TEST_CASE("Stereo's depth noise takes nobody far away for the wall behind him", "[frame]") {
+  cfp_test::FarWalkerOptions walker;
+  walker.rate_hz = 15, walker.away_m_s = 0.9, walker.distance_m = 14;
+  const cfp_test::FarWalkerOutcome mean = cfp_test::mean_of_far_walkers(walker, {}, 3);
+  CHECK(mean.background < 0.2);
+  CHECK(mean.object_known > 0.95);
+  CHECK(mean.room_below < 0.01);
+}
+
 TEST_CASE("Without enough keypoints outside the boxes the first stage's K stays", "[frame]") {
   DynamicSceneOptions options;
   options.wall_points = 5;
@@ -231,13 +252,15 @@ TEST_CASE("Keypoints outside all boxes keep K = 1", "[frame]") {
   }
 }
 
-TEST_CASE("Scaling the scene scales nothing but the translation threshold", "[frame]") {
+TEST_CASE("Scaling the scene scales nothing but the translation threshold and the least speed", "[frame]") {
   FineRun<double> run(make_dynamic_scene<double>({}, 16));
-  run.fine({});
+  cfp::FrameOptions options;
+  options.fine.least_speed_m_s = 0;
+  run.fine(options);
   FineRun<double> scaled(make_dynamic_scene<double>({}, 16));
   for (double& z : scaled.scene.previous_depths) z *= 4;
   scaled.pose.T_cur_prev.translation *= 4;
-  scaled.fine({});
+  scaled.fine(options);
   for (std::size_t i = 0; i < run.state.static_probability.size(); ++i)
     CHECK_THAT(scaled.state.static_probability[i], WithinAbs(run.state.static_probability[i], 1e-9));
 }

@@ -82,6 +82,7 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
                        &object.unknown_object_probability,
                        &fine.min_pose_inliers,
                        &fine.min_translation_m,
+                       &fine.least_speed_m_s,
                        &fine.constraint.quantile,
                        &fine.constraint.steepness,
                        &fine.matching.radius_px,

@@ -1,5 +1,6 @@
 #include "cfp/probability/second_stage_probability.hpp"
 
+#include <algorithm>
 #include <limits>
 #include <vector>
 
@@ -118,6 +119,21 @@ TEST_CASE("As evidence beside M, what no constraint judges says nothing, on the 
   p.foreground = true;
   p.box_associated = false;
   CHECK(cfp::second_stage_evidence(p, 0.9) == 0);  // its match is false, whatever it says
+}
+
+TEST_CASE("Evidence of rest counts as much as motion would have shown, evidence of motion in full", "[probability]") {
+  cfp::SecondStageKeypoint<double> p;
+  p.matched = true;
+  for (const double k : {0.0, 0.3, 0.5, 0.8, 1.0}) {
+    p.projection = {k, 0.4, true};
+    for (const double visibility : {0.0, 0.25, 1.0}) {
+      p.visibility = visibility;
+      CHECK(cfp::second_stage_evidence(p, 0.9) == Approx(k > 0.5 ? 0.5 + visibility * (k - 0.5) : k));
+      CHECK(cfp::second_stage_probability(p, 0.9) == k);  // as printed
+    }
+    p.visibility = std::numeric_limits<double>::quiet_NaN();
+    CHECK(cfp::second_stage_evidence(p, 0.9) == (std::min)(k, 0.5));
+  }
 }
 
 TEST_CASE("Beside a first stage that says its object moves, a keypoint's K may say so too, but not that it rests",

@@ -80,13 +80,11 @@ template <typename Scalar>
   return {static_probability(model, distance_px), confidence, fitted && distance_px >= Scalar(0)};
 }
 
-/// K of a point in the image of which a walker at its depth goes way_px: where that is below D_Th, to see no motion is
-/// the weaker a sign of rest.
+/// How much of somebody's motion shows who goes way_px in the image: all of it from D_Th on, its square below.
 template <typename Scalar>
-[[nodiscard]] Scalar seen_at_rest(Scalar k, Scalar way_px, Scalar threshold_px) noexcept {
-  const Scalar half(0.5);
-  if (!(k > half) || !(way_px < threshold_px)) return k;
-  return half + (k - half) * (way_px / threshold_px) * (way_px / threshold_px);
+[[nodiscard]] Scalar visibility_of(Scalar way_px, Scalar threshold_px) noexcept {
+  const Scalar share = way_px < threshold_px ? way_px / threshold_px : Scalar(1);
+  return share * share;
 }
 
 }  // namespace CFP_ISA
@@ -136,8 +134,8 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
   const bool posterior = options.map_point.weight == WeightRule::posterior;
   const Scalar threshold = static_cast<Scalar>(options.object_threshold);
   const Scalar seen_px = projection.status != Status::not_enough_data ? projection.threshold_px : epipolar.threshold_px;
-  const Scalar way_px_m = undistorted_camera(camera).fx *
-                          static_cast<Scalar>(options.fine.least_speed_m_s * detail::elapsed_s(state));
+  const Scalar way_px_m =
+      undistorted_camera(camera).fx * static_cast<Scalar>(options.fine.least_speed_m_s * detail::elapsed_s(state));
   for (std::size_t i = 0; i < n; ++i) {
     if (state.box[i] == no_box) continue;
     const std::size_t b = static_cast<std::size_t>(state.box[i]);
@@ -150,10 +148,10 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
     keypoint.foreground = state.label[i] == KeypointLabel::foreground;
     keypoint.matched = is_finite(scratch.points[i][0]) && is_finite(scratch.points[i][1]);
     keypoint.box_associated = state.boxes[b].associated;
-    Scalar& k = state.static_probability[i];
-    k = posterior ? second_stage_evidence(keypoint, threshold) : second_stage_probability(keypoint, threshold);
-    if (posterior && way_px_m > Scalar(0) && is_valid_depth(scratch.depths[i]))
-      k = detail::seen_at_rest(k, way_px_m / scratch.depths[i], seen_px);
+    if (way_px_m > Scalar(0) && is_valid_depth(scratch.depths[i]))
+      keypoint.visibility = detail::visibility_of(way_px_m / scratch.depths[i], seen_px);
+    state.static_probability[i] =
+        posterior ? second_stage_evidence(keypoint, threshold) : second_stage_probability(keypoint, threshold);
     ++state.report.constrained;
   }
 }

@@ -48,6 +48,7 @@ struct KeypointExplanation {
   double coarse_probability = 1;                   ///< K of the first stage
   std::int32_t match = no_match;
   ConstraintExplanation projection, epipolar;
+  double visibility = 1;                               ///< how much of a walker's motion would show at its depth
   SecondStageRule rule = SecondStageRule::new_object;  ///< in the fine stage: what K follows
   double static_probability = 1;                       ///< K
   double map_point_probability = -1;                   ///< M as handed over, negative: none
@@ -119,6 +120,7 @@ template <typename Scalar>
       e.rule = second_stage_rule(known, static_cast<Scalar>(options.object_threshold));
       e.projection = detail::explain_constraint(known.projection, state.scratch.projection[i], state.report.projection);
       e.epipolar = detail::explain_constraint(known.epipolar, state.scratch.epipolar[i], state.report.epipolar);
+      e.visibility = static_cast<double>(known.visibility);
     }
   }
   e.static_probability = static_cast<double>(state.static_probability[i]);

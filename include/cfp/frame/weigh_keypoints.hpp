@@ -135,9 +135,10 @@ template <typename Scalar>
 [[nodiscard]] Scalar updated_map_point(std::size_t i, non_deduced<Scalar> map_point_probability,
                                        const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
   CFP_ASSERT(i < state.size());
-  if (!(map_point_probability >= Scalar(0)) || state.label[i] == KeypointLabel::invalid) return map_point_probability;
+  if (!(map_point_probability >= Scalar(0))) return map_point_probability;
   const bool silent =
-      options.map_point.weight == WeightRule::posterior && state.box[i] != no_box && state.report.constrained == 0;
+      state.label[i] == KeypointLabel::invalid ||
+      (options.map_point.weight == WeightRule::posterior && state.box[i] != no_box && state.report.constrained == 0);
   if (state.report.stage != Stage::fine || silent) return clamp_probability(map_point_probability);
   Scalar k = state.static_probability[i];
   if (options.map_point.weight == WeightRule::posterior && state.flow_probability[i] >= Scalar(0)) {

@@ -38,7 +38,8 @@ struct MapPointOptions {
   /// posterior only: M of which nothing is known yet, on an object that may move and behind one, in (0, 1). Depth tells
   /// the two apart well; a point on a person has to earn its weight.
   double foreground_prior = 0.02;
-  double background_prior = 0.9;
+  /// K = 0 has to take a weight below 1/2: odds of less than ((1 - limit) / limit)^constraint_power, here 7.
+  double background_prior = 0.8;
 };
 
 namespace detail {
