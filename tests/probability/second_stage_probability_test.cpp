@@ -1,10 +1,13 @@
 #include "cfp/probability/second_stage_probability.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <vector>
 
+#include "cfp/core/random.hpp"
 #include "cfp/probability/distance_sigmoid.hpp"
+#include "cfp/probability/map_point.hpp"
 #include "support/catch.hpp"
 
 namespace {
@@ -121,18 +124,50 @@ TEST_CASE("As evidence beside M, what no constraint judges says nothing, on the 
   CHECK(cfp::second_stage_evidence(p, 0.9) == 0);  // its match is false, whatever it says
 }
 
-TEST_CASE("Evidence of rest counts as much as motion would have shown, evidence of motion in full", "[probability]") {
+TEST_CASE("Evidence counts as much as motion would have shown, and in full where it surely has", "[probability]") {
   cfp::SecondStageKeypoint<double> p;
   p.matched = true;
-  for (const double k : {0.0, 0.3, 0.5, 0.8, 1.0}) {
+  double last = -1;
+  for (int step = 0; step <= 100; ++step) {
+    const double k = step / 100.0;
     p.projection = {k, 0.4, true};
-    for (const double visibility : {0.0, 0.25, 1.0}) {
-      p.visibility = visibility;
-      CHECK(cfp::second_stage_evidence(p, 0.9) == Approx(k > 0.5 ? 0.5 + visibility * (k - 0.5) : k));
-      CHECK(cfp::second_stage_probability(p, 0.9) == k);  // as printed
-    }
+    p.visibility = 1;
+    CHECK(cfp::second_stage_evidence(p, 0.9) == Approx(k));
+    p.visibility = 0.25;
+    const double quarter = cfp::second_stage_evidence(p, 0.9);
+    CHECK(quarter >= last);  // non-decreasing in K
+    last = quarter;
+    if (k >= 0.1) CHECK(quarter == Approx(0.5 + 0.25 * (k - 0.5)));
+    p.visibility = 0;
+    if (k >= 0.5) CHECK(cfp::second_stage_evidence(p, 0.9) == 0.5);
     p.visibility = std::numeric_limits<double>::quiet_NaN();
-    CHECK(cfp::second_stage_evidence(p, 0.9) == (std::min)(k, 0.5));
+    CHECK(cfp::second_stage_evidence(p, 0.9) <= 0.5);
+    CHECK(cfp::second_stage_probability(p, 0.9) == k);  // as printed
+  }
+  p.projection = {0, 0.4, true};
+  CHECK(cfp::second_stage_evidence(p, 0.9) == 0);
+}
+
+TEST_CASE("What could not be seen to move is learned neither to rest nor to move", "[probability]") {
+  // Distances of a static point under noise of 1 px, 80 % of them below D_Th; M over four seconds at 60 Hz.
+  cfp::Random random(7, "invisible");
+  const cfp::ConstraintModel<double> model{1.794, 0.1, 5 / 1.694, 0.5, 100, cfp::Status::ok};
+  for (const double visibility : {0.02, 0.1, 0.25}) {
+    double rest = 0;
+    for (int point = 0; point < 50; ++point) {
+      double m = 0.9;
+      for (int frame = 0; frame < 240; ++frame) {
+        const double right = random.normal(), down = random.normal();
+        cfp::SecondStageKeypoint<double> p;
+        p.matched = true;
+        p.visibility = visibility;
+        p.projection = {cfp::static_probability(model, std::hypot(right, down)), 0.5, true};
+        m = cfp::updated_map_point(cfp::second_stage_evidence(p, 0.9), m, cfp::MapPointOptions());
+      }
+      rest += m / 50;
+    }
+    CAPTURE(visibility);
+    CHECK(rest > 0.3);  // is not deleted
   }
 }
 

@@ -97,7 +97,8 @@ inline namespace CFP_ISA {
 /// sigmoid for each from the keypoints outside all boxes; second_stage_probability for those inside. M is that of
 /// before this frame, negative where there is no map point; empty for a host that keeps none. With
 /// WeightRule::posterior a keypoint that neither constraint judges, for want of a match, a depth or a translation, gets
-/// 1/2: its weight is what was known before. When neither sigmoid has enough samples, the coarse K stays; a pose that
+/// 1/2: its weight is what was known before; and K counts as much as a walker's motion would show at its depth
+/// (FineOptions::least_speed_m_s). When neither sigmoid has enough samples, the coarse K stays; a pose that
 /// is not finite has that effect. O(keypoints).
 template <typename Scalar, typename Camera>
 void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar>> map_point_probability,

@@ -76,7 +76,7 @@ struct FineOptions {
   /// t_Th in metres: |t| at or below it skips the epipolar constraint, >= 0. No source in the paper.
   double min_translation_m = 0.005;
   /// WeightRule::posterior: how slow those may be who count as moving. Where depths tell that somebody of this speed
-  /// goes less than D_Th from one image to the next, K says as much less that a keypoint is at rest: far away and at
+  /// goes less than D_Th from one image to the next, K says as much less (second_stage_evidence): far away and at
   /// high frame rates who walks looks as who stands. m/s, >= 0; 0: K is as printed.
   double least_speed_m_s = 0.5;
   ConstraintOptions constraint;     ///< of the projection and of the epipolar lines alike

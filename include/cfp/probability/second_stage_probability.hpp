@@ -3,6 +3,8 @@
 /// together, and the special rules around them (paper section IV-D).
 #pragma once
 
+#include <algorithm>
+
 #include "cfp/core/numeric.hpp"
 #include "cfp/probability/first_stage_probability.hpp"
 
@@ -26,7 +28,7 @@ struct SecondStageKeypoint {
   bool foreground = true;                    ///< from the depth clustering
   bool matched = false;                      ///< has a match in frame k-1
   bool box_associated = true;                ///< its box continues a box of frame k-1
-  Scalar visibility = Scalar(1);             ///< of motion, in [0, 1]: what second_stage_evidence may say of rest
+  Scalar visibility = Scalar(1);             ///< of motion, in [0, 1]: how much second_stage_evidence may say
 };
 
 /// The rules of the second stage, in the paper's order. A match without any available constraint (no depth and too
@@ -89,16 +91,19 @@ template <typename Scalar>
 }
 
 /// What the constraints say of a keypoint whose map point's M is the prior: K by the rules above, and 1/2, nothing, of
-/// one that no constraint judges. Above 1/2 it counts as much as motion would show. In [0, 1]. Not in the paper, whose
-/// K is 0 or M without a constraint.
+/// one that no constraint judges. It counts as much as motion would show, and where it is near 0 in full: whoever moves
+/// fast shows. So by what cannot be seen nobody is learned to rest, nor a wall to move. In [0, 1]. Not in the paper,
+/// whose K is 0 or M without a constraint.
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar second_stage_evidence(const SecondStageKeypoint<Scalar>& keypoint,
                                                      Scalar object_threshold) noexcept {
   const SecondStageRule rule = second_stage_rule(keypoint, object_threshold);
   const bool unmatched = rule == SecondStageRule::unmatched_foreground || rule == SecondStageRule::unmatched_background;
   if (unmatched) return Scalar(0.5);
-  const Scalar k = second_stage_probability(keypoint, object_threshold), beyond = k - Scalar(0.5);
-  return beyond > Scalar(0) ? Scalar(0.5) + beyond * clamp_probability(keypoint.visibility) : k;
+  const Scalar towards_motion = Scalar(1) - 2 * second_stage_probability(keypoint, object_threshold);
+  Scalar surely = (std::max)(towards_motion, Scalar(0));
+  for (int squared = 0; squared < 3; ++squared) surely *= surely;
+  return Scalar(0.5) * (Scalar(1) - towards_motion * (std::max)(clamp_probability(keypoint.visibility), surely));
 }
 
 /// K beside E of the same keypoint: at most 1/2 on an object that E says moves (E < 1/2). Both measure one motion, and
