@@ -100,10 +100,10 @@ template <typename Scalar>
   const SecondStageRule rule = second_stage_rule(keypoint, object_threshold);
   const bool unmatched = rule == SecondStageRule::unmatched_foreground || rule == SecondStageRule::unmatched_background;
   if (unmatched) return Scalar(0.5);
-  const Scalar towards_motion = Scalar(1) - 2 * second_stage_probability(keypoint, object_threshold);
-  Scalar surely = (std::max)(towards_motion, Scalar(0));
+  const Scalar k = second_stage_probability(keypoint, object_threshold), half(0.5);
+  Scalar surely = (std::max)(Scalar(1) - 2 * k, Scalar(0));
   for (int squared = 0; squared < 3; ++squared) surely *= surely;
-  return Scalar(0.5) * (Scalar(1) - towards_motion * (std::max)(clamp_probability(keypoint.visibility), surely));
+  return k + (half - k) * (Scalar(1) - (std::max)(clamp_probability(keypoint.visibility), surely));
 }
 
 /// K beside E of the same keypoint: at most 1/2 on an object that E says moves (E < 1/2). Both measure one motion, and
