@@ -28,7 +28,7 @@ struct PairArrays : RansacColumns<pair_rows> {
 
   PairScaling scaling;
   double factor = 0;           // 0: the points of an image coincide, nothing else is set
-  double extent = 1;           // of the previous image's own scale over the common one, which far mismatches stretch
+  double extent = 1;           // >= 1: the previous image's own scale over the common one, which far mismatches stretch
   double grid_sq = 0;          // squared pitch of the grid that all coordinates lie on, scaled; 0 without one
   double total_shared = 0;     // sum of the weights in the score
   std::vector<float> thinned;  // see thinned_columns
@@ -137,7 +137,7 @@ void load_pairs(const PointPairs<Scalar>& input, double cell_px, PairArrays& pai
   if (!pairs.scaling.valid()) return;
   pairs.size = 0;
   pairs.factor = std::sqrt(pairs.scaling.previous.factor * pairs.scaling.current.factor);
-  pairs.extent = pairs.scaling.previous.factor / pairs.factor;
+  pairs.extent = (std::max)(pairs.scaling.previous.factor / pairs.factor, 1.0);
   pairs.scaling.previous.factor = pairs.scaling.current.factor = pairs.factor;
   for_each_pair(input, [&](std::size_t i, const Vector2<double>& previous, const Vector2<double>& current, double w) {
     const Vector3<double> p = scaled(pairs.scaling.previous, previous), q = scaled(pairs.scaling.current, current);
