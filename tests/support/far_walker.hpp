@@ -9,6 +9,7 @@
 
 #include "cfp/core/random.hpp"
 #include "cfp/frame/static_probability.hpp"
+#include "support/moving_flow.hpp"
 
 namespace cfp_test {
 
@@ -29,15 +30,18 @@ struct FarWalkerOutcome {
 
 class FarWalker {
  public:
-  FarWalker(const FarWalkerOptions& options, std::uint64_t seed) : options_(options), random_(seed, "far walker") {
+  FarWalker(const FarWalkerOptions& options, std::uint64_t seed)
+      : options_(options),
+        stereo_{camera.fx, options.baseline_m, 1.414 * options.noise_px},
+        random_(seed, "far walker") {
     for (std::size_t i = 0; i < options.points; ++i)
       points_.push_back({{random_.uniform(-0.2, 0.2), random_.uniform(-0.8, 0.8), 0}, true, {}, -1, -1});
   }
 
   FarWalkerOutcome run(cfp::FrameOptions options) {
     options.tracker.image_width = width, options.tracker.image_height = height;
-    options.coarse.flow.motion.distance.depth_noise = {0, 1.414 * options_.noise_px / (focal * options_.baseline_m), 0};
-    cfp::StaticProbability<cfp::PinholeCamera<float>> probability({focal, focal, width / 2, height / 2}, options);
+    options.coarse.flow.motion.distance.depth_noise = stereo_.depth_noise();
+    cfp::StaticProbability<cfp::PinholeCamera<float>> probability(camera.cast<float>(), options);
     FarWalkerOutcome sums;
     double person = 0, later = 0, room = 0, frames = 0;
     cfp::Vector3<double> place(0.5, 0, options_.distance_m);
@@ -72,7 +76,8 @@ class FarWalker {
   }
 
  private:
-  static constexpr float width = 752, height = 480, focal = 460;
+  static constexpr double width = 752, height = 480;
+  static constexpr cfp::PinholeCamera<double> camera{460, 460, width / 2, height / 2};
 
   struct Point {
     cfp::Vector3<double> place;  // of the person: from his middle
@@ -92,20 +97,20 @@ class FarWalker {
     std::vector<Point> kept;
     for (Point point : points_) {
       const cfp::Vector3<double> x = point.on_person ? cfp::Vector3<double>(place + point.place) : point.place;
-      const double u = double(width) / 2 + double(focal) * x.x() / x.z(),
-                   v = double(height) / 2 + double(focal) * x.y() / x.z();
-      const bool seen = x.z() > 1 && u >= 0 && v >= 0 && u < double(width) && v < double(height);
+      cfp::Vector2<double> u(0, 0);
+      const bool seen =
+          x.z() > 1 && camera.project(x, u) && u.x() >= 0 && u.y() >= 0 && u.x() < width && u.y() < height;
       if (!seen && !point.on_person) continue;
       if (seen) {
-        const double right = random_.normal(), down = random_.normal(), disparity_noise = random_.normal();
-        const std::array<float, 2> pixel{float(u + options_.noise_px * right), float(v + options_.noise_px * down)};
-        const double disparity =
-            double(focal) * options_.baseline_m / x.z() + 1.414 * options_.noise_px * disparity_noise;
+        u += options_.noise_px * cfp::Vector2<double>{random_.normal(), random_.normal()};
+        const std::array<float, 2> pixel{float(u.x()), float(u.y())};
+        const double disparity_m = stereo_.focal_px * stereo_.baseline_m;
+        const double disparity = disparity_m / x.z() + stereo_.disparity_noise_px * random_.normal();
         if (point.index >= 0) from_.push_back(point.last), to_.push_back(pixel);
         match_.push_back(point.index), m_.push_back(point.m), seen_.push_back(kept.size());
         point.index = static_cast<std::int32_t>(pixels_.size()), point.last = pixel;
         pixels_.push_back(pixel);
-        depths_.push_back(disparity > 0 ? float(double(focal) * options_.baseline_m / disparity) : 0.0F);
+        depths_.push_back(disparity > 0 ? float(disparity_m / disparity) : 0.0F);
       } else {
         point.index = -1, point.m = -1;
       }
@@ -115,17 +120,16 @@ class FarWalker {
   }
 
   cfp::Detection<float> detect(const cfp::Vector3<double>& place) {
-    const double u = double(width) / 2 + double(focal) * place.x() / place.z(), v = double(height) / 2;
-    const double w = double(focal) * 0.5 / place.z(), h = double(focal) * 1.7 / place.z();
-    std::array<double, 4> off{};
-    for (double& x : off) x = 0.03 * random_.normal();
-    return {{float(u + (off[0] - 0.5) * w), float(v + (off[1] - 0.5) * h), float(u + (off[2] + 0.5) * w),
-             float(v + (off[3] + 0.5) * h)},
-            0,
-            1};
+    const double u = camera.cx + camera.fx * place.x() / place.z();
+    const double w = camera.fx * 0.5 / place.z(), h = camera.fy * 1.7 / place.z();
+    const auto side = [&](double middle, double half, double size) {
+      return float(middle + half * size + 0.03 * size * random_.normal());
+    };
+    return {{side(u, -0.5, w), side(camera.cy, -0.5, h), side(u, 0.5, w), side(camera.cy, 0.5, h)}, 0, 1};
   }
 
   FarWalkerOptions options_;
+  Stereo stereo_;
   cfp::Random random_;
   std::vector<Point> points_;
   std::vector<std::array<float, 2>> pixels_, from_, to_;

@@ -135,7 +135,7 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
   const bool posterior = options.map_point.weight == WeightRule::posterior;
   const Scalar threshold = static_cast<Scalar>(options.object_threshold);
   const Scalar seen_px = projection.status != Status::not_enough_data ? projection.threshold_px : epipolar.threshold_px;
-  const Scalar way_px_m =
+  const Scalar way_at_metre_px =
       undistorted_camera(camera).fx * static_cast<Scalar>(options.fine.least_speed_m_s * detail::elapsed_s(state));
   for (std::size_t i = 0; i < n; ++i) {
     if (state.box[i] == no_box) continue;
@@ -149,8 +149,8 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
     keypoint.foreground = state.label[i] == KeypointLabel::foreground;
     keypoint.matched = is_finite(scratch.points[i][0]) && is_finite(scratch.points[i][1]);
     keypoint.box_associated = state.boxes[b].associated;
-    if (way_px_m > Scalar(0) && is_valid_depth(scratch.depths[i]))
-      keypoint.visibility = detail::visibility_of(way_px_m / scratch.depths[i], seen_px);
+    if (way_at_metre_px > Scalar(0) && is_valid_depth(scratch.depths[i]))
+      keypoint.visibility = detail::visibility_of(way_at_metre_px / scratch.depths[i], seen_px);
     state.static_probability[i] =
         posterior ? second_stage_evidence(keypoint, threshold) : second_stage_probability(keypoint, threshold);
     ++state.report.constrained;

@@ -189,8 +189,8 @@ struct DegeneracyCheck {
 
   [[nodiscard]] Matrix3<T> no_motion() const noexcept { return scaled_homography(Matrix3<T>::Identity()); }
 
-  // What motion H stands for; K: intrinsics or null. `found` becomes no motion, or the rotation that fits best, where
-  // it explains nine tenths of the pairs that H does.
+  // What motion H stands for; K: intrinsics or null. `found`, which may be H, becomes no motion, or the rotation that
+  // fits best, where it explains nine tenths of the pairs that H does.
   [[nodiscard]] RansacStatus motion_of(const Matrix3<T>* K, Matrix3<T>& found) const noexcept {
     const auto takes = [&](const Matrix3<T>& other) {
       if (!other.allFinite() || !(explained_by(other) >= 0.9)) return false;
@@ -207,10 +207,7 @@ struct DegeneracyCheck {
   // The same of H refined, which becomes what was found.
   [[nodiscard]] RansacStatus classify(const Matrix3<T>* K) noexcept {
     refine_homography(exact_columns(pairs), transfer_noise_limit(), 5, H);
-    Matrix3<T> found = H;
-    const RansacStatus status = motion_of(K, found);
-    H = found;
-    return status;
+    return motion_of(K, H);
   }
 };
 

@@ -1,6 +1,6 @@
 /// @file fundamental_sampson_impl.hpp
-/// What fundamental_ransac.hpp computes of all its pairs at once under an F: score, Sampson distances, and the robust
-/// refinement on the seven parameters of F. Not an interface.
+/// What fundamental_ransac.hpp computes of all its pairs at once under an F: score, Sampson distances, the robust
+/// refinement on the seven parameters of F, and whether it stands out from chance. Not an interface.
 #pragma once
 
 #include <cmath>
