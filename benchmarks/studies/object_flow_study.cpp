@@ -6,9 +6,11 @@
 // its image to the pixel, so --depth spoils it as sensors do: of the frame before, shifted by 6 and 3 px, or what is
 // near widened by 6 px, as stereo matching does; or there is none, as with one camera. --masks gives the people's
 // pixels in the place of boxes, cut (below 0) or grown by so many px, as networks do.
-//   cfp_object_flow_study [--depth late|shifted|widened|none] [--masks PX] [--smoke | --frames N | TUM_FOLDER...]
+//   cfp_object_flow_study [--depth late|shifted|widened|none] [--masks PX]
+//                         [--smoke | --frames N | [--still] TUM_FOLDER...]
 // Instead of rendering it takes folders of cfp_synthetic; one without labels, with a detections.txt, gives times and
-// mean O alone (as "partly").
+// mean O alone (as "partly"). With --still nothing moves in the folders, and three boxes on what is there are people at
+// rest: what a real camera errs by (rolling shutter, lens, late depth) must not make them move.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -27,6 +29,7 @@
 #include "../../examples/detection/simple_detectors.hpp"
 #include "../../examples/support/sequence.hpp"
 #include "../../examples/synthetic/sequence.hpp"
+#include "cfp/core/random.hpp"
 #include "cfp/evaluation/calibration.hpp"
 #include "cfp/frame/begin_frame.hpp"
 #include "cfp/frame/estimate_objects.hpp"
@@ -278,6 +281,17 @@ cv::Mat spoiled(const cv::Mat& depth, const std::string& how, cv::Mat& last) {
   return out;
 }
 
+// Boxes as of people on what is there, which shake as a detector's.
+void add_still(const cv::Size& size, cfp::Random& random, Image& image) {
+  for (const double left : {0.1, 0.36, 0.67}) {
+    const double top = random.uniform(0.08, 0.22), width = 0.25;
+    const auto edge = [&](double share, int pixels) { return float(share * pixels + random.uniform(-2, 2)); };
+    image.people.push_back(
+        {{edge(left, size.width), edge(top, size.height), edge(left + width, size.width), edge(top + 0.7, size.height)},
+         0});
+  }
+}
+
 void finish(Image& image, const cv::Mat& bgr, cv::ORB& orb) {
   cv::cvtColor(bgr, image.gray, cv::COLOR_BGR2GRAY);
   orb.detect(image.gray, image.keypoints);
@@ -309,11 +323,13 @@ int main(int argc, char** argv) {
   std::string depth_is;
   std::optional<int> mask_px;
   int frames = 60;
-  bool smoke = false;
+  bool smoke = false, still = false;
   for (int i = 1; i < argc; ++i) {
     const std::string word = argv[i];
     if (word == "--smoke") {
       smoke = true;
+    } else if (word == "--still") {
+      still = true;
     } else if (word == "--depth" && i + 1 < argc) {
       depth_is = argv[++i];
       if (depth_is != "late" && depth_is != "shifted" && depth_is != "widened" && depth_is != "none") {
@@ -333,6 +349,7 @@ int main(int argc, char** argv) {
   std::vector<Candidate> all = candidates();
   std::vector<Image> images;
   cv::Mat last_depth;
+  cfp::Random random(1, "still");
   const auto add = [&](const cv::Mat& bgr, const cv::Mat& depth, double units_per_metre, const cv::Mat& labels,
                        const std::vector<cfp::Box<float>>& boxes) {
     Image image;
@@ -340,7 +357,9 @@ int main(int argc, char** argv) {
     if (images.empty()) last_depth.release();
     image.depth = spoiled(depth, depth_is, last_depth);
     image.metres_per_unit = 1 / units_per_metre;
-    if (mask_px && !labels.empty())
+    if (still)
+      add_still(bgr.size(), random, image);
+    else if (mask_px && !labels.empty())
       add_masks(labels, *mask_px, image);
     else
       for (const auto& box : boxes) image.people.push_back({box, moving_share(labels, box)});
@@ -359,7 +378,7 @@ int main(int argc, char** argv) {
       if (!frame.usable) continue;
       std::string note;
       const cv::Mat labels = sequence.load_labels(i, note);
-      if (labels.empty()) {
+      if (labels.empty() && !still) {
         if (!detections)
           detections = std::make_unique<cfp_examples::FileDetector>((sequence.folder() / "detections.txt").string(),
                                                                     cfp_examples::DetectorOptions{});

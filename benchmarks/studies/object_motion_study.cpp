@@ -2,19 +2,18 @@
 // positions and the foreground bring over the paper's epipolar distance. Prints, for 0 and 15 % wrong depths, per way
 // of scoring: AUC; moving people missed at 5 % false alarms, over all and in the worst cell from 0.5 m/s on; static
 // people called moving (O <= O_Th) at each noise; share of the frames in which O is known.
-// "pairs one by one" leaves out what they share, "shared, 5 pairs" and "60 pairs" are other ObjectProbabilityOptions::
-// shift_pairs, "strays counted" has a max_stray_share of 0.
-// Then the same in a bare room, whose motion says little of a person who is near; "motion taken as exact" leaves its
-// covariance out; "a host's motion" is the true one with errors of 3 mm and 1 mrad, and these as its sigmas, a "wrong"
-// one errs by five times as much as it says. Then with
-// 5, 15 and 30 % of the depths wrong by anything before furniture and walls, with
+// "pairs one by one" leaves out what they share, "shared, error 0.1 px" and "0.01 px" are other
+// ObjectProbabilityOptions:: shared_error_px, "strays counted" has a max_stray_share of 0. Then the same in a bare
+// room, whose motion says little of a person who is near; "motion taken as exact" leaves its covariance out; "a host's
+// motion" is the true one with errors of 3 mm and 1 mrad, and these as its sigmas, a "wrong" one errs by five times as
+// much as it says. Then with 5, 15 and 30 % of the depths wrong by anything before furniture and walls, with
 // CameraMotionOptions::nearest_share and shared_depth_ratio and without. Then with 10 to 14 points on the person, by
 // ObjectProbabilityOptions::min_pairs. Then how soon somebody who sways counts as moving, and how often somebody at
-// rest does whom a rolling shutter, a lens or a focal length that nobody told displaces, by shift_pairs. Then what the
-// motion of the frame before adds, by FlowModelOptions::camera_acceleration_m_s2, where the camera's velocity changes
-// (a hand: 0.6 m/s^2 in the truth of TUM's fr3_walking_xyz at 30 Hz). Then with one camera, no depths at all, in five
-// kinds of scene and at three frame rates: with the fundamental matrix alone, and with the motion up to scale where
-// there is none, or with a host's motion, which the flow refines.
+// rest does whom a rolling shutter, a lens or a focal length that nobody told displaces, by shared_error_px. Then what
+// the motion of the frame before adds, by FlowModelOptions::camera_acceleration_m_s2, where the camera's velocity
+// changes (a hand: 0.6 m/s^2 in the truth of TUM's fr3_walking_xyz at 30 Hz). Then with one camera, no depths at all,
+// in five kinds of scene and at three frame rates: with the fundamental matrix alone, and with the motion up to scale
+// where there is none, or with a host's motion, which the flow refines.
 //   cfp_object_motion_study [N per cell, default 20] [seed, default 1] | --smoke
 //
 // The simulator: 640 x 480 at 30 Hz, f = 535 px. Camera: still; sideways or forward 0.3 m/s; rotating 20 deg/s; both;
@@ -221,8 +220,8 @@ std::vector<Way> ways() {
   all[8].name = "depth, a host's motion as exact";
   all[9].name = "depth, a host's motion";
   all[10].name = "depth, pairs one by one";
-  all[11].name = "depth, shared, 5 pairs";
-  all[12].name = "depth, shared, 60 pairs";
+  all[11].name = "depth, shared, error 0.1 px";
+  all[12].name = "depth, shared, error 0.01 px";
   all[13].name = "depth, a host's wrong motion";
   all[14].name = "depth, strays counted";
   all[0].options.coarse.flow.use_motion_up_to_scale = false;
@@ -235,9 +234,9 @@ std::vector<Way> ways() {
   all[7].given = Given::pairs_as_exact;
   all[8].given = Given::prediction_as_exact;
   all[9].given = Given::prediction;
-  all[10].options.coarse.object.shift_pairs = 0;
-  all[11].options.coarse.object.shift_pairs = 5;
-  all[12].options.coarse.object.shift_pairs = 60;
+  all[10].options.coarse.object.shared_error_px = 0;
+  all[11].options.coarse.object.shared_error_px = 0.1;
+  all[12].options.coarse.object.shared_error_px = 0.01;
   all[13].given = Given::wrong_prediction;
   return all;
 }
@@ -413,10 +412,10 @@ void follow(const char* name, const cfp::FrameOptions& options, const Room& room
 }
 
 /// Share of the people who sway across at this speed and count as moving, over all cameras and noises.
-double called_moving(double speed, const Fault& fault, double shift_pairs, int repetitions, std::uint64_t seed) {
+double called_moving(double speed, const Fault& fault, double shared_error_px, int repetitions, std::uint64_t seed) {
   cfp::Random random(seed, "sway");
   cfp::FrameOptions options;
-  options.coarse.object.shift_pairs = shift_pairs;
+  options.coarse.object.shared_error_px = shared_error_px;
   cfp::FrameState<double> state;
   int moving = 0, all = 0;
   for (std::size_t c = 0; c < cameras.size(); ++c) {
@@ -458,12 +457,12 @@ void print_accelerated(const std::vector<Cell>& cells, int repetitions, std::uin
 }
 
 void print_shared(int repetitions, std::uint64_t seed) {
-  constexpr std::array<double, 5> pairs = {0, 5, 15, 30, 60};
-  std::printf("\na furnished room, 5 %% wrong depths: called moving (%%), by shift_pairs\n%-34s", "");
-  for (const double p : pairs) std::printf("%8.0f", p);
+  constexpr std::array<double, 6> errors_px = {0, 0.1, 0.06, 0.04, 0.03, 0.02};
+  std::printf("\na furnished room, 5 %% wrong depths: called moving (%%), by shared_error_px\n%-34s", "");
+  for (const double e : errors_px) std::printf("%8.2f", e);
   const auto row = [&](const char* name, double speed, const Fault& fault) {
     std::printf("\n%-34s", name);
-    for (const double p : pairs) std::printf("%8.1f", called_moving(speed, fault, p, repetitions, seed));
+    for (const double e : errors_px) std::printf("%8.1f", called_moving(speed, fault, e, repetitions, seed));
   };
   for (const Fault& fault : faults) row((std::string("at rest, fault: ") + fault.name).c_str(), 0, fault);
   for (const double speed : {0.02, 0.05, 0.1, 0.2, 0.5}) {

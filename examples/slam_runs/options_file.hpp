@@ -41,7 +41,7 @@ void for_each_option(Options& o, const Visit& visit) {
   visit("probability.coarse.flow.motion.max_sigma_px", p.coarse.flow.motion.max_sigma_px);
   visit("probability.coarse.object.noise_factor", p.coarse.object.noise_factor);
   visit("probability.coarse.object.max_stray_share", p.coarse.object.max_stray_share);
-  visit("probability.coarse.object.shift_pairs", p.coarse.object.shift_pairs);
+  visit("probability.coarse.object.shared_error_px", p.coarse.object.shared_error_px);
   visit("probability.fine.min_translation_m", p.fine.min_translation_m);
   visit("probability.fine.least_speed_m_s", p.fine.least_speed_m_s);
   visit("probability.fine.constraint.quantile", p.fine.constraint.quantile);

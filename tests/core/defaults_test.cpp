@@ -45,7 +45,7 @@ TEST_CASE("The defaults of the flow and of objects", "[core]") {
   CHECK((flow.motion.shared_depth_ratio == 0.12 && flow.motion.nearest_share == 0.2));
   CHECK((o.object.score == cfp::ObjectScore::survival && o.object.degrees_of_freedom == 2));
   CHECK((o.object.sigma_px == 1 && o.object.noise_factor == 5.8 && o.object.min_pairs == 8));
-  CHECK((o.object.max_stray_share == 0.4 && o.object.shift_pairs == 15));
+  CHECK((o.object.max_stray_share == 0.4 && o.object.shared_error_px == 0.02));
   CHECK((o.object.positions == std::array<double, 3>{0.2, 0.3, 0.4}));
   CHECK(o.object.unknown_object_probability == 0.5);
   CHECK((o.memory.time_constant_s == 0.2 && o.memory.evidence_limit == 3));

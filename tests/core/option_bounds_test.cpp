@@ -119,7 +119,7 @@ TEST_CASE("The ends of the ranges of a frame's options", "[core]") {
       CFP_FIELD(O, coarse.memory.time_constant_s, not_negative),
       CFP_FIELD(O, coarse.memory.evidence_limit, (Range{0, false, 100, true})),
       CFP_FIELD(O, coarse.object.max_stray_share, below_one),
-      CFP_FIELD(O, coarse.object.shift_pairs, not_negative),
+      CFP_FIELD(O, coarse.object.shared_error_px, not_negative),
       CFP_FIELD(O, coarse.object.unknown_object_probability, share),
       CFP_FIELD(O, coarse.foreground.adaptive.noise.constant_m, not_negative),
       CFP_FIELD(O, coarse.foreground.adaptive.noise_factor, not_negative),

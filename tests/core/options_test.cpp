@@ -85,7 +85,7 @@ TEST_CASE("Every option of a frame is refused by its full, unique name", "[core]
       {"coarse.object.sigma_px", [&](auto& o) { o.coarse.object.sigma_px = nan; }},
       {"coarse.object.noise_factor", [&](auto& o) { o.coarse.object.noise_factor = nan; }},
       {"coarse.object.max_stray_share", [&](auto& o) { o.coarse.object.max_stray_share = nan; }},
-      {"coarse.object.shift_pairs", [&](auto& o) { o.coarse.object.shift_pairs = nan; }},
+      {"coarse.object.shared_error_px", [&](auto& o) { o.coarse.object.shared_error_px = nan; }},
       {"coarse.memory.time_constant_s", [&](auto& o) { o.coarse.memory.time_constant_s = nan; }},
       {"coarse.memory.evidence_limit", [&](auto& o) { o.coarse.memory.evidence_limit = nan; }},
       {"coarse.object.positions", [&](auto& o) { o.coarse.object.positions[1] = nan; }},

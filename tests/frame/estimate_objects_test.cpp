@@ -73,8 +73,8 @@ TEST_CASE("A motion that a host calls exact is not believed to a tenth of a pixe
   for (const std::uint64_t seed : {61U, 62U, 63U}) {
     const DynamicScene<double> scene = make_dynamic_scene<double>(standing, seed);
     cfp::FrameOptions options;
-    const auto judged = [&](double shift_pairs) {
-      options.coarse.object.shift_pairs = shift_pairs;
+    const auto judged = [&](double shared_error_px) {
+      options.coarse.object.shared_error_px = shared_error_px;
       FrameRun<double> run(scene);
       cfp::Frame<double> frame = run.frame();
       frame.flow.previous_depths = scene.previous_depths;
@@ -82,8 +82,8 @@ TEST_CASE("A motion that a host calls exact is not believed to a tenth of a pixe
       run.coarse(options, frame, scene.camera);
       return run.state.objects[0].static_probability;
     };
-    CHECK(judged(15) == judged(0));
-    CHECK(judged(15) > options.object_threshold);
+    CHECK(judged(0.02) == judged(0));
+    CHECK(judged(0.02) > options.object_threshold);
   }
 }
 
@@ -400,9 +400,9 @@ int called_moving(const char* name, bool with_depths, const Fill& fill, const cf
 }  // namespace
 
 TEST_CASE("Who moves by no more than the flow's noise moves by what the pairs share", "[frame]") {
-  const auto called = [](double person_motion_m, double shift_pairs) {
+  const auto called = [](double person_motion_m, double shared_error_px) {
     cfp::FrameOptions options;
-    options.coarse.object.shift_pairs = shift_pairs;
+    options.coarse.object.shared_error_px = shared_error_px;
     return called_moving(
         "together", true,
         [&](DynamicScene<double>& scene, cfp::Random& random) {
@@ -415,9 +415,29 @@ TEST_CASE("Who moves by no more than the flow's noise moves by what the pairs sh
         },
         options);
   };
-  CHECK(called(0, 15) <= 4);
+  CHECK(called(0, 0.02) <= 4);
   CHECK(called(0.0025, 0) <= 35);  // 0.7 px
-  CHECK(called(0.0025, 15) >= 92);
+  CHECK(called(0.0025, 0.02) >= 92);
+}
+
+TEST_CASE("Where the image errs by more than its noise nobody who stands moves for it", "[frame]") {
+  const auto called = [](double error_px, double person_motion_m) {
+    return called_moving("waves", true, [&](DynamicScene<double>& scene, cfp::Random& random) {
+      scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.005, 0.002, 0.004, 0.001, -0.002, 0.001));
+      const double phase = random.uniform(0, 6.28), length_px = random.uniform(90, 160);
+      const auto add = [&](double x, double y, double z, double shift) {
+        add_pair(scene, {x, y}, z, shift, 0.2, random);
+        scene.keypoints.back()[0] += error_px * std::sin(x / length_px + phase);
+        scene.keypoints.back()[1] += error_px * std::sin(y / length_px + 2 * phase);
+      };
+      for (int k = 0; k < 300; ++k) add(random.uniform(20, 620), random.uniform(20, 460), random.uniform(2.5, 5), 0);
+      for (int k = 0; k < 60; ++k)
+        add(random.uniform(270, 370), random.uniform(120, 420), random.uniform(1.95, 2.05), person_motion_m);
+    });
+  };
+  CHECK(called(0, 0) <= 4);
+  CHECK(called(0.6, 0) <= 10);
+  CHECK(called(0.6, 0.03) >= 95);
 }
 
 TEST_CASE("The motion that a far, bare wall gives does not make a near person at rest move", "[frame]") {

@@ -1,6 +1,7 @@
 #include "cfp/frame/flow_model.hpp"
 
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include <Eigen/Cholesky>
@@ -92,6 +93,58 @@ TEST_CASE("Before a wall the motion is known up to scale, and how well", "[frame
   }
   CHECK(nees > 4);
   CHECK(nees < 9);
+}
+
+TEST_CASE("What neighbours err by together is measured, and the motion is as uncertain as it makes it", "[frame]") {
+  constexpr double noise = 0.2, columns = 5, rows = 4;
+  constexpr int seeds = 60;
+  for (const double shared : {0.0, 0.1, 0.3}) {
+    CAPTURE(shared);
+    double measured = 0, nees = 0, nees_if_alone = 0;
+    for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+      cfp::Random random(seed, "shared error");
+      const cfp::SE3<double> T = motion(0.02, 0.02);
+      Room room(T, noise, seed);
+      std::array<cfp::Vector2<double>, static_cast<std::size_t>(columns * rows)> of_part;
+      for (cfp::Vector2<double>& error : of_part) {
+        error.x() = shared * random.normal();
+        error.y() = shared * random.normal();
+      }
+      std::vector<double> depths;
+      for (std::size_t i = 0; i < room.previous.size(); ++i) {
+        cfp::Vector3<double> ray;
+        cfp::Vector2<double> q;
+        REQUIRE(room.camera.unproject({room.previous[i][0], room.previous[i][1]}, ray));
+        depths.push_back(random.uniform(1.5, 4));
+        REQUIRE(room.camera.project(T * cfp::Vector3<double>(depths[i] * ray), q));
+        const double part =
+            std::floor(room.previous[i][0] / 640 * columns) + columns * std::floor(room.previous[i][1] / 480 * rows);
+        q += of_part[static_cast<std::size_t>(part)];
+        room.current[i] = {q.x() + noise * random.normal(), q.y() + noise * random.normal()};
+      }
+      cfp::FlowModelWorkspace<double> workspace;
+      cfp::FlowModelOptions options;
+      options.motion.shared_depth_ratio = 0;
+      options.motion.distance.depth_noise = {0, 0, 0};
+      const auto model = cfp::estimate_flow_model<double>({room.previous, room.current, depths}, room.outside,
+                                                          room.camera, options, workspace);
+      REQUIRE(model.kind == cfp::FlowModelKind::motion);
+      measured += model.shared_error_px / seeds;
+      const cfp::CameraMotion<double> alone = cfp::estimate_camera_motion<double>(
+          {room.previous, room.current, depths}, room.outside, {}, room.camera, options.motion, workspace.motion);
+      const auto squared_error = [&](const cfp::UncertainMotion<double>& found) {
+        const cfp::Vector6<double> error = cfp::se3_log(T * found.T_cur_prev.inverse());
+        const Eigen::Matrix<double, 6, 6> covariance = found.covariance;
+        return error.dot(covariance.llt().solve(error));
+      };
+      nees += squared_error(model.motion) / seeds;
+      nees_if_alone += squared_error(alone) / seeds;
+    }
+    CHECK(measured < shared + 0.05);
+    CHECK(measured > 0.2 * shared);
+    CHECK(nees < 16);  // 6, if all were known
+    if (shared > 0.2) CHECK(nees_if_alone > 40);
+  }
 }
 
 TEST_CASE("Depths that are too few for a motion do not enter one without scale", "[frame]") {

@@ -78,7 +78,7 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
                        &object.sigma_px,
                        &object.noise_factor,
                        &object.max_stray_share,
-                       &object.shift_pairs,
+                       &object.shared_error_px,
                        &object.unknown_object_probability,
                        &fine.min_pose_inliers,
                        &fine.min_translation_m,

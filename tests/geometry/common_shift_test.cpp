@@ -15,7 +15,7 @@ namespace {
 using V3 = cfp::Vector3<double>;
 
 const cfp::PinholeCamera<double> pinhole{535.4, 539.2, 320.1, 247.6};
-constexpr double sigma_px = 0.3, every_pair = 1e9;
+constexpr double sigma_px = 0.3;
 
 /// Points of somebody about 2 m away, seen before and after.
 struct Object {
@@ -23,10 +23,10 @@ struct Object {
   std::vector<double> depths;
   std::vector<std::int32_t> members;
 
-  [[nodiscard]] double shift(const cfp::UncertainMotion<double>& motion, double most_pairs = every_pair) const {
+  [[nodiscard]] double shift(const cfp::UncertainMotion<double>& motion, double shared_error_px = 0) const {
     return cfp::common_shift(cfp::PointSpan<double, 2>(previous), cfp::span<const double>(depths),
                              cfp::PointSpan<double, 2>(current), cfp::span<const std::int32_t>(members), motion,
-                             pinhole, sigma_px, cfp::MotionDistanceOptions(), most_pairs);
+                             pinhole, sigma_px, cfp::MotionDistanceOptions(), shared_error_px);
   }
 };
 
@@ -111,13 +111,14 @@ TEST_CASE("A quarter of mismatches neither makes nor hides a common shift", "[ge
   CHECK(moving >= 196);
 }
 
-TEST_CASE("Pairs count as so many independent ones at most", "[geometry][common_shift]") {
+TEST_CASE("What neighbours err by together no number of pairs makes smaller", "[geometry][common_shift]") {
   cfp::Random random(5, "most");
   const cfp::UncertainMotion<double> motion(drawn_motion(random));
   const Object object = make_object(motion.T_cur_prev, V3(0.002, 0, 0), 60, random);
-  const double all = object.shift(motion), fifteen = object.shift(motion, 15), five = object.shift(motion, 5);
-  CHECK(all > 3 * fifteen);
-  CHECK_THAT(fifteen, WithinAbs(3 * five, 1e-2 * fifteen));  // an exact motion: in proportion
+  const double all = object.shift(motion), a_quarter = object.shift(motion, 0.25 * sigma_px),
+               half = object.shift(motion, 0.5 * sigma_px);
+  CHECK(all > 3 * a_quarter);
+  CHECK_THAT(a_quarter, WithinAbs(16.0 / 4.75 * half, 0.03 * a_quarter));  // 60 pairs as 60/4.75 and 60/16, some less
 }
 
 TEST_CASE("A common shift of nothing is none, and never NaN", "[geometry][common_shift]") {
@@ -169,7 +170,7 @@ TEST_CASE("The common shift allocates nothing, and float sees what double sees",
   const double shift =
       cfp::common_shift(cfp::PointSpan<float, 2>(previous), cfp::span<const float>(depths),
                         cfp::PointSpan<float, 2>(current), cfp::span<const std::int32_t>(object.members),
-                        motion.cast<float>(), pinhole.cast<float>(), 0.3F, cfp::MotionDistanceOptions(), 15);
+                        motion.cast<float>(), pinhole.cast<float>(), 0.3F, cfp::MotionDistanceOptions(), 0.05);
   CHECK(cfp_test::allocation_count() == before);
-  CHECK_THAT(shift, WithinAbs(object.shift(motion, 15), 0.02 * shift));
+  CHECK_THAT(shift, WithinAbs(object.shift(motion, 0.05), 0.02 * shift));
 }

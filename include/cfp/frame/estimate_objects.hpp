@@ -116,8 +116,8 @@ void score_objects(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow
     object = object_probability(scratch.samples, scored, scratch.values);
     if (object.status != Status::ok) continue;
     --state.report.unknown_objects;
-    if (!(scored.shift_pairs > 0)) continue;
-    const double shift = flow_shift(model, flow, scratch.members, camera, coarse.flow, scored.shift_pairs);
+    if (!(scored.shared_error_px > 0)) continue;
+    const double shift = flow_shift(model, flow, scratch.members, camera, coarse.flow, scored.shared_error_px);
     object.static_probability = (std::min)(object.static_probability, shift_probability(shift));
   }
 }
@@ -154,6 +154,7 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   report.flow_support = model.support == FlowSupport::outside_pairs ? support : model.support;
   report.flow_status = model.status;
   report.flow_sigma_px = static_cast<double>(model.sigma_px);
+  report.flow_shared_px = model.shared_error_px;
   report.flow_coordinates = model.coordinates;
   if (model.kind == FlowModelKind::none) return;
 

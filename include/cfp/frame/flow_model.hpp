@@ -9,6 +9,7 @@
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/frame/camera_motion.hpp"
+#include "cfp/frame/shared_error_impl.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/common_shift.hpp"
 #include "cfp/geometry/epipolar.hpp"
@@ -30,8 +31,7 @@ struct FlowModelOptions {
   /// How much nearer than the room an object is taken to be then: the room's depth over the object's, a ratio without
   /// unit. The default covers what is up to five times nearer.
   UnknownDepth nearer_than_room{2.5, 1};
-  /// true: where enough pairs have a depth, they are judged by the camera's motion and their depths. false: as the
-  /// paper.
+  /// Where enough pairs have a depth, they are judged by it and the camera's motion. false: as the paper.
   bool use_depth = true;
   /// Then the motion of the frame before tells of this one, where the host does not: the standard deviation of each
   /// coordinate of the camera's acceleration, m/s^2, >= 0; 0: it tells nothing. Not in the paper.
@@ -64,6 +64,7 @@ struct FlowModel {
   UncertainMotion<Scalar> motion;
   Scalar sigma_px = Scalar(0);  ///< noise of one coordinate, measured on the pairs on no object; 0: not measured
   int coordinates = 2;          ///< of a pixel that most distances see: 1 across lines
+  double shared_error_px = 0;   ///< what neighbours err by together beside it; the motion's covariance counts it
 
   CFP_INLINE FlowModel() noexcept {}  // NOLINT(modernize-use-equals-default): inline
 };
@@ -77,15 +78,6 @@ struct FlowModelWorkspace {
 };
 
 namespace detail {
-
-/// How a flow pair stands to the object of a box.
-enum class PairLabel : std::uint8_t {
-  outside,     // not in its box
-  foreground,  // on the object
-  background,  // behind it
-  undecided    // where box, mask or depth end: it may be on the object
-};
-
 inline namespace CFP_ISA {
 
 template <typename Scalar>
@@ -105,14 +97,21 @@ template <typename Scalar>
   return model;
 }
 
-/// The camera's motion as a model of the given kind; none where it is not known.
+/// The camera's motion as a model of the given kind; none where it is not known. Guessed depths tell no shared error.
 template <typename Scalar>
 FlowModel<Scalar> estimate_motion_model(FlowModelKind kind, const FlowPairs<Scalar>& flow, span<const char> outside,
                                         const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
                                         FlowModelWorkspace<Scalar>& workspace) {
   const CameraMotion<Scalar> motion =
       estimate_camera_motion(flow, outside, SE3<double>(), camera, options.motion, workspace.motion);
-  return motion.known ? model_of(kind, FlowSupport::outside_pairs, motion) : FlowModel<Scalar>();
+  if (!motion.known) return {};
+  FlowModel<Scalar> model = model_of(kind, FlowSupport::outside_pairs, motion);
+  if (kind != FlowModelKind::motion) return model;
+  const SharedError shared =
+      shared_error(flow, workspace.motion.points, motion.T_cur_prev, camera, motion.sigma_px, options.motion.distance);
+  model.motion.covariance *= static_cast<Scalar>(shared.variance_factor);
+  model.shared_error_px = shared.error_px;
+  return model;
 }
 
 /// Measures the noise of the pairs marked in `outside` under the model, if enough of them have a distance.
@@ -186,10 +185,11 @@ void flow_distances(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flo
 template <typename Scalar>
 [[nodiscard]] double flow_shift(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow,
                                 span<const std::int32_t> members, const PinholeCamera<Scalar>& camera,
-                                const FlowModelOptions& options, double most_pairs) noexcept {
+                                const FlowModelOptions& options, double shared_error_px) noexcept {
   if (model.kind != FlowModelKind::motion || model.motion.covariance.isZero(0)) return 0;
   return common_shift(flow.previous, flow.previous_depths, flow.current, members, model.motion, camera,
-                      detail::noise_of(model, options), options.motion.distance, most_pairs);
+                      detail::noise_of(model, options), options.motion.distance,
+                      (std::max)(shared_error_px, model.shared_error_px));
 }
 
 /// What the pairs of the undistorted image are judged by, from those that `outside` marks as on no object: the

@@ -42,9 +42,10 @@ struct FrameReport {
   FlowModelKind flow_model = FlowModelKind::none;            ///< what the flow pairs were judged by,
   FlowSupport flow_support = FlowSupport::none;              ///< what that rests on,
   RansacStatus flow_status = RansacStatus::not_enough_data;  ///< and how its estimation ended
-  bool motion_refused = false;      ///< T_cur_prev: not finite, no covariance, or the flow contradicts it
-  double flow_sigma_px = 0;         ///< noise of the flow as measured; 0: not
-  int flow_coordinates = 2;         ///< of a pixel that most of its distances see: 1 across lines
+  bool motion_refused = false;  ///< T_cur_prev: not finite, no covariance, or the flow contradicts it
+  double flow_sigma_px = 0;     ///< noise of the flow as measured; 0: not
+  double flow_shared_px = 0;    ///< what neighbours err by together beside it: shutter, lens, late depth; 0: not known
+  int flow_coordinates = 2;     ///< of a pixel that most of its distances see: 1 across lines
   std::size_t unknown_objects = 0;  ///< boxes whose O is not known
   // keypoints
   std::size_t outside = 0, foreground = 0, background = 0, invalid = 0;  ///< by label
@@ -86,6 +87,18 @@ struct FrameMemory {
     return {descriptors.data(), descriptors.empty() ? 0 : keypoints.size(), descriptor_bytes, descriptor_bytes};
   }
 };
+
+namespace detail {
+
+/// How a flow pair stands to the object of a box.
+enum class PairLabel : std::uint8_t {
+  outside,     // not in its box
+  foreground,  // on the object
+  background,  // behind it
+  undecided    // where box, mask or depth end: it may be on the object
+};
+
+}  // namespace detail
 
 /// Scratch memory of the steps.
 template <typename Scalar>

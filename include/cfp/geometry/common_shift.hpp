@@ -22,17 +22,19 @@ inline namespace CFP_ISA {
 ///
 /// so that what the motion's error explains is no evidence, however many the pairs. A robust fit: mismatches take no
 /// part, and of a shift far beyond the noise little is left, which the pairs' distances tell. Neighbours share errors
-/// that are no noise (rolling shutter, lens, focal length): pairs count as `most_pairs` independent ones at most, > 0.
-/// Pairs without a depth take no part; 0 where nothing can be fitted. sigma_px > 0. O(members), allocates nothing.
+/// that are no noise (rolling shutter, lens, focal length), of about `shared_error_px` >= 0, which no number of pairs
+/// makes smaller: n pairs count as n / (1 + n (shared_error_px / sigma_px)^2) independent ones. Pairs without a depth
+/// take no part; 0 where nothing can be fitted. sigma_px > 0. O(members), allocates nothing.
 template <typename Camera, typename Scalar = typename Camera::ScalarType>
 [[nodiscard]] double common_shift(const PointSpan<non_deduced<Scalar>, 2>& prev,
                                   span<const non_deduced<Scalar>> depths_prev,
                                   const PointSpan<non_deduced<Scalar>, 2>& cur, span<const std::int32_t> members,
                                   const UncertainMotion<non_deduced<Scalar>>& motion, const Camera& camera,
                                   non_deduced<Scalar> sigma_px, const MotionDistanceOptions& options,
-                                  double most_pairs) noexcept {
+                                  double shared_error_px) noexcept {
   CFP_ASSERT(cur.size() == prev.size() && detail::fits(prev.size(), depths_prev));
   constexpr int passes = 2;
+  const double shared = shared_error_px / static_cast<double>(sigma_px);
   // A micrometre and a microradian of error are none, and give every covariance an inverse.
   Matrix6<double> covariance = motion.template cast<double>().covariance, information, inverse;
   for (int k = 0; k < 6; ++k) covariance(k, k) += 1e-12;
@@ -51,7 +53,7 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
           detail::expected_residual<Camera, Scalar>(prev[i], depth, cur[i], motion.T_cur_prev, camera, options, pair))
         count += detail::add_pair(pair, static_cast<double>(sigma_px), moved, sums).weight;
     }
-    const double share = count > most_pairs ? most_pairs / count : 1;
+    const double share = 1 / (1 + count * shared * shared);
     const Vector6<double> g = -share * sums.g;
     const Matrix6<double> H = share * Matrix6<double>(sums.H.template selfadjointView<Eigen::Upper>());
     if (!invert_normal_equations<6>(Matrix6<double>(H + information), 1e-14, inverse)) return 0;

@@ -44,9 +44,9 @@ struct ObjectProbabilityOptions {
   /// large a share as scores below 1/2 of the pairs on no object, at most this, in [0, 1). 0: none is passed over, as
   /// printed (cfp_object_motion_study).
   double max_stray_share = 0.4;
-  /// Where depths are known, what the pairs share is judged, too (common_shift): they count as so many independent ones
-  /// at most, lest errors that neighbours share look like motion; >= 0. 0: the pairs are judged one by one.
-  double shift_pairs = 15;
+  /// Where depths are known, what the pairs share is judged, too (common_shift), beside the error of the image that
+  /// neighbours share, lest it look like motion; >= 0. 0: the pairs are judged one by one, as printed.
+  double shared_error_px = 0.02;
   /// Fewer usable pairs than this, and O is unknown (>= 1; benchmarks/studies/object_motion_study).
   std::size_t min_pairs = 8;
   /// What an unknown object counts as, in [0, 1]. Below O_Th: an object is dynamic until it is shown to be static.
@@ -79,7 +79,7 @@ inline namespace CFP_ISA {
   if (!detail::positive(o.sigma_px)) return "sigma_px";
   if (!detail::non_negative(o.noise_factor)) return "noise_factor";
   if (!(o.max_stray_share >= 0 && o.max_stray_share < 1)) return "max_stray_share";
-  if (!detail::non_negative(o.shift_pairs)) return "shift_pairs";
+  if (!detail::non_negative(o.shared_error_px)) return "shared_error_px";
   if (!(o.positions[0] > 0 && o.positions[0] <= o.positions[1] && o.positions[1] <= o.positions[2] &&
         o.positions[2] <= 1))
     return "positions";
