@@ -53,6 +53,7 @@
 #include "cfp/geometry/distance.hpp"
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/fundamental.hpp"
+#include "cfp/geometry/image_motion.hpp"
 #include "cfp/geometry/motion_distance.hpp"
 #include "cfp/geometry/p3p.hpp"
 #include "cfp/geometry/point_pairs.hpp"

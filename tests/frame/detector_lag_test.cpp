@@ -54,7 +54,7 @@ struct Street {
     cfp::TrackedBox<float> box;
     box.box = {left, 100, left + 100, 400};
     box.rate_x = turns ? 0 : step * 30;
-    if (turns) frame.image_motion = motion_that_moves({left + 50, 250}, step);
+    if (turns) state.image_motion = motion_that_moves({left + 50, 250}, step);
     box.detection = seen ? 0 : -1;
     box.age = settled ? k : 4;
     state.boxes = {box};
@@ -122,8 +122,8 @@ TEST_CASE("Frames without depths, without a motion or with hostile numbers count
   street.state.flow_depths.clear();
   CHECK(street.after(100) == 0);
   street.state.flow_depths = street.depths;
-  street.frame.image_motion = cfp::Matrix3<float>::Constant(std::numeric_limits<float>::quiet_NaN());
+  street.state.image_motion = cfp::Matrix3<float>::Constant(std::numeric_limits<float>::quiet_NaN());
   CHECK(street.after(100) == 0);
-  street.frame.image_motion.reset();
+  street.state.image_motion.reset();
   CHECK(street.after(60) > 0);
 }

@@ -1,5 +1,6 @@
 #include "cfp/frame/track_boxes.hpp"
 
+#include <array>
 #include <limits>
 #include <vector>
 
@@ -17,14 +18,29 @@ struct Camera {
     frame.timestamp_s = time;
     if (detections) frame.detections = *detections;
     frame.image_motion = motion;
+    frame.flow = {cfp::PointSpan<double, 2>(flow_from), cfp::PointSpan<double, 2>(flow_to)};
     cfp::begin_frame(frame, state);
     cfp::track_boxes(frame, options, tracker, state);
     return state;
   }
 
+  /// The flow of the next frames: the room goes by (x, y), what is in `inside` by (in_x, in_y).
+  void flow(double x, double y, const cfp::Box<double>& inside = {}, double in_x = 0, double in_y = 0) {
+    flow_from.clear();
+    flow_to.clear();
+    for (double u = 5; u < 640; u += 15) {
+      for (double v = 5; v < 480; v += 15) {
+        const bool in = cfp::contains(inside, u, v);
+        flow_from.push_back({u, v});
+        flow_to.push_back({u + (in ? in_x : x), v + (in ? in_y : y)});
+      }
+    }
+  }
+
   cfp::FrameOptions options;
   cfp::BoxTracker<double> tracker;
   cfp::FrameState<double> state;
+  std::vector<std::array<double, 2>> flow_from, flow_to;
 };
 
 const std::vector<cfp::Detection<double>> person = {{{100, 100, 200, 400}, 0, 0.9}};
@@ -107,6 +123,58 @@ TEST_CASE("The image motion moves a compensated box", "[frame]") {
   REQUIRE(still.state.boxes.size() == 1);
   REQUIRE(turning.state.boxes.size() == 1);
   CHECK_THAT(turning.state.boxes[0].box.x1 - still.state.boxes[0].box.x1, WithinAbs(25, 1e-6));
+}
+
+TEST_CASE("Without a motion of the host the flow outside of the boxes moves a compensated one", "[frame]") {
+  const auto left_after = [](std::optional<cfp::Matrix3<double>> motion, const auto& prepare) {
+    Camera camera;
+    camera.see(0, person);
+    camera.see(0.03, person);
+    prepare(camera);
+    camera.see(0.06, nothing, motion);
+    REQUIRE(camera.state.boxes.size() == 1);
+    return camera.state.boxes[0].box.x1;
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto shaken = [](Camera& camera) { camera.flow(25, -10); };
+  const double still = left_after({}, [](Camera&) {});
+  CHECK_THAT(left_after({}, shaken) - still, WithinAbs(25, 1e-2));
+  // Who is in the box of the frame before does not count, however many of the pairs he has.
+  const cfp::Box<double> body{100, 100, 200, 400};
+  const auto walks = [&](Camera& camera) { camera.flow(0, 0, body, 30, 0); };
+  CHECK(left_after({}, walks) == still);
+  const auto shaken_and_walks = [&](Camera& camera) { camera.flow(25, 0, body, -70, 0); };
+  CHECK_THAT(left_after({}, shaken_and_walks) - still, WithinAbs(25, 1e-2));
+  // The host's motion comes first, the identity of one that wants none, too.
+  cfp::Matrix3<double> shift = cfp::Matrix3<double>::Identity();
+  CHECK_THAT(left_after(shift, shaken) - still, WithinAbs(0, 1e-6));
+  shift(0, 2) = 7;
+  CHECK_THAT(left_after(shift, shaken) - still, WithinAbs(7, 1e-6));
+  // Pairs that are no numbers or far away are left out.
+  const auto hostile = [&](Camera& camera) {
+    camera.flow(25, 0);
+    for (std::size_t i = 0; i < camera.flow_from.size(); i += 5)
+      (i % 4 < 2 ? camera.flow_from : camera.flow_to)[i][i % 3 % 2] = i % 8 < 4 ? nan : 1e300;
+  };
+  CHECK_THAT(left_after({}, hostile) - still, WithinAbs(25, 1e-2));
+  const auto lost = [&](Camera& camera) {
+    camera.flow(25, 0);
+    for (auto& pixel : camera.flow_to) pixel = {nan, nan};
+  };
+  CHECK(left_after({}, lost) == still);
+}
+
+TEST_CASE("The state tells what moved the boxes", "[frame]") {
+  Camera camera;
+  camera.flow(25, 0);
+  CHECK_FALSE(camera.see(0, person).image_motion.has_value());  // there was nothing to move
+  REQUIRE(camera.see(0.03, person).image_motion.has_value());
+  CHECK_THAT((*camera.state.image_motion)(0, 2), WithinAbs(25, 1e-2));
+  CHECK(camera.state.previous_boxes.size() == 1);
+  camera.flow(0, 0);
+  CHECK_FALSE(camera.see(0.06, person).image_motion.has_value());
+  const cfp::Matrix3<double> shift = cfp::Matrix3<double>::Identity();
+  CHECK(*camera.see(0.09, person, shift).image_motion == shift);
 }
 
 TEST_CASE("Boxes of classes that cannot move, and all boxes when they are off, are ignored", "[frame]") {

@@ -22,7 +22,7 @@ struct Detection {
 template <typename Scalar>
 struct TrackedBox {
   Box<Scalar> box;            ///< as detected, or as predicted and clipped to the image when compensated
-  Scalar rate_x{}, rate_y{};  ///< of its centre, px/s, without the image motion that the caller handed over
+  Scalar rate_x{}, rate_y{};  ///< of its centre, px/s, without the image motion
   int class_id = 0;
   Scalar score{};       ///< of the last detection
   std::int64_t id = 0;  ///< 1, 2, 3, ...; never used twice between resets

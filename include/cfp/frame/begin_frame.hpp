@@ -30,12 +30,14 @@ void copy_frame(const Frame<Scalar>& frame, const FrameMemory<Scalar>& previous,
     std::copy_n(frame.descriptors.row(i), bytes, current.descriptors.data() + i * bytes);
 }
 
-/// A box may hold all that the frame has.
+/// A box may hold all that the frame has, or none of it.
 template <typename Scalar>
 void reserve_scratch(std::size_t most, FrameScratch<Scalar>& scratch) {
   scratch.members.reserve(most);
   scratch.mask.reserve(most);
   scratch.points.reserve(most);
+  scratch.undistorted_previous.reserve(most);
+  scratch.undistorted_current.reserve(most);
   scratch.depths.reserve(most);
   scratch.samples.reserve(most);
   scratch.values.reserve(most);
@@ -72,6 +74,7 @@ void begin_frame(const Frame<Scalar>& frame, FrameState<Scalar>& state) {
   }
   state.weight = state.static_probability;
   detail::reserve_scratch((std::max)(n, frame.flow.current.size()), state.scratch);
+  std::swap(state.previous_boxes, state.boxes);
   state.boxes.clear();
   state.objects.clear();
   FrameReport report;

@@ -57,7 +57,7 @@ class DetectorLag {
         state.report.flow_model == FlowModelKind::motion && state.flow_distances.size() == state.flow_depths.size();
     for (std::size_t b = 0; judged && b < state.boxes.size(); ++b) {
       const TrackedBox<Scalar>& box = state.boxes[b];
-      const Vector2<Scalar> rate = image_rate(box, frame, static_cast<Scalar>(dt));
+      const Vector2<Scalar> rate = image_rate(box, state, static_cast<Scalar>(dt));
       const bool moves = rate.norm() > static_cast<Scalar>(options_.min_rate) * box.box.width();
       if (box.compensated() || box.age < settled_age || !moves || is_cut(box.box)) continue;
       for (std::size_t i = 0; i < lags; ++i)
@@ -84,12 +84,12 @@ class DetectorLag {
   }
 
   // Of the box's centre, px/s: its own and the image's.
-  [[nodiscard]] static Vector2<Scalar> image_rate(const TrackedBox<Scalar>& box, const Frame<Scalar>& frame,
+  [[nodiscard]] static Vector2<Scalar> image_rate(const TrackedBox<Scalar>& box, const FrameState<Scalar>& state,
                                                   Scalar dt_s) noexcept {
     Vector2<Scalar> own(box.rate_x, box.rate_y);
-    if (!frame.image_motion || !(dt_s > Scalar(0))) return own;
+    if (!state.image_motion || !(dt_s > Scalar(0))) return own;
     const Vector2<Scalar> centre(Scalar(0.5) * (box.box.x1 + box.box.x2), Scalar(0.5) * (box.box.y1 + box.box.y2));
-    const Vector3<Scalar> moved = *frame.image_motion * Vector3<Scalar>(centre.x(), centre.y(), Scalar(1));
+    const Vector3<Scalar> moved = *state.image_motion * Vector3<Scalar>(centre.x(), centre.y(), Scalar(1));
     return own + (moved.template head<2>() / moved.z() - centre) / dt_s;
   }
 

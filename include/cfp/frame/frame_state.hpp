@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -120,6 +121,8 @@ template <typename Scalar>
 struct FrameState {
   FrameMemory<Scalar> previous, current;
   std::vector<TrackedBox<Scalar>> boxes;                        ///< of objects that can move: detected and compensated
+  std::vector<TrackedBox<Scalar>> previous_boxes;               ///< the same of the frame before
+  std::optional<Matrix3<Scalar>> image_motion;                  ///< that moved the predicted boxes; not set: none
   std::vector<ObjectProbability> objects;                       ///< O, one per box
   std::vector<std::pair<std::int64_t, ObjectMemory>> memories;  ///< of the objects, by the id of their boxes
   std::vector<KeypointLabel> label;                             ///< per keypoint

@@ -1,0 +1,72 @@
+/// @file image_motion.hpp
+/// How the image moved as a whole, told by optical flow. Not in the paper, whose boxes are predicted as if the camera
+/// were still: a shaken one moves all of them at once, and a prediction knows nothing of it.
+#pragma once
+
+#include <complex>
+#include <vector>
+
+#include "cfp/core/span.hpp"
+#include "cfp/core/types.hpp"
+#include "cfp/math/order_statistic.hpp"
+
+namespace cfp {
+inline namespace CFP_ISA {
+
+/// Sets `motion` to what moves pixels of the frame before to this one, for `warp_box`: a similarity, since a camera
+/// that turns shifts and rolls the image, fitted with Geman-McClure's weights in four passes. A camera that goes moves
+/// each pixel by its depth instead, and a box not as the room behind it: the more the pairs disagree, the less of the
+/// similarity is taken, 1 - 12 d^2 / D^2 of it, D the median of how far the pairs moved, d of how far they are from it
+/// (cfp_tracker_study). False, and `motion` stays, where that is nothing, where D is half a pixel or less, and below 12
+/// pairs.
+///
+/// The caller leaves out what moves by itself; of the rest, less than half may be wrong. Coordinates finite and within
+/// +-1e6 px. `distances` is scratch memory. O(pairs), allocates only while it grows.
+template <typename Scalar>
+[[nodiscard]] bool image_motion(const PointSpan<Scalar, 2>& prev, const PointSpan<non_deduced<Scalar>, 2>& cur,
+                                std::vector<non_deduced<Scalar>>& distances, Matrix3<non_deduced<Scalar>>& motion) {
+  CFP_ASSERT(prev.size() == cur.size());
+  using Complex = std::complex<double>;  // a pixel x + iy; a similarity is p -> turn p + shift
+  constexpr int passes = 4;
+  const std::size_t n = prev.size();
+  if (n < 12) return false;
+  const auto at = [](const PointSpan<Scalar, 2>& points, std::size_t i) {
+    return Complex(static_cast<double>(points(i, 0)), static_cast<double>(points(i, 1)));
+  };
+  Complex turn(1), shift(0);
+  const auto distance_sq = [&](std::size_t i) { return std::norm(turn * at(prev, i) + shift - at(cur, i)); };
+  double moved_sq = 0, left_sq = 0;
+  distances.resize(n);
+  for (int pass = 0; pass <= passes; ++pass) {
+    for (std::size_t i = 0; i < n; ++i) distances[i] = static_cast<Scalar>(distance_sq(i));
+    left_sq = static_cast<double>(order_statistic(span<Scalar>(distances), n / 2));
+    if (pass == 0 && !((moved_sq = left_sq) > 0.25)) return false;
+    if (pass == passes) break;
+    const double scale_sq = 2 * left_sq + 0.1;  // px^2; exact pairs, too, need one
+    double count = 0, square = 0;
+    Complex from(0), to(0), product(0);
+    for (std::size_t i = 0; i < n; ++i) {
+      const Complex p = at(prev, i), q = at(cur, i);
+      const double share = scale_sq / (scale_sq + distance_sq(i)), weight = share * share;
+      count += weight;
+      from += weight * p;
+      to += weight * q;
+      square += weight * std::norm(p);
+      product += weight * q * std::conj(p);
+    }
+    const double spread = square - std::norm(from) / count;
+    if (!(spread > 1e-9 * square)) return false;  // all at one place
+    turn = (product - to * std::conj(from) / count) / spread;
+    shift = (to - turn * from) / count;
+  }
+  const double taken = 1 - 12 * left_sq / moved_sq;
+  if (!(taken > 0)) return false;
+  turn = 1.0 + taken * (turn - 1.0);
+  shift *= taken;
+  motion << Scalar(turn.real()), -Scalar(turn.imag()), Scalar(shift.real()),  //
+      Scalar(turn.imag()), Scalar(turn.real()), Scalar(shift.imag()), 0, 0, 1;
+  return true;
+}
+
+}  // namespace CFP_ISA
+}  // namespace cfp
