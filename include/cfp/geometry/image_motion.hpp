@@ -87,8 +87,12 @@ template <typename Scalar>
   const double taken = 1 - 12 * left_sq / moved_sq;
   if (!(taken > 0)) return false;
   const std::complex<double> turn = 1.0 + taken * (fit.turn - 1.0), shift = taken * fit.shift;
-  motion << Scalar(turn.real()), -Scalar(turn.imag()), Scalar(shift.real()),  //
-      Scalar(turn.imag()), Scalar(turn.real()), Scalar(shift.imag()), 0, 0, 1;
+  motion.setIdentity();
+  motion(0, 0) = motion(1, 1) = Scalar(turn.real());
+  motion(1, 0) = Scalar(turn.imag());
+  motion(0, 1) = -motion(1, 0);
+  motion(0, 2) = Scalar(shift.real());
+  motion(1, 2) = Scalar(shift.imag());
   return true;
 }
 
