@@ -24,14 +24,17 @@ struct SharedError {
   double variance_factor = 1;  // of what is fitted to all pairs: so many times that of pairs which err alone
 };
 
+inline namespace CFP_ISA {
+
 /// The pairs in one part of the image: the sum of their residuals in units of the noise, and what it says.
 struct ResidualPart {
   Vector2<double> sum = Vector2<double>::Zero();
   double weights = 0, variance = 0;  // of both coordinates of the sum, if the pairs err alone
+  double agreeing = 0;               // pairs, by the weights of the loss: a part that moves has hardly any
 
   template <typename Scalar>
   void add(const MotionResidual<Scalar>& pair, double sigma_px) noexcept {
-    constexpr double loss_sq = 16;  // 4 sigma
+    constexpr double loss_sq = 64;  // 8 sigma: what neighbours share may be several
     const Vector2<double> r = pair.r.template cast<double>() / sigma_px;
     const double of_depth = static_cast<double>(pair.sigma_z) / sigma_px,
                  v = 2 + of_depth * of_depth * static_cast<double>(pair.along.squaredNorm()),
@@ -40,18 +43,17 @@ struct ResidualPart {
     sum += w * r;
     weights += w;
     variance += w * w * v;
+    agreeing += root * root;
   }
   /// How many pairs of two coordinates without errors of depth would say as much.
   [[nodiscard]] double pairs() const noexcept { return variance > 0 ? 2 * weights * weights / variance : 0; }
 };
 
-inline namespace CFP_ISA {
-
 /// The error that the pairs with a point share under the motion that was fitted to them. In each of 4 x 3 parts of what
 /// they cover the mean of n residuals has the variance sigma^2 / n + e^2 per coordinate; e is had from the upper
 /// quartile of the parts, as what errs may be a part of the image, and what moves there may be another. Six parameters
 /// were fitted to the two coordinates of every part, so that e^2 is n / (n - 3) times what is left of it. Fewer than
-/// four parts with five pairs tell nothing.
+/// four parts with five pairs that agree tell nothing.
 template <typename Scalar>
 [[nodiscard]] SharedError shared_error(const FlowPairs<Scalar>& flow, const std::vector<std::array<Scalar, 3>>& points,
                                        const SE3<Scalar>& T_cur_prev, const PinholeCamera<Scalar>& camera,
@@ -83,7 +85,7 @@ template <typename Scalar>
   std::size_t n = 0;
   double pairs = 0;
   for (const ResidualPart& part : parts) {
-    if (part.pairs() < fewest_pairs) continue;
+    if (part.agreeing < fewest_pairs) continue;
     error_sq[n++] = (part.sum.squaredNorm() / (part.variance * upper_quartile) - 1) / part.pairs();
     pairs += part.pairs();
   }
