@@ -344,6 +344,10 @@ int main(int argc, char** argv) {
       folders.push_back(word);
     }
   }
+  if (still && folders.empty()) {
+    std::fprintf(stderr, "--still: names folders in which nothing moves\n");
+    return 2;
+  }
   cv::setNumThreads(1);
   const cv::Ptr<cv::ORB> orb = cv::ORB::create(1000, 1.2F, 8, 15, 0, 2, cv::ORB::HARRIS_SCORE, 31, 10);
   std::vector<Candidate> all = candidates();

@@ -44,8 +44,9 @@ struct ObjectProbabilityOptions {
   /// large a share as scores below 1/2 of the pairs on no object, at most this, in [0, 1). 0: none is passed over, as
   /// printed (cfp_object_motion_study).
   double max_stray_share = 0.4;
-  /// Where depths are known, what the pairs share is judged, too (common_shift), beside the error of the image that
-  /// neighbours share, lest it look like motion; >= 0. 0: the pairs are judged one by one, as printed.
+  /// Where depths are known, what the pairs share is judged, too (common_shift), beside what the image itself errs by
+  /// among neighbours: as the frame shows it, and at least this, px, >= 0 (cfp_object_motion_study). 0: the pairs are
+  /// judged one by one, as printed.
   double shared_error_px = 0.02;
   /// Fewer usable pairs than this, and O is unknown (>= 1; benchmarks/studies/object_motion_study).
   std::size_t min_pairs = 8;
