@@ -66,16 +66,33 @@ int main(int argc, char* argv[]) {
   app.add_option("--image-noise", options.sensor.image_noise, "standard deviation, grey levels")
       ->check(CLI::Range(0, 100))
       ->capture_default_str();
+  double readout_ms = 0, depth_late_ms = 0, lens = 0, focal_error_percent = 0;
+  auto* readout = app.add_option("--readout", readout_ms, "rolling shutter: from the first row to the last, ms")
+                      ->check(CLI::Range(0, 100))
+                      ->capture_default_str();
+  auto* late = app.add_option("--depth-late", depth_late_ms, "depth is taken so much after its stamp, ms")
+                   ->check(CLI::Range(-100, 100))
+                   ->capture_default_str();
+  auto* bent = app.add_option("--lens", lens, "an image that nobody undistorted: radial coefficient")
+                   ->check(CLI::Range(-0.2, 0.2))
+                   ->capture_default_str();
+  app.add_option("--focal-error", focal_error_percent, "of camera.txt, per cent")
+      ->check(CLI::Range(-20, 20))
+      ->capture_default_str();
   app.add_option("--threads", threads, "rendering threads")->check(CLI::Range(1, 256))->capture_default_str();
   app.add_option("--background", background, "a recording in TUM format with poses; the people are put into it")
       ->check(CLI::ExistingDirectory)
-      ->excludes(close_up, furniture);
+      ->excludes(close_up, furniture, readout, late, bent);
   app.add_option("--camera-height", camera_height, "of the first background camera above the floor, m")
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
 
   cv::setNumThreads(1);  // the frames are what runs in parallel
   options.camera = SequenceOptions::default_camera(width);
+  options.camera.lens = lens;
+  options.readout_s = readout_ms / 1000;
+  options.depth_late_s = depth_late_ms / 1000;
+  options.focal_error = focal_error_percent / 100;
   try {
     std::shared_ptr<Recording> recording;
     if (!background.empty()) recording = std::make_shared<Recording>(read_recording(background, camera_height));

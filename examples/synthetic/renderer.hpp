@@ -22,6 +22,18 @@ enum Label : unsigned char { label_static = 0, label_moving = 1, label_person_st
 
 struct ImageCamera : cfp::PinholeCamera<double> {
   int width = 640, height = 480;
+  double lens = 0;  ///< the ray of a pixel is (1 + lens r^2) times as far from the axis as the pinhole's, r at depth 1
+
+  [[nodiscard]] Vector3d ray(double x, double y) const {
+    const Eigen::Vector2d plain((x - cx) / fx, (y - cy) / fy);
+    const Eigen::Vector2d bent = (1 + lens * plain.squaredNorm()) * plain;
+    return {bent.x(), bent.y(), 1};
+  }
+  /// No pixel's ray is farther from the pinhole's, px.
+  [[nodiscard]] double most_bent_px() const {
+    const double r = std::hypot(std::max(cx, width - cx) / fx, std::max(cy, height - cy) / fy);
+    return std::abs(lens) * r * r * r * std::max(fx, fy);
+  }
 };
 
 /// What can be seen of a person. Box in pixels, right and lower edges exclusive; improper when nothing can be seen.
@@ -54,10 +66,11 @@ struct RenderOptions {
 
 class Renderer {
  public:
-  /// Renders surfaces (people among them) as seen by the camera.
+  /// Renders surfaces (people among them) as seen by the camera: all rows, or some of them.
   void render(const Scene& scene, const std::vector<Surface>& surfaces, const ImageCamera& camera,
-              const cfp::SE3<double>& T_world_cam, const Backdrop& backdrop, const RenderOptions& options,
-              Frame& frame) {
+              const cfp::SE3<double>& T_world_cam, const Backdrop& backdrop, const RenderOptions& options, Frame& frame,
+              cv::Range rows = cv::Range::all()) {
+    if (rows == cv::Range::all()) rows = {0, camera.height};
     scene_ = &scene;
     surfaces_ = &surfaces;
     camera_ = camera;
@@ -69,16 +82,16 @@ class Renderer {
     frame.surface.create(size, CV_16S);
     frame.label.create(size, CV_8U);
     frame.slant.create(size, CV_32F);
-    for (int tile_y = 0; tile_y < camera.height; tile_y += tile) {
+    for (int tile_y = rows.start; tile_y < rows.end; tile_y += tile) {
       for (int tile_x = 0; tile_x < camera.width; tile_x += tile) {
         collect(tile_x, tile_y);
-        for (int y = tile_y; y < std::min(tile_y + tile, camera.height); ++y) {
+        for (int y = tile_y; y < std::min(tile_y + tile, rows.end); ++y) {
           for (int x = tile_x; x < std::min(tile_x + tile, camera.width); ++x) shade_pixel(x, y, options, frame);
         }
       }
     }
-    smooth_edges(frame);
-    describe_people(frame);
+    smooth_edges(frame, rows);
+    if (rows == cv::Range(0, camera.height)) describe_people(frame);
   }
 
  private:
@@ -127,7 +140,8 @@ class Renderer {
       y2 = std::max(y2, camera_.fy * q.y() / z + camera_.cy);
     }
     p.nearest = nearest;
-    if (nearest > 0.01) p = {p.A_cam, p.origin, nearest, x1 - 1, y1 - 1, x2 + 1, y2 + 1};
+    const double margin = 1 + camera_.most_bent_px();
+    if (nearest > 0.01) p = {p.A_cam, p.origin, nearest, x1 - margin, y1 - margin, x2 + margin, y2 + margin};
   }
 
   /// Candidates of a tile; nearest first, so that a pixel can stop early.
@@ -140,9 +154,6 @@ class Renderer {
   }
   [[nodiscard]] const Prepared& at(int i) const { return prepared_[static_cast<std::size_t>(i)]; }
   [[nodiscard]] const Surface& surface(int i) const { return (*surfaces_)[static_cast<std::size_t>(i)]; }
-  [[nodiscard]] Vector3d ray(double x, double y) const {
-    return {(x - camera_.cx) / camera_.fx, (y - camera_.cy) / camera_.fy, 1};
-  }
 
   [[nodiscard]] Sample trace(const Vector3d& direction, double farthest) const {
     Sample best;
@@ -187,7 +198,7 @@ class Renderer {
   }
 
   void shade_pixel(int x, int y, const RenderOptions& options, Frame& frame) const {
-    const Vector3d direction = ray(x, y);
+    const Vector3d direction = camera_.ray(x, y);
     const double limit = behind(x, y);
     const Sample sample = trace(direction, limit);
     Color color;
@@ -213,11 +224,11 @@ class Renderer {
   }
 
   /// Four more rays through every pixel that borders on another surface.
-  void smooth_edges(Frame& frame) {
-    for (int tile_y = 0; tile_y < camera_.height; tile_y += tile) {
+  void smooth_edges(Frame& frame, cv::Range rows) {
+    for (int tile_y = rows.start; tile_y < rows.end; tile_y += tile) {
       for (int tile_x = 0; tile_x < camera_.width; tile_x += tile) {
         bool collected = false;
-        for (int y = std::max(tile_y, 1); y < std::min(tile_y + tile, camera_.height - 1); ++y) {
+        for (int y = std::max(tile_y, rows.start + 1); y < std::min(tile_y + tile, rows.end - 1); ++y) {
           for (int x = std::max(tile_x, 1); x < std::min(tile_x + tile, camera_.width - 1); ++x) {
             const short here = frame.surface.at<short>(y, x);
             if (here == frame.surface.at<short>(y, x + 1) && here == frame.surface.at<short>(y + 1, x) &&
@@ -228,7 +239,7 @@ class Renderer {
             collected = true;
             Color sum = Color::Zero();
             for (int sub = 0; sub < 4; ++sub) {
-              const Vector3d direction = ray(x + (sub % 2 == 0 ? -0.25 : 0.25), y + (sub < 2 ? -0.25 : 0.25));
+              const Vector3d direction = camera_.ray(x + (sub % 2 == 0 ? -0.25 : 0.25), y + (sub < 2 ? -0.25 : 0.25));
               const Sample sample = trace(direction, behind(x, y));
               sum += sample.surface >= 0 ? shade(sample, direction) : backdrop_color(x, y);
             }
@@ -256,7 +267,7 @@ class Renderer {
           if (on_grid) ++seen[static_cast<std::size_t>(person)];
         }
         if (on_grid) {
-          const Vector3d direction = ray(x, y);
+          const Vector3d direction = camera_.ray(x, y);
           std::array<bool, 2> hits{};
           for (std::size_t i = 0; i < prepared_.size(); ++i) {
             const int who = (*surfaces_)[i].person;

@@ -35,6 +35,9 @@ struct SequenceOptions {
   bool furniture = false;     ///< stands before them
   int blur_samples = 1;       ///< sub-exposures; 1: no motion blur
   double exposure_s = 0.012;  ///< over which they are spread
+  double readout_s = 0;       ///< rolling shutter: from the first row to the last; the stamp is that of the middle
+  double depth_late_s = 0;    ///< the depth image is taken so much later than the colour image of its stamp
+  double focal_error = 0;     ///< camera.txt says that the focal lengths are (1 + this) times what they are
   ImageCamera camera = default_camera(640);
   RenderOptions render;
   SensorOptions sensor;
@@ -140,12 +143,15 @@ class Sequence {
     const std::vector<Surface> surfaces = surfaces_at(time);
     renderer.render(scene_, surfaces, options_.camera, T_stage_cam(frame), backdrop, options_.render, out.truth);
     if (options_.blur_samples > 1 && recording_ == nullptr) blur(time, renderer, out.truth);
+    if (options_.readout_s > 0 && recording_ == nullptr) roll(time, renderer, out.truth);
     double people = 0;
     for (const Sighting& s : out.truth.people) people += s.pixels;
     people /= static_cast<double>(out.truth.depth.total());
     const cfp::Random random(options_.seed * 1000003 + static_cast<std::uint64_t>(frame), "sensor");
     const double gain = exposure(options_.sensor, time, people);
-    out.depth = sense_depth(out.truth, surfaces, options_.sensor, normal_, random);
+    out.depth = options_.depth_late_s != 0 && recording_ == nullptr
+                    ? late_depth(std::max(0.0, time + options_.depth_late_s), renderer, random)
+                    : sense_depth(out.truth, surfaces, options_.sensor, normal_, random);
     out.color = sense_color(out.truth, options_.sensor, gain, normal_, cfp::Random(cfp::Random(random)()));
     out.label = out.truth.label;
   }
@@ -178,6 +184,30 @@ class Sequence {
       sum += part.color;
     }
     truth.color = sum / options_.blur_samples;
+  }
+
+  /// Every band of rows at its own time. What is seen of the people stays that of the middle.
+  void roll(double time, Renderer& renderer, Frame& truth) const {
+    constexpr int band = 4;
+    const int height = options_.camera.height;
+    Frame part;
+    for (int y = 0; y < height; y += band) {
+      const double at = std::max(0.0, time + options_.readout_s * ((y + 0.5 * band) / height - 0.5));
+      const cv::Range rows(y, std::min(y + band, height)), seen(std::max(y - 1, 0), std::min(rows.end + 1, height));
+      renderer.render(scene_, surfaces_at(at), options_.camera, motion_(at), {}, options_.render, part, seen);
+      part.color.rowRange(rows).copyTo(truth.color.rowRange(rows));
+      part.depth.rowRange(rows).copyTo(truth.depth.rowRange(rows));
+      part.surface.rowRange(rows).copyTo(truth.surface.rowRange(rows));
+      part.label.rowRange(rows).copyTo(truth.label.rowRange(rows));
+      part.slant.rowRange(rows).copyTo(truth.slant.rowRange(rows));
+    }
+  }
+
+  [[nodiscard]] cv::Mat late_depth(double time, Renderer& renderer, const cfp::Random& random) const {
+    Frame later;
+    const std::vector<Surface> surfaces = surfaces_at(time);
+    renderer.render(scene_, surfaces, options_.camera, motion_(time), {}, options_.render, later);
+    return sense_depth(later, surfaces, options_.sensor, normal_, random);
   }
 
   [[nodiscard]] Backdrop load(const Recording::View& view) const {

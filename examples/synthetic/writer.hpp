@@ -73,7 +73,8 @@ inline void write_sequence(const Sequence& sequence, const std::filesystem::path
       camera(folder / "camera.txt");
   const ImageCamera& c = options.camera;
   camera << "# fx fy cx cy width height depth_units_per_metre; images are undistorted\n";
-  for (const double value : {c.fx, c.fy, c.cx, c.cy, double(c.width), double(c.height)})
+  const double told = 1 + options.focal_error;
+  for (const double value : {told * c.fx, told * c.fy, c.cx, c.cy, double(c.width), double(c.height)})
     camera << cfp_examples::general(value, 6) << ' ';
   camera << cfp_examples::general(options.sensor.depth_units_per_metre, 6) << '\n';
   rgb << "# color images: timestamp filename\n";

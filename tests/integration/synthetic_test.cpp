@@ -50,8 +50,7 @@ double signed_distance(const Surface& s, const Vector3d& world) {
 }
 
 Vector3d world_point(const Sequence& sequence, int frame, double x, double y, double depth) {
-  const ImageCamera& c = sequence.options().camera;
-  return sequence.T_stage_cam(frame) * Vector3d(depth * (x - c.cx) / c.fx, depth * (y - c.cy) / c.fy, depth);
+  return sequence.T_stage_cam(frame) * (depth * sequence.options().camera.ray(x, y));
 }
 
 std::map<std::string, std::string> files_of(const std::filesystem::path& folder) {
@@ -80,8 +79,10 @@ TEST_CASE("A frame depends on the seed and its number alone", "[synthetic]") {
 }
 
 TEST_CASE("True depth lies on the nearest surface of the scene", "[synthetic]") {
-  for (const int kind : {0, 1, 2, 3}) {
-    const Sequence sequence(of_kind(kind, Motion::halfsphere));
+  for (const int kind : {0, 1, 2, 3, 4, 5}) {
+    auto options = of_kind(kind % 4, Motion::halfsphere);
+    options.camera.lens = kind < 4 ? 0 : kind == 4 ? 0.08 : -0.08;
+    const Sequence sequence(options);
     const int frame = 75;
     const auto out = rendered(sequence, frame);
     const auto surfaces = sequence.surfaces_at(sequence.time_of(frame));
@@ -345,6 +346,52 @@ TEST_CASE("Sensed depth has the stated noise, steps and holes", "[synthetic]") {
   CHECK(holes_at_edges > 0.3 * edges);
 }
 
+TEST_CASE("A rolling shutter shows each row at its own time", "[synthetic]") {
+  auto options = small(Scenario::walking, Motion::rpy);
+  auto in_milliseconds = options;
+  in_milliseconds.rate_hz = 1000;
+  in_milliseconds.frames = 8000;  // as long: the people do the same
+  options.readout_s = 0.06;
+  const Sequence rolling(options), still(in_milliseconds);
+  const auto out = rendered(rolling, 45);
+  for (const int row : {0, 41, 59, 117}) {
+    const int band = row / 4, at_ms = 1500 - 30 + 2 * band + 1;
+    const auto then = rendered(still, at_ms);
+    int equal = 0, equal_label = 0, equal_of_frame = 0;
+    const auto middle = rendered(still, 1500);
+    for (int x = 0; x < 160; ++x) {
+      const float depth = out.truth.depth.at<float>(row, x);
+      equal += std::abs(depth - then.truth.depth.at<float>(row, x)) < 1e-4F * depth ? 1 : 0;
+      equal_of_frame += std::abs(depth - middle.truth.depth.at<float>(row, x)) < 1e-4F * depth ? 1 : 0;
+      equal_label += out.label.at<unsigned char>(row, x) == then.label.at<unsigned char>(row, x) ? 1 : 0;
+    }
+    CAPTURE(row);
+    CHECK(equal == 160);
+    CHECK(equal_label == 160);
+    CHECK((row == 59 || equal_of_frame < 80));
+  }
+}
+
+TEST_CASE("Late depth is that of another time, through the same lens", "[synthetic]") {
+  auto options = small(Scenario::walking, Motion::rpy);
+  const auto later = rendered(Sequence(options), 63);
+  options.depth_late_s = 3 / options.rate_hz;
+  const auto out = rendered(Sequence(options), 60);
+  int known = 0, late = 0, in_time = 0;
+  for (int y = 0; y < out.depth.rows; ++y) {
+    for (int x = 0; x < out.depth.cols; ++x) {
+      const double z = out.depth.at<std::uint16_t>(y, x) / options.sensor.depth_units_per_metre;
+      if (z == 0) continue;
+      ++known;
+      late += std::abs(static_cast<double>(later.truth.depth.at<float>(y, x)) - z) < 0.05 * z ? 1 : 0;
+      in_time += std::abs(static_cast<double>(out.truth.depth.at<float>(y, x)) - z) < 0.05 * z ? 1 : 0;
+    }
+  }
+  CHECK(known > 5000);
+  CHECK(late > 0.97 * known);
+  CHECK(in_time < 0.9 * known);
+}
+
 TEST_CASE("The detector misses in bursts, more often where detection is hard", "[synthetic]") {
   const DetectorOptions options;
   const auto missed = [&](bool at_border, double visible, double rotation, bool blurred) {
@@ -380,6 +427,7 @@ TEST_CASE("A written folder is the same from one thread and from three, and read
   auto options = small(Scenario::walking, Motion::rpy);
   options.frames = 7;
   options.blur_samples = 2;
+  options.focal_error = 0.02;
   const cfp_test::TemporaryFolder folder;
   const Sequence sequence(options);
   write_sequence(sequence, folder.path / "one", 1, [](int) {});
@@ -390,6 +438,8 @@ TEST_CASE("A written folder is the same from one thread and from three, and read
 
   const auto camera = cfp_examples::read_tum_camera(folder.path / "one/camera.txt");
   CHECK(camera.width == 160);
+  CHECK_THAT(camera.fx / options.camera.fx, WithinAbs(1.02, 1e-5));
+  CHECK_THAT(camera.fy / options.camera.fy, WithinAbs(1.02, 1e-5));
   const auto images = cfp_examples::read_tum_list(folder.path / "one/rgb.txt");
   const auto truth = cfp_examples::read_tum_trajectory(folder.path / "one/groundtruth.txt");
   REQUIRE(images.size() == 7);
