@@ -52,11 +52,15 @@ void print_summary(const RunRecord& run) {
   const auto tracking = static_cast<std::size_t>(cfp_slam::Module::tracking);
   std::printf("; lost %zu, relocalised %zu, skipped %zu; tracking %.1f ms (95 %%: %.1f)\n", s.lost, s.relocalised,
               s.skipped, s.median_ms[tracking], s.p95_ms[tracking]);
+  const auto percent = [](double share) { return cfp_slam::number(100 * share, 1) + " %"; };
   if (s.weight.samples > 0)
     std::printf(
-        "%11s AUC of K %.3f, M %.3f, the weight %.3f; in boxes %.1f %% of the static at 0, %.1f %% of the moving "
-        "above 0.5\n",
-        "", s.second_stage.auc, s.map_point.auc, s.weight.auc, 100 * s.weight.static_lost, 100 * s.weight.moving_kept);
+        "%11s AUC of K %.3f, M %.3f, the weight %.3f; in boxes %s of the static at 0, %s of the moving above 0.5\n", "",
+        s.second_stage.auc, s.map_point.auc, s.weight.auc, percent(s.weight.static_lost).c_str(),
+        percent(s.weight.moving_kept).c_str());
+  if (s.object.samples > 0)
+    std::printf("%11s AUC of O %.3f; of the boxes of people at rest %s at or below 0.9, of those who move %s above\n",
+                "", s.object.auc, percent(s.object.static_lost).c_str(), percent(s.object.moving_kept).c_str());
 }
 
 struct Arguments {

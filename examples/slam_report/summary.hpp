@@ -19,9 +19,16 @@ namespace cfp_slam {
 struct CalibrationSummary {
   std::size_t samples = 0;
   double static_fraction = not_known, auc = not_known, brier = not_known, ece = not_known;
-  // Of the static ones, the share below 0.01, which is as good as left out; of the others, the share above 0.5.
+  // Of the static ones, the share that counts as moving; of the others, the share that counts as static.
   double static_lost = not_known, moving_kept = not_known;
 };
+
+// From where on a probability counts as moving, and above what as static.
+struct Cuts {
+  double moving_to, static_above;
+};
+inline constexpr Cuts of_weight{0.01, 0.5};  // below a hundredth is as good as left out
+inline constexpr Cuts of_object{0.9, 0.9};   // O_Th
 
 // Errors are not_known when the run has no truth or no result.
 struct RunSummary {
@@ -46,7 +53,7 @@ inline std::array<const LabelledSamples*, 5> labelled(const RunRecord& run) {
   return {&run.first_stage, &run.second_stage, &run.map_point, &run.weight, &run.object};
 }
 
-inline CalibrationSummary summarize(const LabelledSamples& samples) {
+inline CalibrationSummary summarize(const LabelledSamples& samples, const Cuts& cuts = of_weight) {
   CalibrationSummary out;
   if (samples.probability.size() != samples.is_static.size()) return out;
   const auto result = cfp::evaluate_calibration(samples.probability, samples.is_static);
@@ -60,7 +67,8 @@ inline CalibrationSummary summarize(const LabelledSamples& samples) {
   for (std::size_t i = 0; i < samples.probability.size(); ++i) {
     const bool is_static = samples.is_static[i] != 0;
     ++count[is_static ? 1 : 0];
-    wrong[is_static ? 1 : 0] += is_static ? samples.probability[i] < 0.01F : samples.probability[i] > 0.5F;
+    const auto probability = static_cast<double>(samples.probability[i]);
+    wrong[is_static ? 1 : 0] += is_static ? probability <= cuts.moving_to : probability > cuts.static_above;
   }
   out.moving_kept = wrong[0] / count[0];
   out.static_lost = wrong[1] / count[1];
@@ -144,7 +152,7 @@ inline RunSummary summarize(const RunRecord& run) {
   s.second_stage = summarize(run.second_stage);
   s.map_point = summarize(run.map_point);
   s.weight = summarize(run.weight);
-  s.object = summarize(run.object);
+  s.object = summarize(run.object, of_object);
   return s;
 }
 

@@ -67,6 +67,16 @@ TEST_CASE("A summary holds the record's figures", "[slam]") {
         s.median_ms[static_cast<std::size_t>(Module::tracking)]);
 }
 
+TEST_CASE("Weights count as moving near zero, objects at or below O_Th", "[slam]") {
+  RunRecord run;
+  run.weight = run.object = {{0.005F, 0.4F, 0.6F, 0.95F, 0.6F, 0.95F}, {1, 1, 1, 1, 0, 0}};
+  const RunSummary s = summarize(run);
+  CHECK(s.weight.static_lost == 0.25);
+  CHECK(s.weight.moving_kept == 1);
+  CHECK(s.object.static_lost == 0.75);
+  CHECK(s.object.moving_kept == 0.5);
+}
+
 TEST_CASE("A run without truth, frames or labels has no errors, not errors of zero", "[slam]") {
   for (const RunSummary& s : {RunSummary{}, summarize(RunRecord{})}) {
     CHECK(std::isnan(s.ate_rmse_m));

@@ -87,6 +87,68 @@ template <typename Scalar>
   return share * share;
 }
 
+/// Both constraints of a frame, and how far each is believed: C_s C_c.
+template <typename Scalar>
+struct FrameConstraints {
+  ConstraintModel<Scalar> projection, epipolar;
+  Scalar projection_confidence{}, epipolar_confidence{};
+};
+
+/// Sets the distances of all matches in scratch.projection and scratch.epipolar, and fits both constraints to them.
+template <typename Scalar, typename Camera>
+[[nodiscard]] FrameConstraints<Scalar> fit_constraints(const PoseEstimate& pose,
+                                                       span<const Scalar> map_point_probability, const Camera& camera,
+                                                       const FrameOptions& options, FrameState<Scalar>& state) {
+  FrameScratch<Scalar>& scratch = state.scratch;
+  FrameConstraints<Scalar> fitted;
+  gather_matches(state);
+  scratch.projection.resize(state.size());
+  scratch.epipolar.resize(state.size());
+  reprojection_distances(PointSpan<Scalar, 2>(scratch.points), span<const Scalar>(scratch.depths),
+                         PointSpan<Scalar, 2>(state.current.keypoints), pose.T_cur_prev.template cast<Scalar>(), camera,
+                         span<Scalar>(scratch.projection));
+  fitted.projection = fit_to_static(scratch.projection, map_point_probability, options, state);
+  const bool moved = pose.T_cur_prev.translation.norm() > options.fine.min_translation_m;
+  if (moved) {
+    pose_epipolar_distances(pose.T_cur_prev, camera, state);
+    fitted.epipolar = fit_to_static(scratch.epipolar, map_point_probability, options, state);
+  }
+  const Scalar cs = statistical_confidence(pose.inliers, static_cast<Scalar>(options.fine.min_pose_inliers));
+  fitted.projection_confidence = cs * fitted.projection.calculation_confidence;
+  fitted.epipolar_confidence = cs * fitted.epipolar.calculation_confidence;
+  const auto told = [](Status status, Scalar threshold_px, Scalar confidence) {
+    return ConstraintReport{status, static_cast<double>(threshold_px), static_cast<double>(confidence)};
+  };
+  state.report.projection =
+      told(fitted.projection.status, fitted.projection.threshold_px, fitted.projection_confidence);
+  state.report.epipolar = told(moved ? fitted.epipolar.status : Status::degenerate, fitted.epipolar.threshold_px,
+                               fitted.epipolar_confidence);
+  return fitted;
+}
+
+/// What the fine stage knows of keypoint i, which is in a box; its M is m, negative: none.
+template <typename Scalar>
+[[nodiscard]] SecondStageKeypoint<Scalar> second_stage_keypoint(std::size_t i,
+                                                                const FrameConstraints<Scalar>& constraints, Scalar m,
+                                                                Scalar way_at_metre_px,
+                                                                const FrameState<Scalar>& state) noexcept {
+  const FrameScratch<Scalar>& scratch = state.scratch;
+  const ConstraintModel<Scalar>&projection = constraints.projection, &epipolar = constraints.epipolar;
+  const std::size_t b = static_cast<std::size_t>(state.box[i]);
+  SecondStageKeypoint<Scalar> keypoint;
+  keypoint.projection = evidence_of(projection, scratch.projection[i], constraints.projection_confidence);
+  keypoint.epipolar = evidence_of(epipolar, scratch.epipolar[i], constraints.epipolar_confidence);
+  keypoint.object_probability = static_cast<Scalar>(state.objects[b].static_probability);
+  keypoint.map_point_probability = m >= Scalar(0) ? m : Scalar(1);
+  keypoint.foreground = state.label[i] == KeypointLabel::foreground;
+  keypoint.matched = is_finite(scratch.points[i][0]) && is_finite(scratch.points[i][1]);
+  keypoint.box_associated = state.boxes[b].associated;
+  const Scalar seen_px = projection.status != Status::not_enough_data ? projection.threshold_px : epipolar.threshold_px;
+  if (way_at_metre_px > Scalar(0) && is_valid_depth(scratch.depths[i]))
+    keypoint.visibility = visibility_of(way_at_metre_px / scratch.depths[i], seen_px);
+  return keypoint;
+}
+
 }  // namespace CFP_ISA
 }  // namespace detail
 
@@ -104,53 +166,26 @@ template <typename Scalar, typename Camera>
 void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar>> map_point_probability,
                          const Camera& camera, const FrameOptions& options, FrameState<Scalar>& state) {
   CFP_ASSERT(detail::fits(state.size(), map_point_probability));
-  const std::size_t n = state.size();
-  FrameScratch<Scalar>& scratch = state.scratch;
   state.report.stage = Stage::fine;
   state.report.constrained = 0;
   if (!options.fine.enabled) return;
+  const detail::FrameConstraints<Scalar> constraints =
+      detail::fit_constraints<Scalar>(pose, map_point_probability, camera, options, state);
+  if (constraints.projection.status == Status::not_enough_data &&
+      constraints.epipolar.status == Status::not_enough_data)
+    return;
 
-  detail::gather_matches(state);
-  scratch.projection.resize(n);
-  scratch.epipolar.resize(n);
-  reprojection_distances(PointSpan<Scalar, 2>(scratch.points), span<const Scalar>(scratch.depths),
-                         PointSpan<Scalar, 2>(state.current.keypoints), pose.T_cur_prev.template cast<Scalar>(), camera,
-                         span<Scalar>(scratch.projection));
-  const ConstraintModel<Scalar> projection =
-      detail::fit_to_static(scratch.projection, map_point_probability, options, state);
-  ConstraintModel<Scalar> epipolar;
-  const bool moved = pose.T_cur_prev.translation.norm() > options.fine.min_translation_m;
-  if (moved) {
-    detail::pose_epipolar_distances(pose.T_cur_prev, camera, state);
-    epipolar = detail::fit_to_static(scratch.epipolar, map_point_probability, options, state);
-  }
-  const Scalar cs = statistical_confidence(pose.inliers, static_cast<Scalar>(options.fine.min_pose_inliers));
-  const Scalar ct = cs * projection.calculation_confidence, cf = cs * epipolar.calculation_confidence;
-  state.report.projection = {projection.status, static_cast<double>(projection.threshold_px), static_cast<double>(ct)};
-  state.report.epipolar = {moved ? epipolar.status : Status::degenerate, static_cast<double>(epipolar.threshold_px),
-                           static_cast<double>(cf)};
-
-  if (projection.status == Status::not_enough_data && epipolar.status == Status::not_enough_data) return;
+  const std::size_t n = state.size();
   state.evidence.resize(n);
   const bool posterior = options.map_point.weight == WeightRule::posterior;
   const Scalar threshold = static_cast<Scalar>(options.object_threshold);
-  const Scalar seen_px = projection.status != Status::not_enough_data ? projection.threshold_px : epipolar.threshold_px;
   const Scalar way_at_metre_px =
       undistorted_camera(camera).fx * static_cast<Scalar>(options.fine.least_speed_m_s * detail::elapsed_s(state));
   for (std::size_t i = 0; i < n; ++i) {
     if (state.box[i] == no_box) continue;
-    const std::size_t b = static_cast<std::size_t>(state.box[i]);
     const Scalar m = detail::map_point_at(map_point_probability, i);
-    SecondStageKeypoint<Scalar>& keypoint = state.evidence[i] = {};
-    keypoint.projection = detail::evidence_of(projection, scratch.projection[i], ct);
-    keypoint.epipolar = detail::evidence_of(epipolar, scratch.epipolar[i], cf);
-    keypoint.object_probability = static_cast<Scalar>(state.objects[b].static_probability);
-    keypoint.map_point_probability = m >= Scalar(0) ? m : Scalar(1);
-    keypoint.foreground = state.label[i] == KeypointLabel::foreground;
-    keypoint.matched = is_finite(scratch.points[i][0]) && is_finite(scratch.points[i][1]);
-    keypoint.box_associated = state.boxes[b].associated;
-    if (way_at_metre_px > Scalar(0) && is_valid_depth(scratch.depths[i]))
-      keypoint.visibility = detail::visibility_of(way_at_metre_px / scratch.depths[i], seen_px);
+    const SecondStageKeypoint<Scalar> keypoint = state.evidence[i] =
+        detail::second_stage_keypoint(i, constraints, m, way_at_metre_px, state);
     state.static_probability[i] =
         posterior ? second_stage_evidence(keypoint, threshold) : second_stage_probability(keypoint, threshold);
     ++state.report.constrained;

@@ -63,6 +63,61 @@ inline namespace CFP_ISA {
   return static_cast<int>(bits);
 }
 
+}  // namespace CFP_ISA
+
+namespace detail {
+
+/// A descriptor's nearest, and how far the next one is, in bits.
+struct NearestDescriptor {
+  std::size_t index = 0;
+  int distance = 0, second = 0;
+};
+
+inline namespace CFP_ISA {
+
+/// The previous keypoints that may be matched, by where they are expected; those that `match` names are held already.
+template <typename Scalar>
+void place_candidates(const PointSpan<Scalar, 2>& predicted, span<const std::int32_t> match, Scalar radius_px,
+                      DescriptorMatchWorkspace<Scalar>& workspace) {
+  workspace.holders.assign(predicted.size(), {-1, 0});
+  for (std::size_t i = 0; i < match.size(); ++i) {
+    if (match[i] >= 0 && static_cast<std::size_t>(match[i]) < predicted.size())
+      workspace.holders[static_cast<std::size_t>(match[i])].keypoint = static_cast<std::int32_t>(i);
+  }
+  const auto is_free = [&](std::size_t j) {
+    return workspace.holders[j].keypoint < 0 && is_finite(predicted(j, 0)) && is_finite(predicted(j, 1));
+  };
+  fill_grid(predicted, is_free, radius_px, workspace.candidates);
+}
+
+/// Among the candidates within the radius of (x, y); at a distance of more than all bits without one.
+template <typename Scalar>
+[[nodiscard]] NearestDescriptor nearest_descriptor(const PointGrid<Scalar>& candidates, Scalar x, Scalar y,
+                                                   const DescriptorSpan& previous, const std::uint8_t* descriptor) {
+  const int bits = static_cast<int>(8 * previous.bytes);
+  NearestDescriptor nearest{0, bits + 1, bits};
+  visit_near(candidates, x, y, [&](const auto& candidate) {
+    const Scalar dx = candidate.x - x, dy = candidate.y - y;
+    if (!(dx * dx + dy * dy <= candidates.reach * candidates.reach)) return false;
+    const int distance = hamming_distance(previous.row(candidate.index), descriptor, previous.bytes);
+    nearest.second = (std::min)(nearest.second, (std::max)(nearest.distance, distance));
+    if (distance < nearest.distance) nearest.index = candidate.index, nearest.distance = distance;
+    return false;
+  });
+  return nearest;
+}
+
+[[nodiscard]] inline bool passes(const NearestDescriptor& nearest, std::size_t bytes,
+                                 const DescriptorMatchOptions& options) noexcept {
+  if (nearest.distance > static_cast<int>(8 * bytes) || nearest.distance > options.max_distance) return false;
+  return options.max_ratio >= 1 || nearest.distance < options.max_ratio * nearest.second;
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
+
+inline namespace CFP_ISA {
+
 /// Matches the keypoints `queries` of the current frame with those of the previous one: match[i] becomes the index of
 /// the previous keypoint, for every i of `queries` that finds one. `predicted` is where each previous keypoint is
 /// expected in the current image; one that is not finite, or that `match` names already, takes no part. A match lies
@@ -78,35 +133,15 @@ std::size_t match_descriptors(const PointSpan<Scalar, 2>& predicted, const Descr
   CFP_ASSERT(match.size() == keypoints.size());
   if (previous.bytes != current.bytes || current.bytes == 0) return 0;
   if (previous.size != predicted.size() || current.size != keypoints.size()) return 0;
-  // The previous keypoints that may be matched, by where they are expected; those that `match` names are held already.
-  workspace.holders.assign(predicted.size(), {-1, 0});
-  for (std::size_t i = 0; i < match.size(); ++i) {
-    if (match[i] >= 0 && static_cast<std::size_t>(match[i]) < predicted.size())
-      workspace.holders[static_cast<std::size_t>(match[i])].keypoint = static_cast<std::int32_t>(i);
-  }
-  const auto is_free = [&](std::size_t j) {
-    return workspace.holders[j].keypoint < 0 && is_finite(predicted(j, 0)) && is_finite(predicted(j, 1));
-  };
-  const Scalar radius_px = static_cast<Scalar>(options.radius_px);
-  detail::fill_grid(predicted, is_free, radius_px, workspace.candidates);
-  const int bits = static_cast<int>(8 * previous.bytes);
+  detail::place_candidates(predicted, span<const std::int32_t>(match), static_cast<Scalar>(options.radius_px),
+                           workspace);
   for (const std::int32_t query : queries) {
     const std::size_t i = static_cast<std::size_t>(query);
-    const Scalar x = keypoints(i, 0), y = keypoints(i, 1);
-    std::size_t nearest = 0;
-    int least = bits + 1, second = bits;  // distances of the nearest descriptor and of the next
-    detail::visit_near(workspace.candidates, x, y, [&](const auto& candidate) {
-      const Scalar dx = candidate.x - x, dy = candidate.y - y;
-      if (!(dx * dx + dy * dy <= radius_px * radius_px)) return false;
-      const int distance = hamming_distance(previous.row(candidate.index), current.row(i), previous.bytes);
-      second = (std::min)(second, (std::max)(least, distance));
-      if (distance < least) nearest = candidate.index, least = distance;
-      return false;
-    });
-    if (least > bits || least > options.max_distance) continue;
-    if (options.max_ratio < 1 && !(least < options.max_ratio * second)) continue;
-    auto& holder = workspace.holders[nearest];
-    if (holder.keypoint < 0 || least < holder.distance) holder = {query, least};
+    const detail::NearestDescriptor nearest =
+        detail::nearest_descriptor(workspace.candidates, keypoints(i, 0), keypoints(i, 1), previous, current.row(i));
+    if (!detail::passes(nearest, previous.bytes, options)) continue;
+    auto& holder = workspace.holders[nearest.index];
+    if (holder.keypoint < 0 || nearest.distance < holder.distance) holder = {query, nearest.distance};
   }
   std::size_t matched = 0;
   for (std::size_t j = 0; j < workspace.holders.size(); ++j) {

@@ -44,37 +44,57 @@ void measure_room(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow,
     flow_distances(model, flow, camera, options, span<Scalar>(room_distances));
 }
 
-/// Puts the flow pairs on no object, and those of known depth on one, into scratch.grid where they move, into
-/// scratch.resting where they do not, and their scores into scratch.samples. Whether few enough of those on no object
-/// move that this is not the camera, whose motion must rest on more than a few of them, too.
+/// Whether the flow tells by depth what moves.
+template <typename Scalar>
+[[nodiscard]] bool is_judged_by_depth(const FlowPairs<Scalar>& flow, const FrameReport& report) noexcept {
+  return report.flow_model == FlowModelKind::motion && !flow.previous_depths.empty();
+}
+
+/// Sets scratch.samples to the scores of the flow pairs on no object and, judged by depth, of those with one; -1 of
+/// all others.
+template <typename Scalar>
+void score_pairs(const FlowPairs<Scalar>& flow, const ObjectProbabilityOptions& scored, FrameState<Scalar>& state) {
+  FrameScratch<Scalar>& scratch = state.scratch;
+  const std::vector<Scalar>& distances =
+      state.report.flow_model == FlowModelKind::motion_up_to_scale ? scratch.room_distances : state.flow_distances;
+  const bool by_depth = is_judged_by_depth(flow, state.report);
+  scratch.samples.assign(flow.current.size(), Scalar(-1));
+  for (std::size_t p = 0; p < flow.current.size(); ++p) {
+    const bool asked = scratch.outside[p] != 0 || (by_depth && is_valid_depth(flow.previous_depths[p]));
+    if (asked && has_distance(distances[p])) scratch.samples[p] = object_score(distances[p], scored);
+  }
+}
+
+/// Whether any of the pairs scored move, but so few of those on no object that it is not the camera, whose motion must
+/// rest on more than a few of them, too.
+template <typename Scalar>
+[[nodiscard]] bool some_move(const FlowPairs<Scalar>& flow, Scalar threshold, const UnreportedOptions& unreported,
+                             const FrameState<Scalar>& state) noexcept {
+  const FrameScratch<Scalar>& scratch = state.scratch;
+  std::size_t moving = 0, moving_outside = 0, all_outside = 0;
+  for (std::size_t p = 0; p < scratch.samples.size(); ++p) {
+    if (scratch.samples[p] < 0) continue;
+    const bool outside = scratch.outside[p] != 0, moves = scratch.samples[p] < threshold;
+    moving += moves ? 1U : 0U;
+    moving_outside += moves && outside ? 1U : 0U;
+    all_outside += outside ? 1U : 0U;
+  }
+  const double most = unreported.max_share * static_cast<double>(all_outside);
+  if (moving < unreported.pairs || static_cast<double>(moving_outside) > most) return false;
+  return !is_judged_by_depth(flow, state.report) ||
+         2 * share_with_depth(flow, span<const char>(scratch.outside)) >= unreported.min_known_depths;
+}
+
+/// Puts the pairs that score_pairs scores into scratch.grid where they move, into scratch.resting where they do not;
+/// false without some_move.
 template <typename Scalar>
 [[nodiscard]] bool gather_pairs_outside(const FlowPairs<Scalar>& flow, const FrameOptions& options,
                                         FrameState<Scalar>& state) {
   const UnreportedOptions& unreported = options.coarse.unreported;
-  const ObjectProbabilityOptions scored = scaled_to_flow(options.coarse.object, state.report);
   const Scalar threshold = static_cast<Scalar>(options.object_threshold);
   FrameScratch<Scalar>& scratch = state.scratch;
-  const std::vector<Scalar>& distances =
-      state.report.flow_model == FlowModelKind::motion_up_to_scale ? scratch.room_distances : state.flow_distances;
-  const bool by_depth = state.report.flow_model == FlowModelKind::motion && !flow.previous_depths.empty();
-  const std::size_t n = flow.current.size();
-  scratch.samples.assign(n, Scalar(-1));  // of pairs without a score
-  std::size_t moving = 0, moving_outside = 0, all = 0;
-  for (std::size_t p = 0; p < n; ++p) {
-    const bool outside = scratch.outside[p] != 0;
-    const bool asked = outside || (by_depth && is_valid_depth(flow.previous_depths[p]));
-    if (!asked || !has_distance(distances[p])) continue;
-    scratch.samples[p] = object_score(distances[p], scored);
-    const bool moves = scratch.samples[p] < threshold;
-    moving += moves ? 1U : 0U;
-    moving_outside += moves && outside ? 1U : 0U;
-    all += outside ? 1U : 0U;
-  }
-  if (moving < unreported.pairs ||
-      static_cast<double>(moving_outside) > unreported.max_share * static_cast<double>(all))
-    return false;
-  if (by_depth && 2 * share_with_depth(flow, span<const char>(scratch.outside)) < unreported.min_known_depths)
-    return false;
+  score_pairs(flow, scaled_to_flow(options.coarse.object, state.report), state);
+  if (!some_move(flow, threshold, unreported, state)) return false;
   const Scalar radius_px = static_cast<Scalar>(unreported.radius_px);
   const auto moves = [&](std::size_t p) { return scratch.samples[p] >= 0 && scratch.samples[p] < threshold; };
   const auto rests = [&](std::size_t p) { return scratch.samples[p] >= threshold; };

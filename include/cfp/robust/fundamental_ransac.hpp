@@ -40,6 +40,29 @@ struct FundamentalRansacWorkspace {
 namespace detail {
 inline namespace CFP_ISA {
 
+/// F of scaled coordinates and its inliers as the result.
+template <typename Scalar>
+void report_fundamental(const Matrix3<double>& F, const FundamentalSearch<double>& search, std::size_t min_inliers,
+                        span<char> inlier_mask, FundamentalResult<Scalar>& result) noexcept {
+  const auto is_inlier = [&](std::size_t i) { return search.distances_sq[i] <= search.limit; };
+  report_inliers(search.pairs, is_inlier, min_inliers, inlier_mask, result);
+  if (result.found()) result.F = unscaled_fundamental(F, search.pairs.scaling).template cast<Scalar>();
+}
+
+/// In the place of an F: what motion the homography is, its pairs and itself.
+template <typename Scalar>
+void report_homography(DegeneracyCheck<double>& check, const Matrix3<double>* K, std::size_t min_inliers,
+                       span<char> inlier_mask, FundamentalResult<Scalar>& result) noexcept {
+  const PairArrays& pairs = check.pairs;
+  result.status = check.classify(K);
+  const auto is_inlier = [&](std::size_t i) { return transfer_sq(pairs, check.H, i) <= check.transfer_limit(); };
+  report_inliers(pairs, is_inlier, min_inliers, inlier_mask, result);
+  if (result.status == RansacStatus::no_consensus) return;
+  const Matrix3<double> pixels =
+      unscaling_matrix(pairs.scaling.current) * check.H * scaling_matrix(pairs.scaling.previous);
+  result.homography = ((determinant(pixels) < 0 ? -1.0 : 1.0) * pixels.normalized()).template cast<Scalar>();
+}
+
 template <typename Scalar>
 [[nodiscard]] FundamentalResult<Scalar> fundamental_ransac(const PointPairs<Scalar>& input, const Matrix3<double>* K,
                                                            const FundamentalRansacOptions& options,
@@ -86,19 +109,10 @@ template <typename Scalar>
   }
   if (has_F) {
     result.status = found.confident ? RansacStatus::ok : RansacStatus::iteration_limit;
-    const auto is_inlier = [&](std::size_t i) { return search.distances_sq[i] <= search.limit; };
-    report_inliers(pairs, is_inlier, options.min_inliers, inlier_mask, result);
-    if (result.found()) result.F = unscaled_fundamental(F, pairs.scaling).template cast<Scalar>();
-    return result;
+    report_fundamental(F, search, options.min_inliers, inlier_mask, result);
+  } else if (check.dominant) {
+    report_homography(check, K, options.min_inliers, inlier_mask, result);
   }
-  if (!check.dominant) return result;
-  result.status = check.classify(K);
-  const auto is_inlier = [&](std::size_t i) { return transfer_sq(pairs, check.H, i) <= check.transfer_limit(); };
-  report_inliers(pairs, is_inlier, options.min_inliers, inlier_mask, result);
-  if (result.status == RansacStatus::no_consensus) return result;
-  const Matrix3<double> pixels =
-      unscaling_matrix(pairs.scaling.current) * check.H * scaling_matrix(pairs.scaling.previous);
-  result.homography = ((determinant(pixels) < 0 ? -1.0 : 1.0) * pixels.normalized()).template cast<Scalar>();
   return result;
 }
 
