@@ -1,5 +1,6 @@
 #include "cfp/frame/detector_lag.hpp"
 
+#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -126,4 +127,16 @@ TEST_CASE("Frames without depths, without a motion or with hostile numbers count
   CHECK(street.after(100) == 0);
   street.state.image_motion.reset();
   CHECK(street.after(60) > 0);
+}
+
+TEST_CASE("Without a noise of the flow nothing is late", "[health]") {
+  Street street;
+  street.late = 6;
+  street.state.report.flow_sigma_px = 0;
+  for (int i = 0; i < 120; ++i) {
+    const float left = street.left_at(street.k + 1 - street.late);  // no depth where the box is, as of what is near
+    for (std::size_t p = 0; p < street.pixels.size(); ++p)
+      street.state.flow_depths[p] = std::abs(street.pixels[p][0] - left - 50) < 51 ? 0.0F : 3.0F;
+    REQUIRE(street.next() == 0);
+  }
 }

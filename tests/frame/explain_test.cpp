@@ -61,6 +61,23 @@ TEST_CASE("The explanation's numbers are the frame's, in both stages and for eit
   check(0.0F);
 }
 
+TEST_CASE("An O that rounds to O_Th is told as it is judged", "[frame]") {
+  FrameRun<float> run(make_dynamic_scene<float>({}, 81));
+  const cfp::FrameOptions options;
+  run.coarse(options);
+  for (cfp::ObjectProbability& object : run.state.objects) object.static_probability = 0.9000000001;
+  run.fine(options);
+  std::size_t judged = 0;
+  for (std::size_t i = 0; i < run.m.size(); ++i) {
+    const auto e = cfp::explain(i, run.m[i], options, run.state);
+    if (e.box == cfp::no_box) continue;
+    ++judged;
+    REQUIRE(e.high_dynamic);
+    REQUIRE(e.rule != SecondStageRule::low_dynamic);
+  }
+  CHECK(judged > 50);
+}
+
 TEST_CASE("Each rule is told by its name", "[frame]") {
   FrameRun<double> run(make_dynamic_scene<double>({}, 82));
   run.scene.keypoints.back() = {std::numeric_limits<double>::quiet_NaN(), 1};

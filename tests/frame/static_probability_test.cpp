@@ -129,6 +129,7 @@ TEST_CASE("Without a frame before, and without matches, stage 1 stands", "[frame
   CHECK(fine.report.unmatched_foreground == fine.report.foreground);
   host.probability.reset();
   host.probability.coarse(host.current());
+  CHECK(host.probability.state().previous_boxes.empty());
   CHECK(host.probability.fine({scene.T_cur_prev, 300}, scene.match).report.stage == Stage::coarse);
 }
 

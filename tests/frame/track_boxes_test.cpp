@@ -110,6 +110,28 @@ TEST_CASE("A gap that ends the tracks is told, as it is behind every frame of a 
   CHECK_FALSE(camera.see(33.03, person).report.after_gap);
 }
 
+TEST_CASE("A gap that float rounds to what is allowed ends no track and is none", "[frame]") {
+  cfp::FrameOptions options;
+  options.tracker.max_gap_s = 2;
+  cfp::BoxTracker<float> tracker(options.tracker);
+  cfp::FrameState<float> state;
+  const std::vector<cfp::Detection<float>> seen = {{{100, 100, 200, 400}, 0, 0.9F}};
+  const auto see = [&](double time) {
+    cfp::Frame<float> frame;
+    frame.timestamp_s = time;
+    frame.detections = seen;
+    cfp::begin_frame(frame, state);
+    cfp::track_boxes(frame, options, tracker, state);
+    REQUIRE(state.boxes.size() == 1);
+    return state.boxes[0].id;
+  };
+  CHECK(see(0) == 1);
+  CHECK(see(2.00000005) == 1);
+  CHECK_FALSE(state.report.after_gap);
+  CHECK(see(4.1) == 2);
+  CHECK(state.report.after_gap);
+}
+
 TEST_CASE("The image motion moves a compensated box", "[frame]") {
   Camera still, turning;
   cfp::Matrix3<double> shift = cfp::Matrix3<double>::Identity();

@@ -60,3 +60,31 @@ TEST_CASE("What the covariance of a filter's poses is in this convention", "[mat
   const cfp::SE3<double> still = T_cam_body * T;
   CHECK((cfp::se3_log(cfp::SE3<double>(seen * still.inverse())) - cfp::adjoint(T_cam_body) * zeta).norm() < 1e-12);
 }
+
+TEST_CASE("Motions whose join is not finite do not join, and leave the result alone", "[math][uncertain_motion]") {
+  const auto refused = [](const cfp::UncertainMotion<double>& given, auto measured) {
+    auto result = measured;
+    result.T_cur_prev.translation.setConstant(7);
+    const bool joins = cfp::join(given, measured, std::numeric_limits<double>::infinity(), result);
+    return !joins && result.T_cur_prev.translation.isConstant(7, 0);
+  };
+  const cfp::UncertainMotion<double> sane(cfp::SE3<double>(), 1, 1);
+  const cfp::UncertainMotion<float> sane_float = sane.cast<float>();
+  CHECK_FALSE(refused(sane, sane));
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (int row = 0; row < 6; ++row) {
+    for (int column = 0; column < 6; ++column) {
+      cfp::UncertainMotion<double> broken = sane;
+      broken.covariance(row, column) = nan;
+      CHECK(refused(sane, broken));
+      CHECK(refused(broken, sane));
+    }
+  }
+  cfp::UncertainMotion<double> far = sane;
+  far.T_cur_prev.translation.x() = 1e200;
+  CHECK_FALSE(refused(far, sane));
+  CHECK(refused(far, sane_float));
+  far.T_cur_prev.translation.x() = nan;
+  CHECK(refused(far, sane));
+  CHECK(refused(sane, far));
+}

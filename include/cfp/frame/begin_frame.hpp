@@ -33,15 +33,9 @@ void copy_frame(const Frame<Scalar>& frame, const FrameMemory<Scalar>& previous,
 /// A box may hold all that the frame has, or none of it.
 template <typename Scalar>
 void reserve_scratch(std::size_t most, FrameScratch<Scalar>& scratch) {
-  scratch.members.reserve(most);
-  scratch.mask.reserve(most);
-  scratch.points.reserve(most);
-  scratch.undistorted_previous.reserve(most);
-  scratch.undistorted_current.reserve(most);
-  scratch.depths.reserve(most);
-  scratch.samples.reserve(most);
-  scratch.values.reserve(most);
-  scratch.foreground.reserve(most);
+  const auto reserve = [most](auto&... memory) { (memory.reserve(most), ...); };
+  reserve(scratch.members, scratch.mask, scratch.points, scratch.undistorted_previous, scratch.undistorted_current,
+          scratch.depths, scratch.samples, scratch.values, scratch.foreground);
 }
 
 }  // namespace CFP_ISA

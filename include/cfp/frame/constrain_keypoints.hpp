@@ -116,13 +116,12 @@ template <typename Scalar, typename Camera>
   const Scalar cs = statistical_confidence(pose.inliers, static_cast<Scalar>(options.fine.min_pose_inliers));
   fitted.projection_confidence = cs * fitted.projection.calculation_confidence;
   fitted.epipolar_confidence = cs * fitted.epipolar.calculation_confidence;
-  const auto told = [](Status status, Scalar threshold_px, Scalar confidence) {
-    return ConstraintReport{status, static_cast<double>(threshold_px), static_cast<double>(confidence)};
+  const auto told = [](const ConstraintModel<Scalar>& model, Scalar confidence) {
+    return ConstraintReport{model.status, static_cast<double>(model.threshold_px), static_cast<double>(confidence)};
   };
-  state.report.projection =
-      told(fitted.projection.status, fitted.projection.threshold_px, fitted.projection_confidence);
-  state.report.epipolar = told(moved ? fitted.epipolar.status : Status::degenerate, fitted.epipolar.threshold_px,
-                               fitted.epipolar_confidence);
+  state.report.projection = told(fitted.projection, fitted.projection_confidence);
+  state.report.epipolar = told(fitted.epipolar, fitted.epipolar_confidence);
+  if (!moved) state.report.epipolar.status = Status::degenerate;
   return fitted;
 }
 

@@ -47,14 +47,14 @@ class DetectorLag {
   /// Once per frame, after its coarse stage; the lag in seconds, 0: none, or not known. Detected boxes that move are
   /// laid at where the image will have them after each of ten lags; a pair in them scores 1 when it moves (distance
   /// above 6 sigma) and -1 when it rests (below 3), and the lag is that of the best mean score, if most pairs there
-  /// move. Frames whose flow has no depths, or no camera motion, count for nothing. O(boxes that move x pairs).
+  /// move. Frames whose flow has no depths, no camera motion or no noise count for nothing. O(boxes that move x pairs).
   double update(const Frame<Scalar>& frame, const FrameState<Scalar>& state) noexcept {
     const double dt = detail::elapsed_s(state);
     const double kept = dt > 0 && is_finite(dt) ? std::exp(-dt / options_.memory_s) : 1;
     boxes_ *= kept;
     for (double& sum : scores_) sum *= kept;
-    const bool judged =
-        state.report.flow_model == FlowModelKind::motion && state.flow_distances.size() == state.flow_depths.size();
+    const bool judged = state.report.flow_model == FlowModelKind::motion && state.report.flow_sigma_px > 0 &&
+                        state.flow_distances.size() == state.flow_depths.size();
     for (std::size_t b = 0; judged && b < state.boxes.size(); ++b) {
       const TrackedBox<Scalar>& box = state.boxes[b];
       const Vector2<Scalar> rate = image_rate(box, state, static_cast<Scalar>(dt));

@@ -108,16 +108,17 @@ template <typename Scalar>
     e.compensated = state.boxes[b].compensated();
     e.associated = state.boxes[b].associated;
     e.object = state.objects[b];
-    e.high_dynamic = is_high_dynamic(e.object.static_probability, options.object_threshold);
+    const Scalar o = static_cast<Scalar>(e.object.static_probability);
+    const Scalar threshold = static_cast<Scalar>(options.object_threshold);
+    e.high_dynamic = is_high_dynamic(o, threshold);
     e.flow_model = state.report.flow_model;
     e.flow_sigma_px = state.report.flow_sigma_px;
     if (foreground || options.coarse.soft_background)
-      e.coarse_probability = static_cast<double>(first_stage_probability(
-          static_cast<Scalar>(e.object.static_probability), foreground, static_cast<Scalar>(options.object_threshold)));
+      e.coarse_probability = static_cast<double>(first_stage_probability(o, foreground, threshold));
     if (state.report.stage == Stage::fine && state.report.constrained > 0) {
       const SecondStageKeypoint<Scalar>& known = state.evidence[i];
       e.stage = Stage::fine;
-      e.rule = second_stage_rule(known, static_cast<Scalar>(options.object_threshold));
+      e.rule = second_stage_rule(known, threshold);
       e.projection = detail::explain_constraint(known.projection, state.scratch.projection[i], state.report.projection);
       e.epipolar = detail::explain_constraint(known.epipolar, state.scratch.epipolar[i], state.report.epipolar);
       e.visibility = static_cast<double>(known.visibility);

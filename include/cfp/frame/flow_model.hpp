@@ -89,8 +89,7 @@ template <typename Scalar>
 template <typename Scalar>
 [[nodiscard]] FlowModel<Scalar> model_of(FlowModelKind kind, FlowSupport support, const CameraMotion<Scalar>& motion) {
   FlowModel<Scalar> model;
-  model.kind = kind, model.support = support;
-  model.status = RansacStatus::ok;
+  model.kind = kind, model.support = support, model.status = RansacStatus::ok;
   model.motion = motion;
   model.sigma_px = motion.sigma_px;
   model.coordinates = motion.coordinates;
@@ -114,18 +113,24 @@ FlowModel<Scalar> estimate_motion_model(FlowModelKind kind, const FlowPairs<Scal
   return model;
 }
 
-/// Measures the noise of the pairs marked in `outside` under the model, if enough of them have a distance.
+/// F as a model, with the noise of the pairs marked in `outside` if enough of them have a distance.
 template <typename Scalar>
-void measure_sigma(const FlowPairs<Scalar>& flow, span<const char> outside, const PinholeCamera<Scalar>& camera,
-                   const FlowModelOptions& options, FlowModel<Scalar>& model, std::vector<Scalar>& distances) {
+[[nodiscard]] FlowModel<Scalar> fundamental_model(const Matrix3<Scalar>& F, RansacStatus status, FlowSupport support,
+                                                  const FlowPairs<Scalar>& flow, span<const char> outside,
+                                                  const FlowModelOptions& options, std::vector<Scalar>& distances) {
+  FlowModel<Scalar> model;
+  model.kind = FlowModelKind::fundamental, model.support = support, model.status = status;
+  model.F = F;
+  model.coordinates = 1;
   distances.resize(outside.size());
-  flow_distances(model, flow, camera, options, span<Scalar>(distances));
+  epipolar_distances(F, flow.previous, flow.current, span<Scalar>(distances));
   std::size_t kept = 0;
   for (std::size_t i = 0; i < outside.size(); ++i) {
     if (outside[i] != 0 && has_distance(distances[i])) distances[kept++] = distances[i];
   }
-  if (kept < options.min_outside_pairs) return;
-  model.sigma_px = flow_sigma(span<Scalar>(distances.data(), kept), model.coordinates, options.motion);
+  if (kept >= options.min_outside_pairs)
+    model.sigma_px = flow_sigma(span<Scalar>(distances.data(), kept), model.coordinates, options.motion);
+  return model;
 }
 
 /// The fundamental matrix of the pairs marked in `outside` and their noise; none of too few, or if they have none.
@@ -142,12 +147,8 @@ FlowModel<Scalar> estimate_fundamental(const FlowPairs<Scalar>& flow, span<const
       PointPairs<Scalar>{flow.previous, flow.current, workspace.weights}, camera, options.ransac, workspace.ransac);
   model.status = estimate.status;
   if (!estimate.found()) return model;
-  model.kind = FlowModelKind::fundamental;
-  model.support = FlowSupport::outside_pairs;
-  model.F = estimate.F;
-  model.coordinates = 1;
-  measure_sigma(flow, outside, camera, options, model, workspace.distances);
-  return model;
+  return fundamental_model(estimate.F, estimate.status, FlowSupport::outside_pairs, flow, outside, options,
+                           workspace.distances);
 }
 
 }  // namespace CFP_ISA

@@ -1,6 +1,6 @@
 /// @file frame_flow_model_impl.hpp
 /// What the flow pairs of a frame are judged by: the flow's own model, what the host knows of the camera's motion, and
-/// what the frame before lets expect. For estimate_objects.hpp, not an interface.
+/// what the frame before lets expect. Not an interface.
 #pragma once
 
 #include <optional>
@@ -37,22 +37,6 @@ void find_flow_depths(const Frame<Scalar>& frame, const CoarseOptions& coarse, F
                                   [](const auto&) { return true; });
     state.flow_depths.push_back(j < previous.depths.size() ? previous.depths[j] : Scalar(-1));
   }
-}
-
-/// The flow of a frame with the depths that are known of it; after find_flow_depths.
-template <typename Scalar>
-[[nodiscard]] FlowPairs<Scalar> flow_with_depths(const Frame<Scalar>& frame, const FrameState<Scalar>& state) noexcept {
-  return {frame.flow.previous, frame.flow.current, state.flow_depths};
-}
-
-/// The motion of the flow's depths joined with what the frame before lets expect if the two agree, for a camera that is
-/// pushed keeps no velocity.
-template <typename Scalar>
-[[nodiscard]] UncertainMotion<Scalar> joined_with_expected(const UncertainMotion<Scalar>& measured,
-                                                           const TimedMotion<double>& last, double time_s,
-                                                           double acceleration_m_s2) noexcept {
-  if (!(acceleration_m_s2 > 0 && last.time_s > 0 && time_s > 0)) return measured;
-  return joined(predicted_motion(last, time_s, acceleration_m_s2), measured, most_motion_distance_sq);
 }
 
 /// Joins the flow's motion with the host's. Where they disagree, one is wrong: the flow's if most of the pairs on no
@@ -97,12 +81,13 @@ template <typename Scalar>
   FlowModel<Scalar> model =
       estimate_motion_model(FlowModelKind::motion, flow, outside, camera, options, state.scratch.flow);
   if (model.kind == FlowModelKind::none) return model;
-  const double time_s = elapsed_s(state);
+  const double time_s = elapsed_s(state), acceleration = options.camera_acceleration_m_s2;
+  const TimedMotion<double>& last = state.previous.motion;
   if (given)
     state.report.motion_refused =
         !join_with_given(*given, flow, outside, camera, options, model, state.scratch.flow.motion);
-  else
-    model.motion = joined_with_expected(model.motion, state.previous.motion, time_s, options.camera_acceleration_m_s2);
+  else if (acceleration > 0 && last.time_s > 0 && time_s > 0)  // where the two agree: a camera may be pushed
+    model.motion = joined(predicted_motion(last, time_s, acceleration), model.motion, most_motion_distance_sq);
   state.current.motion = {model.motion.template cast<double>(), time_s};
   return model;
 }
@@ -140,13 +125,8 @@ template <typename Scalar>
   const bool exact = given && given->covariance.isZero(0);
   FlowModel<Scalar> model, as_given;
   if (frame.fundamental && !exact) {
-    model.kind = FlowModelKind::fundamental;
-    model.support = FlowSupport::caller;
-    model.status = RansacStatus::ok;
-    model.F = *frame.fundamental;
-    model.coordinates = 1;
-    measure_sigma(undistorted_flow, outside, camera, coarse.flow, model, state.scratch.flow.distances);
-    return model;
+    return fundamental_model(*frame.fundamental, RansacStatus::ok, FlowSupport::caller, undistorted_flow, outside,
+                             coarse.flow, state.scratch.flow.distances);
   }
   if (!exact) model = model_by_depths(given, undistorted_flow, camera, coarse, state);
   if (model.kind != FlowModelKind::none) return model;

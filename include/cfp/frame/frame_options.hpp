@@ -55,7 +55,7 @@ struct UnreportedOptions {
 struct CoarseOptions {
   bool use_object_probability = true;  ///< false: O of every object is unknown (the paper's CFP-SLAM-)
   bool use_depth_foreground = true;    ///< false: all keypoints in a box are its foreground (W/O-DBS)
-  bool soft_background = true;  ///< false: background keypoints keep K = 1, as do all outside (W/O-KSP, Only-YOLO)
+  bool soft_background = true;         ///< false: background keypoints keep K = 1, as do all outside (W/O-KSP)
   /// WeightRule::posterior: a keypoint in a box is judged by the flow pair nearest to it, if one lies within; by
   /// its object else. >= 0; 0: always by its object.
   double flow_radius_px = 10;

@@ -57,7 +57,7 @@ struct FrameReport {
   // constraints
   ConstraintReport projection, epipolar;
   std::size_t matched_in_boxes = 0;      ///< keypoints that the descriptors matched
-  std::size_t unmatched_foreground = 0;  ///< foreground keypoints without a match in the frame before: K = 0
+  std::size_t unmatched_foreground = 0;  ///< foreground keypoints without a match in the frame before
   std::size_t constrained = 0;           ///< keypoints in boxes whose K the constraints have set
   // map points and weights
   std::size_t mismatched = 0;  ///< observations left out because K and M differ too much
@@ -149,6 +149,12 @@ inline namespace CFP_ISA {
 template <typename Scalar>
 [[nodiscard]] double elapsed_s(const FrameState<Scalar>& state) noexcept {
   return state.previous.known ? state.current.timestamp_s - state.previous.timestamp_s : 0;
+}
+
+/// The flow of a frame with the depths that are known of it; after find_flow_depths.
+template <typename Scalar>
+[[nodiscard]] FlowPairs<Scalar> flow_with_depths(const Frame<Scalar>& frame, const FrameState<Scalar>& state) noexcept {
+  return {frame.flow.previous, frame.flow.current, state.flow_depths};
 }
 
 /// M of keypoint i; -1, as of one without a map point, for a host that keeps none.

@@ -17,7 +17,7 @@ struct HealthOptions {
 enum class WeightFallback : std::uint8_t {
   none,        ///< the weights are the model's
   background,  ///< background keypoints inside boxes count as static
-  all          ///< even so too few: every keypoint counts as static, as without this library
+  all          ///< even so too few: every valid keypoint counts as static, as without this library
 };
 
 struct FrameHealth {

@@ -4,10 +4,7 @@
 #pragma once
 
 #include <algorithm>
-#include <vector>
 
-#include "cfp/frame/estimate_objects.hpp"
-#include "cfp/frame/frame_flow_model_impl.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
 #include "cfp/frame/object_members_impl.hpp"
@@ -62,16 +59,6 @@ void label_members(std::size_t b, const FrameOptions& options, FrameState<Scalar
   }
 }
 
-inline void count_labels(const std::vector<KeypointLabel>& label, FrameReport& report) noexcept {
-  const auto count = [&](KeypointLabel wanted) {
-    return static_cast<std::size_t>(std::count(label.begin(), label.end(), wanted));
-  };
-  report.outside = count(KeypointLabel::outside);
-  report.foreground = count(KeypointLabel::foreground);
-  report.background = count(KeypointLabel::background);
-  report.invalid = count(KeypointLabel::invalid);
-}
-
 /// The detection that object_of_keypoint or the mask at its pixel names for keypoint i; negative: none.
 template <typename Scalar>
 [[nodiscard]] std::int32_t detection_of_keypoint(std::size_t i, const Frame<Scalar>& frame,
@@ -118,7 +105,7 @@ inline namespace CFP_ISA {
 /// index). Keypoints on no object keep K = 1. What a mask or object_of_keypoint gives an object is its foreground;
 /// depth then only tells where it stands, and what lies in its box and on no mask is background: masks leave out hands
 /// and feet, which the flow at their place tells (cfp_posterior_study). In a box for which nothing is named depth
-/// decides. O(keypoints x boxes), and keypoints x flow pairs within each box. Outside of boxes the flow is asked as
+/// decides. O(keypoints x boxes), and flow pairs near each keypoint. Outside of boxes the flow is asked as
 /// UnreportedOptions say.
 template <typename Scalar>
 void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
@@ -146,7 +133,9 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
   report.stray_labels = detail::stray_labels(frame, state);
   detail::score_flow_at_keypoints(frame, options, state);
   detail::score_flow_outside(detail::flow_with_depths(frame, state), options, state);
-  detail::count_labels(state.label, report);
+  std::size_t* const counts[] = {&report.outside, &report.foreground, &report.background, &report.invalid};
+  for (std::size_t* const count : counts) *count = 0;
+  for (const KeypointLabel label : state.label) ++*counts[static_cast<std::size_t>(label)];
 }
 
 }  // namespace CFP_ISA

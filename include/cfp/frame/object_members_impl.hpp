@@ -1,6 +1,5 @@
 /// @file object_members_impl.hpp
-/// What belongs to the object of a box: by its mask or the box, and there by depth. For estimate_objects.hpp and
-/// label_keypoints.hpp, not an interface.
+/// What belongs to the object of a box: by its mask or the box, and there by depth. Not an interface.
 #pragma once
 
 #include "cfp/clustering/depth_foreground.hpp"

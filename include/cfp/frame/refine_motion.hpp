@@ -10,7 +10,7 @@
 #include "cfp/core/span.hpp"
 #include "cfp/frame/camera_motion.hpp"
 #include "cfp/frame/frame.hpp"
-#include "cfp/geometry/motion_distance.hpp"
+#include "cfp/geometry/motion_residual_impl.hpp"
 #include "cfp/math/normal_equations.hpp"
 #include "cfp/math/se3.hpp"
 #include "cfp/optimization/least_squares.hpp"

@@ -99,6 +99,7 @@ class StaticProbability {
   void reset() noexcept {
     tracker_.reset();
     state_.previous.known = state_.current.known = false;
+    state_.boxes.clear();
     state_.report = {};
   }
 

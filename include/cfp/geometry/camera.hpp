@@ -48,8 +48,8 @@ struct PinholeCamera {
     return true;
   }
 
-  /// The ray through a pixel, scaled to z = 1: a point at depth d is d * ray. False, and ray untouched, for a pixel or
-  /// an intrinsic that is not finite.
+  /// The ray through a pixel, scaled to z = 1: a point at depth d is d * ray. False, and ray untouched, for a pixel, a
+  /// principal point or a result that is not finite, as of a focal length of 0.
   [[nodiscard]] CFP_INLINE bool unproject(const Vector2<Scalar>& pixel, Vector3<Scalar>& ray) const noexcept {
     const Scalar x = (pixel.x() - cx) / fx;
     const Scalar y = (pixel.y() - cy) / fy;

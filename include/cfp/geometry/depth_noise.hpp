@@ -16,7 +16,7 @@ struct DepthNoise {
   double nearest_m = 0.4;      ///< defaults: structured light, Nguyen, Izadi and Lovell, 3DIMPVT 2012
 
   /// Example: 0.0140 m at z = 3 m with the defaults.
-  [[nodiscard]] constexpr double sigma_m(double depth_m) const noexcept {
+  [[nodiscard]] CFP_INLINE constexpr double sigma_m(double depth_m) const noexcept {
     return constant_m + quadratic * (depth_m - nearest_m) * (depth_m - nearest_m);
   }
 };

@@ -19,6 +19,17 @@
 
 namespace cfp {
 
+inline namespace CFP_ISA {
+
+/// The line (A, B, C) = F x_prev in the current image: A u + B v + C = 0.
+template <typename Scalar>
+[[nodiscard]] CFP_INLINE Vector3<Scalar> epipolar_line(const Matrix3<Scalar>& F,
+                                                       const Vector2<Scalar>& x_prev) noexcept {
+  return F.col(0) * x_prev.x() + F.col(1) * x_prev.y() + F.col(2);
+}
+
+}  // namespace CFP_ISA
+
 namespace detail {
 inline namespace CFP_ISA {
 
@@ -45,7 +56,7 @@ template <typename Scalar>
                                                          const Vector2<Scalar>& x_cur) noexcept {
   using std::abs;
   using std::sqrt;
-  const Vector3<Scalar> line = F.col(0) * x_prev.x() + F.col(1) * x_prev.y() + F.col(2);
+  const Vector3<Scalar> line = epipolar_line(F, x_prev);
   const Scalar norm_sq = line.x() * line.x() + line.y() * line.y();
   const Scalar noise_sq = noise.x() * x_prev.x() * x_prev.x() + noise.y() * x_prev.y() * x_prev.y() + noise.z();
   if (!(norm_sq > noise_sq)) return Scalar(no_distance<double>);
@@ -79,12 +90,6 @@ template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> rotation_homography(const PinholeCamera<Scalar>& camera,
                                                   const Matrix3<non_deduced<Scalar>>& R) noexcept {
   return camera.matrix() * R * inverse(camera.matrix());
-}
-
-/// The line (A, B, C) = F x_prev in the current image: A u + B v + C = 0.
-template <typename Scalar>
-[[nodiscard]] Vector3<Scalar> epipolar_line(const Matrix3<Scalar>& F, const Vector2<Scalar>& x_prev) noexcept {
-  return F.col(0) * x_prev.x() + F.col(1) * x_prev.y() + F.col(2);
 }
 
 /// The paper's d = |x_cur^T F x_prev| / sqrt(A^2 + B^2), (A, B, C) = F x_prev: distance in pixels of the current point

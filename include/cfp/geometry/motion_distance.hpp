@@ -30,9 +30,7 @@ using AtLeastDouble = decltype(Scalar() + double());
 template <typename Real>
 [[nodiscard]] UncertainMotion<Real> at_unknown_depth(UncertainMotion<Real> motion, const UnknownDepth& depth) noexcept {
   const double ratio = depth.inverse_sigma / depth.inverse_mean, more = 1 + (std::min)(ratio * ratio, 1.0);
-  for (int i = 0; i < 3; ++i) {
-    for (int k = 0; k < 3; ++k) motion.covariance(i, k) *= Real(more);
-  }
+  motion.covariance.template topLeftCorner<3, 3>() *= Real(more);
   return motion;
 }
 

@@ -1,6 +1,6 @@
 /// @file motion_residual_impl.hpp
-/// A flow pair against the camera's motion, linearised, for motion_distance.hpp, common_shift.hpp and
-/// refine_motion.hpp. Not an interface.
+/// A flow pair against the camera's motion, linearised, for the distances and sums that are made of it. Not an
+/// interface.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,6 @@
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/types.hpp"
 #include "cfp/geometry/depth_noise.hpp"
-#include "cfp/geometry/distance.hpp"
 #include "cfp/math/matrix3.hpp"
 #include "cfp/math/normal_equations.hpp"
 #include "cfp/math/se3.hpp"

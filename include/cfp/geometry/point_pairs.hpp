@@ -46,9 +46,8 @@ struct PairScaling {
 
 inline namespace CFP_ISA {
 
-template <typename T>
-[[nodiscard]] Vector3<double> scaled(const PixelScaling& s, const Vector2<T>& x) noexcept {
-  return {s.factor * (static_cast<double>(x[0]) - s.x), s.factor * (static_cast<double>(x[1]) - s.y), 1.0};
+[[nodiscard]] inline Vector3<double> scaled(const PixelScaling& s, const Vector2<double>& x) noexcept {
+  return {s.factor * (x[0] - s.x), s.factor * (x[1] - s.y), 1.0};
 }
 
 // The same as a matrix of homogeneous pixels, and its inverse.

@@ -140,7 +140,8 @@ struct RadialTangentialCamera {
   }
 
   /// The ray through a pixel, scaled to z = 1, by Newton's method from the axis with step halving. False, and ray
-  /// untouched, when no ray before the fold gives the pixel, or anything is not finite. At most 40 evaluations of the
+  /// untouched, when no ray before the fold gives the pixel, or pixel, principal point, a coefficient or the
+  /// result is not finite. At most 40 evaluations of the
   /// model.
   [[nodiscard]] CFP_INLINE bool unproject(const Vector2<Scalar>& pixel, Vector3<Scalar>& ray) const noexcept {
     return detail::find_ray(*this, pixel, ray);

@@ -102,7 +102,7 @@ inline Status sample_depth(const cv::Mat& depth, const PointSpan<float, 2>& pixe
 /// rotation is normalised, as products of float matrices drift. invalid_input, and pose untouched: another size or
 /// type, or what is no rigid motion (see `is_rigid_motion`).
 template <typename Scalar>
-Status to_se3(const cv::Mat& matrix, SE3<Scalar>& pose) noexcept {
+[[nodiscard]] Status to_se3(const cv::Mat& matrix, SE3<Scalar>& pose) noexcept {
   if (!detail::is_pose_matrix(matrix)) return Status::invalid_input;
   SE3<double> read;
   for (int row = 0; row < 3; ++row) {
@@ -155,7 +155,7 @@ template <typename Scalar>
 /// the fourth row if there is one. invalid_input, and the matrix untouched, for another size or type. The matrix shares
 /// its elements with its shallow copies, as always in OpenCV.
 template <typename Scalar>
-Status write_pose(const SE3<Scalar>& pose, cv::Mat& matrix) noexcept {
+[[nodiscard]] Status write_pose(const SE3<Scalar>& pose, cv::Mat& matrix) noexcept {
   if (!detail::is_pose_matrix(matrix)) return Status::invalid_input;
   const Matrix4<Scalar> T = pose.matrix();
   for (int row = 0; row < matrix.rows; ++row) {

@@ -3,10 +3,11 @@
 /// eq. for O_m). k: degrees of freedom, in [1, 100]; any other k gives 0.
 ///
 /// x is a squared, normalised residual, no unit. NaN gives 0 for both functions: the safe side of a static probability.
-/// Closed forms, in double for float where k > 2; the tail is a sum of positive terms and never 1 - cdf, so nothing
-/// cancels: relative error about 1e-13 for double (tests: a table from an independent library), as far as exp(-x/2) is
-/// a normal number, x < 1416; from 1490 on it is 0, and both functions with it. Both also take dual numbers such as
-/// ceres::Jet. Nothing allocates. Source: Abramowitz, Stegun: "Handbook of mathematical functions", 26.4.4, 26.4.5.
+/// Closed forms, the density in double for float where k > 2; the tail is a sum of positive terms and never 1 - cdf, so
+/// nothing cancels: relative error about 1e-13 for double (tests: a table from an independent library), as far as
+/// exp(-x/2) is a normal number, x < 1416; from 1490 on it is 0, and both functions with it. Both also take dual
+/// numbers such as ceres::Jet. Nothing allocates. Source: Abramowitz, Stegun: "Handbook of mathematical
+/// functions", 26.4.4, 26.4.5.
 #pragma once
 
 #include <cmath>

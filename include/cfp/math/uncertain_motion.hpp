@@ -92,7 +92,9 @@ template <typename Scalar>
   const Vector6<double> correction = gain.lazyProduct(apart);
   UncertainMotion<double> both(se3_exp(correction) * given.T_cur_prev);
   both.covariance = gain.lazyProduct(other.covariance);
-  result = both.template cast<Scalar>();
+  const UncertainMotion<Scalar> rounded = both.template cast<Scalar>();
+  if (!rounded.covariance.allFinite() || !rounded.T_cur_prev.translation.allFinite()) return false;
+  result = rounded;
   return true;
 }
 

@@ -91,9 +91,7 @@ LeastSquaresResult minimize_least_squares(Problem& problem, const LevenbergMarqu
   if (!is_finite(cost)) return result;
   result.initial_cost = cost;
   result.status = SolverStatus::iteration_limit;
-  const auto clamped = [&](double damping) {
-    return (std::min)((std::max)(damping, options.min_damping), options.max_damping);
-  };
+  const auto clamped = [&](double damping) { return std::clamp(damping, options.min_damping, options.max_damping); };
   const double rejected_damping = (std::min)(options.rejected_damping, options.max_damping);
   double damping = clamped(options.initial_damping), growth = 2;
   while (result.iterations < options.max_iterations) {

@@ -72,7 +72,7 @@ struct FundamentalEvidence {
   };
 
   [[nodiscard]] static std::size_t cell_of(T x) noexcept {
-    return static_cast<std::size_t>((std::min)((std::max)(T(0.2) * x + T(0.5), T(0)), T(0.999)) * cells);
+    return static_cast<std::size_t>(std::clamp(T(0.2) * x + T(0.5), T(0), T(0.999)) * cells);
   }
   [[nodiscard]] std::size_t range_of(std::size_t k) const noexcept { return static_cast<std::size_t>(range[k]); }
 

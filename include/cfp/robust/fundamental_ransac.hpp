@@ -88,7 +88,7 @@ template <typename Scalar>
   RansacSearch<Matrix3<double>> found = lo_ransac(search, options, search.random, workspace.sampling);
   result.iterations = found.iterations;
   Matrix3<double>& F = found.best.model;
-  bool has_F = found.best.cost < search.total_weight();
+  bool has_F = is_finite(found.best.cost);
   DegeneracyCheck<double> check{search, workspace.scratch};
   if (has_F)
     search.measure_noise(F);
@@ -103,7 +103,6 @@ template <typename Scalar>
     has_F = check.has_parallax(F, K, static_cast<double>(options.min_inliers));
     if (!has_F && !check.rests_on_lines()) result.status = RansacStatus::no_consensus;
   } else {
-    if (is_finite(found.best.cost)) result.status = RansacStatus::no_consensus;
     for (std::size_t i = 0; i < pairs.size; ++i) search.distances_sq[i] = transfer_sq(pairs, check.H, i) / 4;
     search.measure_noise();
   }

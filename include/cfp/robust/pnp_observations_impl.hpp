@@ -32,11 +32,6 @@ struct ObservationArrays : RansacColumns<observation_rows> {
 
 inline namespace CFP_ISA {
 
-[[nodiscard]] inline double median_of(const double* values, std::size_t count, std::vector<double>& scratch) {
-  scratch.assign(values, values + count);
-  return order_statistic(span<double>(scratch), count / 2);
-}
-
 template <typename Camera, typename Scalar>
 void load_observations(const PointSpan<Scalar, 3>& world, const PointSpan<Scalar, 2>& pixels,
                        const span<const Scalar>& weights, const Camera& camera, ObservationArrays& out,
@@ -63,15 +58,11 @@ void load_observations(const PointSpan<Scalar, 3>& world, const PointSpan<Scalar
   }
   for (std::size_t r = X; r <= Z; ++r) {
     // Of an odd number of them: the origin of points on a line then lies there, too.
-    out.origin[r] = median_of(out.row(r), out.size - (out.size % 2 == 0 && out.size > 0 ? 1 : 0), scratch);
+    scratch.assign(out.row(r), out.row(r) + (out.size - (out.size % 2 == 0 && out.size > 0 ? 1 : 0)));
+    out.origin[r] = order_statistic(span<double>(scratch), scratch.size() / 2);
     for (std::size_t i = 0; i < out.size; ++i) out.row(r)[i] -= out.origin[r];
   }
   finish(out);
-}
-
-// What the coordinates given, whose epsilon that is, may err by rounding; relative to the origin they err less.
-[[nodiscard]] inline double rounding_of(const ObservationArrays& in, double epsilon) {
-  return 4 * epsilon * Vector3<double>(in.origin[0], in.origin[1], in.origin[2]).norm();
 }
 
 // Whether the points lie on a line or in one place, to the rounding of float coordinates: relative to the size of the

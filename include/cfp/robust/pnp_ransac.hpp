@@ -72,22 +72,21 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
   detail::load_observations(world, pixels, weights, camera, observations, workspace.sampling);
   result.used = observations.size;
   if (observations.size < options.min_inliers || observations.size < 4) return result;
-  const double rounding =
-      detail::rounding_of(observations, static_cast<double>(std::numeric_limits<Scalar>::epsilon()));
-  if (detail::on_a_line(observations, rounding, workspace.sampling)) {
-    result.status = RansacStatus::degenerate;
-    return result;
-  }
+  result.status = RansacStatus::degenerate;
+  const Vector3<double> origin(observations.origin.data());
+  // What the coordinates given may err by rounding; relative to the origin they err less.
+  const double rounding = 4 * static_cast<double>(std::numeric_limits<Scalar>::epsilon()) * origin.norm();
+  if (detail::on_a_line(observations, rounding, workspace.sampling)) return result;
   detail::PnpProblem<double> problem{observations, options.threshold_px * options.threshold_px};
   Random random(options.seed, "pnp_ransac");
   RansacSearch<SE3<double>> search = lo_ransac(problem, options, random, workspace.sampling);
   result.iterations = search.iterations;
   result.status = RansacStatus::no_consensus;
-  if (!(search.best.cost < observations.total_weight)) return result;
+  if (!is_finite(search.best.cost)) return result;
   problem.refine<double>(problem.limit, 10, search.best.model);  // the scale of the loss near the inliers' spread
 
   SE3<double> T = search.best.model;
-  T.translation -= T.rotation * Vector3<double>(observations.origin[0], observations.origin[1], observations.origin[2]);
+  T.translation -= T.rotation * origin;
   const SE3<Scalar> pose = T.template cast<Scalar>();
   result.status = search.confident ? RansacStatus::ok : RansacStatus::iteration_limit;
   const auto is_inlier = [&](std::size_t i) {
@@ -99,10 +98,8 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
   detail::report_inliers(observations, is_inlier, options.min_inliers, inlier_mask, result);
   if (result.found() && !detail::four_places(observations, is_inlier)) detail::refuse(inlier_mask, result);
   if (result.found() && detail::hang_on_a_line(observations, search.best.model, options.threshold_px, rounding,
-                                               is_inlier, workspace.sampling)) {
-    detail::refuse(inlier_mask, result);
-    result.status = RansacStatus::degenerate;
-  }
+                                               is_inlier, workspace.sampling))
+    detail::refuse(inlier_mask, result, RansacStatus::degenerate);
   const bool few = 5 * result.inliers < 2 * result.used;  // chance makes no more, save where all pixels are one
   if (few && result.found() && !problem.stands_out(search.best.model, search.iterations))
     detail::refuse(inlier_mask, result);

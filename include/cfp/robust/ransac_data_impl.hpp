@@ -19,7 +19,7 @@ namespace cfp::detail {
 // blocks, so that loops over packets need no rest. In double and, for scoring, rounded to float.
 template <std::size_t Rows>
 struct RansacColumns {
-  static constexpr std::size_t rows = Rows, block = 64;
+  static constexpr std::size_t block = 64;
 
   std::size_t size = 0, capacity = 0;
   double total_weight = 0;
@@ -104,11 +104,12 @@ template <typename T>
   return nats(near, chance) + nats(all - near, 1 - chance);
 }
 
-inline void refuse(span<char> inlier_mask, RansacReport& report) noexcept {
+inline void refuse(span<char> inlier_mask, RansacReport& report,
+                   RansacStatus status = RansacStatus::no_consensus) noexcept {
   std::fill(inlier_mask.begin(), inlier_mask.end(), char(0));
   report.inliers = 0;
   report.inlier_share = 0;
-  report.status = RansacStatus::no_consensus;
+  report.status = status;
 }
 
 // Fills the counts, the share and the mask (empty, or one per datum of the caller, all 0). Too few inliers are no

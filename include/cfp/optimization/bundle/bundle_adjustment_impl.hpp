@@ -176,10 +176,9 @@ void write_squared_errors(const BundleProblem<Camera, Scalar>& problem, const Bu
   CFP_ASSERT(squared_errors.size() == problem.observations.pose.size());
   for (std::size_t i = 0; i < squared_errors.size(); ++i) {
     BundleMeasurement m;
-    double error = -1;
-    const bool judged = read_measurement(problem, i, m) && index.is_rigid[to_index(m.pose)] != 0 &&
-                        squared_error(problem, m, error) && is_finite(error) && is_finite(error * m.weight);
-    squared_errors[i] = judged ? error : -1;
+    const bool valid = read_measurement(problem, i, m) && index.is_rigid[to_index(m.pose)] != 0;
+    const double error = valid ? squared_error(problem, m) : -1;
+    squared_errors[i] = is_finite(error) && is_finite(error * m.weight) ? error : -1;
   }
 }
 

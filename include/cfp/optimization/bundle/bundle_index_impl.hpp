@@ -73,18 +73,16 @@ template <typename Camera>
   return cameras.size() == 1 ? cameras[0] : cameras[to_index(pose)];
 }
 
-/// |r|^2 / sigma^2 of one observation; false when the camera does not see the point.
+/// |r|^2 / sigma^2 of one observation; -1 when the camera does not see the point.
 template <typename Camera, typename Scalar>
-[[nodiscard]] bool squared_error(const BundleProblem<Camera, Scalar>& problem, const BundleMeasurement& m,
-                                 double& error) noexcept {
+[[nodiscard]] double squared_error(const BundleProblem<Camera, Scalar>& problem, const BundleMeasurement& m) noexcept {
   using Real = typename Camera::ScalarType;
   const Vector3<double> p = problem.poses[to_index(m.pose)] * problem.points[to_index(m.point)];
   Vector2<Real> pixel;
-  if (!camera_of(problem.cameras, m.pose).project(p.template cast<Real>(), pixel)) return false;
+  if (!camera_of(problem.cameras, m.pose).project(p.template cast<Real>(), pixel)) return -1;
   const double du = static_cast<double>(pixel.x()) - m.u, dv = static_cast<double>(pixel.y()) - m.v;
   const double dr = m.stereo ? du + m.disparity - problem.baseline_fx / p.z() : 0.0;
-  error = (du * du + dv * dv + dr * dr) * m.information;
-  return true;
+  return (du * du + dv * dv + dr * dr) * m.information;
 }
 
 /// Keeps the observations that can be used, and marks the poses and points they touch.
@@ -102,14 +100,13 @@ void select_observations(const BundleProblem<Camera, Scalar>& problem, BundleInd
   for (std::size_t k = 0; k < problem.poses.size(); ++k) index.is_rigid[k] = is_rigid_motion(problem.poses[k]) ? 1 : 0;
   for (std::size_t i = 0; i < n; ++i) {
     BundleMeasurement m;
-    double error = 0;
     if (!read_measurement(problem, i, m)) {
       ++result.invalid;
     } else if (m.weight == 0) {
       ++result.zero_weight;
     } else if (index.is_rigid[to_index(m.pose)] == 0 || !is_finite(problem.points[to_index(m.point)].sum())) {
       ++result.invalid;
-    } else if (!squared_error(problem, m, error)) {
+    } else if (const double error = squared_error(problem, m); error < 0) {
       ++result.behind;
     } else if (!is_finite(error * m.weight)) {
       ++result.invalid;

@@ -20,8 +20,9 @@ namespace cfp {
 /// `u_right`, at most one may be given: both are invalid input.
 ///
 /// A third row comes from a depth z or from the column of the point in the (virtual) right image, u_right = u - fx b /
-/// z: two names for one measurement. It counts when z is positive and finite, and u_right positive and finite (as in
-/// ORB-SLAM2, which marks "none" with -1); otherwise the observation is a pixel only. Bundle adjustment does the same.
+/// z: two names for one measurement. It counts when z is positive and finite, and u_right positive (as in ORB-SLAM2,
+/// which marks "none" with -1) and at most 1e7 px, also where it follows from z; otherwise the observation is a pixel
+/// only. Bundle adjustment takes any finite u_right above 0.
 template <typename Scalar>
 struct PoseObservations {
   PointSpan<Scalar, 3> points;           ///< X, world frame, m
@@ -31,7 +32,7 @@ struct PoseObservations {
   span<const Scalar> inverse_sigmas_sq;  ///< 1/px^2, instead of sigmas (ORB-SLAM2: mvInvLevelSigma2 of the octave)
   span<const Scalar> depths;             ///< m, instead of u_right
   span<const Scalar> u_right;            ///< px, instead of depths
-  double baseline_fx = 0;  ///< fx times stereo baseline, px m (ORB-SLAM2: Camera.bf); not > 0: pixels only
+  double baseline_fx = 0;  ///< fx times stereo baseline, px m (ORB-SLAM2: Camera.bf); not in (0, 1e6]: pixels only
 };
 
 /// One robust solve within a refinement.
