@@ -44,6 +44,7 @@ FRAME = [
     ("frame", "frame<float, Stages::both, Given::fundamental>", "both stages, F given, float", 170, 140),
     ("frame", "frame<double, Stages::both, Given::fundamental>", "both stages, F given, double", None, None),
     ("frame", "frame<float, Stages::both, Given::depths>", "both stages, motion from the flow's depths, float", 500, 500),
+    ("frame", "frame<float, Stages::both, Given::keypoint_depths>", "the same by the depths of the keypoints next to it, float", None, None),
     ("frame", "frame<float, Stages::both, Given::motion>", "both stages, a host's motion, no depths, float", None, None),
     ("frame", "frame<float, Stages::both, Given::nothing>", "both stages, F by RANSAC, float", 1500, 1500),
     ("frame", "frame<double, Stages::both, Given::nothing>", "both stages, F by RANSAC, double", None, None),
