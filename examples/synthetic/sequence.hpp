@@ -142,8 +142,10 @@ class Sequence {
     if (recording_ != nullptr) backdrop = load(recording_->views[static_cast<std::size_t>(frame)]);
     const std::vector<Surface> surfaces = surfaces_at(time);
     renderer.render(scene_, surfaces, options_.camera, T_stage_cam(frame), backdrop, options_.render, out.truth);
-    if (options_.blur_samples > 1 && recording_ == nullptr) blur(time, renderer, out.truth);
-    if (options_.readout_s > 0 && recording_ == nullptr) roll(time, renderer, out.truth);
+    if (options_.readout_s > 0 && recording_ == nullptr)
+      roll(time, renderer, out.truth);
+    else if (options_.blur_samples > 1 && recording_ == nullptr)
+      blur(time, {0, options_.camera.height}, renderer, out.truth);
     double people = 0;
     for (const Sighting& s : out.truth.people) people += s.pixels;
     people /= static_cast<double>(out.truth.depth.total());
@@ -175,15 +177,21 @@ class Sequence {
     return stage;
   }
 
-  void blur(double time, Renderer& renderer, Frame& truth) const {
-    cv::Mat sum = cv::Mat::zeros(truth.color.size(), CV_32FC3);
+  /// Some rows at a time, and beside them those that their edges are smoothed with.
+  void render_rows(double time, cv::Range rows, Renderer& renderer, Frame& frame) const {
+    const cv::Range seen(std::max(rows.start - 1, 0), std::min(rows.end + 1, options_.camera.height));
+    renderer.render(scene_, surfaces_at(time), options_.camera, motion_(time), {}, options_.render, frame, seen);
+  }
+
+  void blur(double time, cv::Range rows, Renderer& renderer, Frame& truth) const {
+    cv::Mat sum = cv::Mat::zeros(rows.size(), truth.color.cols, CV_32FC3);
     Frame part;
     for (int k = 0; k < options_.blur_samples; ++k) {
       const double at = std::max(0.0, time + options_.exposure_s * ((k + 0.5) / options_.blur_samples - 0.5));
-      renderer.render(scene_, surfaces_at(at), options_.camera, motion_(at), {}, options_.render, part);
-      sum += part.color;
+      render_rows(at, rows, renderer, part);
+      sum += part.color.rowRange(rows);
     }
-    truth.color = sum / options_.blur_samples;
+    cv::Mat(sum / options_.blur_samples).copyTo(truth.color.rowRange(rows));
   }
 
   /// Every band of rows at its own time. What is seen of the people stays that of the middle.
@@ -193,13 +201,11 @@ class Sequence {
     Frame part;
     for (int y = 0; y < height; y += band) {
       const double at = std::max(0.0, time + options_.readout_s * ((y + 0.5 * band) / height - 0.5));
-      const cv::Range rows(y, std::min(y + band, height)), seen(std::max(y - 1, 0), std::min(rows.end + 1, height));
-      renderer.render(scene_, surfaces_at(at), options_.camera, motion_(at), {}, options_.render, part, seen);
-      part.color.rowRange(rows).copyTo(truth.color.rowRange(rows));
-      part.depth.rowRange(rows).copyTo(truth.depth.rowRange(rows));
-      part.surface.rowRange(rows).copyTo(truth.surface.rowRange(rows));
-      part.label.rowRange(rows).copyTo(truth.label.rowRange(rows));
-      part.slant.rowRange(rows).copyTo(truth.slant.rowRange(rows));
+      const cv::Range rows(y, std::min(y + band, height));
+      render_rows(at, rows, renderer, part);
+      for (cv::Mat Frame::*image : {&Frame::color, &Frame::depth, &Frame::surface, &Frame::label, &Frame::slant})
+        (part.*image).rowRange(rows).copyTo((truth.*image).rowRange(rows));
+      if (options_.blur_samples > 1) blur(at, rows, renderer, truth);
     }
   }
 

@@ -348,6 +348,7 @@ TEST_CASE("Sensed depth has the stated noise, steps and holes", "[synthetic]") {
 
 TEST_CASE("A rolling shutter shows each row at its own time", "[synthetic]") {
   auto options = small(Scenario::walking, Motion::rpy);
+  options.blur_samples = 2;
   auto in_milliseconds = options;
   in_milliseconds.rate_hz = 1000;
   in_milliseconds.frames = 8000;  // as long: the people do the same
@@ -357,16 +358,19 @@ TEST_CASE("A rolling shutter shows each row at its own time", "[synthetic]") {
   for (const int row : {0, 41, 59, 117}) {
     const int band = row / 4, at_ms = 1500 - 30 + 2 * band + 1;
     const auto then = rendered(still, at_ms);
-    int equal = 0, equal_label = 0, equal_of_frame = 0;
+    int equal = 0, equal_color = 0, equal_label = 0, equal_of_frame = 0;
     const auto middle = rendered(still, 1500);
     for (int x = 0; x < 160; ++x) {
       const float depth = out.truth.depth.at<float>(row, x);
       equal += std::abs(depth - then.truth.depth.at<float>(row, x)) < 1e-4F * depth ? 1 : 0;
       equal_of_frame += std::abs(depth - middle.truth.depth.at<float>(row, x)) < 1e-4F * depth ? 1 : 0;
+      equal_color +=
+          cv::norm(out.truth.color.at<cv::Vec3f>(row, x) - then.truth.color.at<cv::Vec3f>(row, x)) < 0.1 ? 1 : 0;
       equal_label += out.label.at<unsigned char>(row, x) == then.label.at<unsigned char>(row, x) ? 1 : 0;
     }
     CAPTURE(row);
     CHECK(equal == 160);
+    CHECK(equal_color == 160);
     CHECK(equal_label == 160);
     CHECK((row == 59 || equal_of_frame < 80));
   }
