@@ -59,8 +59,8 @@ void print_summary(const RunRecord& run) {
         s.second_stage.auc, s.map_point.auc, s.weight.auc, percent(s.weight.static_lost).c_str(),
         percent(s.weight.moving_kept).c_str());
   if (s.object.samples > 0)
-    std::printf("%11s AUC of O %s; of the boxes of people at rest %s at or below 0.9, of those who move %s above\n", "",
-                cfp_slam::number(s.object.auc, 3).c_str(), percent(s.object.static_lost).c_str(),
+    std::printf("%11s AUC of O %s; of the boxes of people at rest %s at or below O_Th, of those who move %s above\n",
+                "", cfp_slam::number(s.object.auc, 3).c_str(), percent(s.object.static_lost).c_str(),
                 percent(s.object.moving_kept).c_str());
 }
 

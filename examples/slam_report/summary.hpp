@@ -11,6 +11,7 @@
 #include "../slam_runs/run_record.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/evaluation/calibration.hpp"
+#include "cfp/frame/frame_options.hpp"
 #include "statistics.hpp"
 
 namespace cfp_slam {
@@ -28,7 +29,7 @@ struct Cuts {
   double moving_to, static_above;
 };
 inline constexpr Cuts of_weight{0.01, 0.5};  // below a hundredth is as good as left out
-inline constexpr Cuts of_object{0.9, 0.9};   // O_Th
+inline Cuts of_object() { return {cfp::FrameOptions().object_threshold, cfp::FrameOptions().object_threshold}; }
 
 // Errors are not_known when the run has no truth or no result.
 struct RunSummary {
@@ -152,7 +153,7 @@ inline RunSummary summarize(const RunRecord& run) {
   s.second_stage = summarize(run.second_stage);
   s.map_point = summarize(run.map_point);
   s.weight = summarize(run.weight);
-  s.object = summarize(run.object, of_object);
+  s.object = summarize(run.object, of_object());
   return s;
 }
 

@@ -142,16 +142,17 @@ class Sequence {
     if (recording_ != nullptr) backdrop = load(recording_->views[static_cast<std::size_t>(frame)]);
     const std::vector<Surface> surfaces = surfaces_at(time);
     renderer.render(scene_, surfaces, options_.camera, T_stage_cam(frame), backdrop, options_.render, out.truth);
-    if (options_.readout_s > 0 && recording_ == nullptr)
+    const bool is_rendered = recording_ == nullptr;  // not put into a recording, which has errors of its own
+    if (options_.readout_s > 0 && is_rendered)
       roll(time, renderer, out.truth);
-    else if (options_.blur_samples > 1 && recording_ == nullptr)
+    else if (options_.blur_samples > 1 && is_rendered)
       blur(time, {0, options_.camera.height}, renderer, out.truth);
     double people = 0;
     for (const Sighting& s : out.truth.people) people += s.pixels;
     people /= static_cast<double>(out.truth.depth.total());
     const cfp::Random random(options_.seed * 1000003 + static_cast<std::uint64_t>(frame), "sensor");
     const double gain = exposure(options_.sensor, time, people);
-    out.depth = options_.depth_late_s != 0 && recording_ == nullptr
+    out.depth = options_.depth_late_s != 0 && is_rendered
                     ? late_depth(std::max(0.0, time + options_.depth_late_s), renderer, random)
                     : sense_depth(out.truth, surfaces, options_.sensor, normal_, random);
     out.color = sense_color(out.truth, options_.sensor, gain, normal_, cfp::Random(cfp::Random(random)()));

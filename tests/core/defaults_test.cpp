@@ -153,7 +153,7 @@ TEST_CASE("A report that nothing was counted for counts nothing", "[core]") {
   CHECK((b.rate_x == 0 && b.rate_y == 0 && b.score == 0 && b.compensated()));
   const cfp::BoxTrackerResult<double> tracked;
   CHECK((tracked.status == cfp::Status::ok && tracked.boxes.empty() && tracked.skipped == 0));
-  CHECK((tracked.ignored == 0 && tracked.compensated == 0 && tracked.unwarped == 0));
+  CHECK((tracked.ignored == 0 && tracked.compensated == 0 && tracked.unwarped == 0 && !tracked.after_gap));
   const cfp::AssignmentResult assigned;
   CHECK((assigned.status == cfp::Status::ok && assigned.pairs == 0 && assigned.cost == 0));
   const cfp::DbscanResult clusters;

@@ -81,7 +81,8 @@ class BoxTracker {
       result.status = Status::invalid_input;
       dt_s = Scalar(0);
     }
-    if (static_cast<double>(dt_s) > options_.max_gap_s) tracks_.clear();
+    result.after_gap = static_cast<double>(dt_s) > options_.max_gap_s;
+    if (result.after_gap) tracks_.clear();
     for (Track& track : tracks_) {
       predict_box(track.filter, dt_s, options_.motion);
       if (image_motion != nullptr && !warp_box(track.filter, *image_motion)) ++result.unwarped;

@@ -92,6 +92,7 @@ template <typename Scalar>
 template <typename Scalar>
 struct BoxTrackerResult {
   Status status = Status::ok;            ///< invalid_input: dt was negative or not finite, and counted as 0
+  bool after_gap = false;                ///< dt was above max_gap_s: all tracks ended
   span<const TrackedBox<Scalar>> boxes;  ///< oldest track first
   std::size_t skipped = 0;               ///< detections that were improper, too large (1e6 px) or without a score
   std::size_t ignored = 0;               ///< detections below min_score, or below birth_threshold without a track

@@ -60,8 +60,7 @@ struct FlowModel {
   FlowSupport support = FlowSupport::none;
   RansacStatus status = RansacStatus::not_enough_data;  ///< of kind none or motion_up_to_scale: why there is no F
   Matrix3<Scalar> F = Matrix3<Scalar>::Zero();          ///< of kind fundamental, previous to current
-  /// Of both kinds of motion; up to scale, the room's depth is the unit of length.
-  UncertainMotion<Scalar> motion;
+  UncertainMotion<Scalar> motion;                       ///< of both kinds of motion; up to scale in depths of the room
   Scalar sigma_px = Scalar(0);  ///< noise of one coordinate, measured on the pairs on no object; 0: not measured
   int coordinates = 2;          ///< of a pixel that most distances see: 1 across lines
   double shared_error_px = 0;   ///< what neighbours err by together beside it; the motion's covariance counts it

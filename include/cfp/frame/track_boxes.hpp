@@ -70,7 +70,7 @@ void track_boxes(const Frame<Scalar>& frame, const FrameOptions& options, BoxTra
   const BoxTrackerResult<Scalar> tracked = ran ? tracker.track(*frame.detections, static_cast<Scalar>(dt), motion)
                                                : tracker.coast(static_cast<Scalar>(dt), motion);
   report.frames_since_detector = ran ? 0 : report.frames_since_detector + 1;
-  report.after_gap = static_cast<double>(static_cast<Scalar>(dt)) > options.tracker.max_gap_s;  // as the tracker
+  report.after_gap = tracked.after_gap;
   report.skipped_detections = tracked.skipped;
   const bool blind = ran && frame.detections->size() == tracked.skipped;
   if (ran) report.frames_without_detections = blind ? report.frames_without_detections + 1 : 0;
