@@ -420,6 +420,26 @@ TEST_CASE("Who moves by no more than the flow's noise moves by what the pairs sh
   CHECK(called(0.0025, 0.02) >= 92);
 }
 
+TEST_CASE("What the rows of a rolling shutter err by hides nobody and moves nobody", "[frame]") {
+  const auto called = [](double error_px, double person_motion_m) {
+    return called_moving("rows", true, [&](DynamicScene<double>& scene, cfp::Random& random) {
+      scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.005, 0.002, 0.004, 0.001, -0.002, 0.001));
+      const cfp::Vector2<double> error(error_px * random.normal(), error_px * random.normal());  // of a turn that ends
+      const auto add = [&](double x, double y, double z, double shift) {
+        add_pair(scene, {x, y}, z, shift, 0.2, random);
+        scene.keypoints.back()[0] += error.x() * (y / 240 - 1);
+        scene.keypoints.back()[1] += error.y() * (y / 240 - 1);
+      };
+      for (int k = 0; k < 300; ++k) add(random.uniform(20, 620), random.uniform(20, 460), random.uniform(2.5, 5), 0);
+      for (int k = 0; k < 60; ++k)
+        add(random.uniform(270, 370), random.uniform(120, 420), random.uniform(1.95, 2.05), person_motion_m);
+    });
+  };
+  CHECK(called(0, 0) <= 4);
+  CHECK(called(1.5, 0) <= 6);
+  CHECK(called(1.5, 0.003) >= 95);  // 0.8 px
+}
+
 TEST_CASE("Where the image errs by more than its noise nobody who stands moves for it", "[frame]") {
   const auto called = [](double error_px, double person_motion_m) {
     return called_moving("waves", true, [&](DynamicScene<double>& scene, cfp::Random& random) {

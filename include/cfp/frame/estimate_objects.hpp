@@ -144,12 +144,12 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
 
   FrameScratch<Scalar>& scratch = state.scratch;
   detail::find_flow_depths(frame, coarse, state);
-  const FlowPairs<Scalar> flow{undistorted(camera, frame.flow.previous, scratch.undistorted_previous),
-                               undistorted(camera, frame.flow.current, scratch.undistorted_current), state.flow_depths};
+  FlowPairs<Scalar> flow{undistorted(camera, frame.flow.previous, scratch.undistorted_previous),
+                         undistorted(camera, frame.flow.current, scratch.undistorted_current), state.flow_depths};
   const PinholeCamera<Scalar> pinhole = undistorted_camera(camera);
   detail::label_pairs(frame, options, state);
   const FlowSupport support = detail::mark_outside(n, coarse.flow, scratch);
-  const FlowModel<Scalar> model = detail::flow_model(frame, flow, pinhole, coarse, state);
+  const FlowModel<Scalar> model = detail::flow_model(frame, pinhole, coarse, flow, state);
   report.flow_model = model.kind;
   report.flow_support = model.support == FlowSupport::outside_pairs ? support : model.support;
   report.flow_status = model.status;

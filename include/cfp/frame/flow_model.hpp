@@ -95,18 +95,15 @@ template <typename Scalar>
   return model;
 }
 
-/// The camera's motion as a model of the given kind; none where it is not known. Guessed depths tell no shared error.
+/// The same where depths are known: its covariance counts what neighbours err by together, under a motion to which, and
+/// to what was taken out of the pairs before, so many parameters were fitted.
 template <typename Scalar>
-FlowModel<Scalar> estimate_motion_model(FlowModelKind kind, const FlowPairs<Scalar>& flow, span<const char> outside,
-                                        const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
-                                        FlowModelWorkspace<Scalar>& workspace) {
-  const CameraMotion<Scalar> motion =
-      estimate_camera_motion(flow, outside, SE3<double>(), camera, options.motion, workspace.motion);
-  if (!motion.known) return {};
-  FlowModel<Scalar> model = model_of(kind, FlowSupport::outside_pairs, motion);
-  if (kind != FlowModelKind::motion) return model;
+[[nodiscard]] FlowModel<Scalar> model_of(const CameraMotion<Scalar>& motion, int parameters,
+                                         const FlowPairs<Scalar>& flow, const PinholeCamera<Scalar>& camera,
+                                         const FlowModelOptions& options, const CameraMotionWorkspace<Scalar>& from) {
+  FlowModel<Scalar> model = model_of(FlowModelKind::motion, FlowSupport::outside_pairs, motion);
   const SharedError shared =
-      shared_error(flow, workspace.motion.points, motion.T_cur_prev, camera, motion.sigma_px, options.motion.distance);
+      shared_error(flow, from.points, motion.T_cur_prev, camera, motion.sigma_px, options.motion.distance, parameters);
   model.motion.covariance *= static_cast<Scalar>(shared.variance_factor);
   model.shared_error_px = shared.error_px;
   return model;
@@ -201,17 +198,18 @@ FlowModel<Scalar> estimate_flow_model(const FlowPairs<Scalar>& flow, span<const 
                                       FlowModelWorkspace<Scalar>& workspace) {
   CFP_ASSERT(flow.previous.size() == flow.current.size() && outside.size() == flow.current.size());
   CFP_ASSERT(detail::fits(flow.current.size(), flow.previous_depths));
-  FlowModel<Scalar> model;
-  if (options.use_depth)
-    model = detail::estimate_motion_model(FlowModelKind::motion, flow, outside, camera, options, workspace);
-  if (model.kind == FlowModelKind::none)
-    model = detail::estimate_fundamental(flow, outside, camera, options, workspace);
+  const auto motion_from = [&](const FlowPairs<Scalar>& pairs) {
+    return estimate_camera_motion(pairs, outside, SE3<double>(), camera, options.motion, workspace.motion);
+  };
+  CameraMotion<Scalar> motion;
+  if (options.use_depth) motion = motion_from(flow);
+  if (motion.known) return detail::model_of(motion, 6, flow, camera, options, workspace.motion);
+  FlowModel<Scalar> model = detail::estimate_fundamental(flow, outside, camera, options, workspace);
   if (model.kind != FlowModelKind::none || !options.use_motion_up_to_scale) return model;
   const RansacStatus status = model.status;
   workspace.distances.assign(outside.size(), Scalar(1));
-  model = detail::estimate_motion_model(FlowModelKind::motion_up_to_scale,
-                                        FlowPairs<Scalar>{flow.previous, flow.current, workspace.distances}, outside,
-                                        camera, options, workspace);
+  motion = motion_from({flow.previous, flow.current, workspace.distances});
+  if (motion.known) model = detail::model_of(FlowModelKind::motion_up_to_scale, FlowSupport::outside_pairs, motion);
   model.status = status;
   return model;
 }

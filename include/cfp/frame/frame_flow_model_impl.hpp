@@ -10,6 +10,7 @@
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
 #include "cfp/frame/refine_motion.hpp"
+#include "cfp/frame/smooth_error_impl.hpp"
 #include "cfp/frame/unreported_impl.hpp"
 #include "cfp/math/uncertain_motion.hpp"
 
@@ -68,24 +69,28 @@ template <typename Scalar>
 }
 
 /// The model by the pairs' depths, joined with the host's motion or what the frame before lets expect; none where they
-/// do not tell. Without boxes few depths are left out: see UnreportedOptions::min_known_depths.
+/// do not tell. Without boxes few depths are left out: see UnreportedOptions::min_known_depths. The pairs become those
+/// that it judges: without their smooth error, unless the host's motion tells of the turn that is part of it.
 template <typename Scalar>
 [[nodiscard]] FlowModel<Scalar> model_by_depths(const std::optional<UncertainMotion<double>>& given,
-                                                const FlowPairs<Scalar>& flow, const PinholeCamera<Scalar>& camera,
-                                                const CoarseOptions& coarse, FrameState<Scalar>& state) {
+                                                const PinholeCamera<Scalar>& camera, const CoarseOptions& coarse,
+                                                FlowPairs<Scalar>& flow, FrameState<Scalar>& state) {
   const FlowModelOptions& options = coarse.flow;
   const span<const char> outside(state.scratch.outside);
   const bool few_known =
       state.boxes.empty() && !given && share_with_depth(flow, outside) < coarse.unreported.min_known_depths;
   if (!options.use_depth || flow.previous_depths.empty() || few_known) return {};
-  FlowModel<Scalar> model =
-      estimate_motion_model(FlowModelKind::motion, flow, outside, camera, options, state.scratch.flow);
-  if (model.kind == FlowModelKind::none) return model;
+  FlowModelWorkspace<Scalar>& workspace = state.scratch.flow;
+  CameraMotion<Scalar> motion =
+      estimate_camera_motion(flow, outside, SE3<double>(), camera, options.motion, workspace.motion);
+  if (!motion.known) return {};
+  const bool straightened =
+      !given && straighten(camera, options.motion, workspace.motion, state.scratch.straight, flow, motion);
+  FlowModel<Scalar> model = model_of(motion, straightened ? 9 : 6, flow, camera, options, workspace.motion);
   const double time_s = elapsed_s(state), acceleration = options.camera_acceleration_m_s2;
   const TimedMotion<double>& last = state.previous.motion;
   if (given)
-    state.report.motion_refused =
-        !join_with_given(*given, flow, outside, camera, options, model, state.scratch.flow.motion);
+    state.report.motion_refused = !join_with_given(*given, flow, outside, camera, options, model, workspace.motion);
   else if (acceleration > 0 && last.time_s > 0 && time_s > 0)  // where the two agree: a camera may be pushed
     model.motion = joined(predicted_motion(last, time_s, acceleration), model.motion, most_motion_distance_sq);
   state.current.motion = {model.motion.template cast<double>(), time_s};
@@ -109,12 +114,13 @@ template <typename Scalar>
   return false;
 }
 
-/// What the flow pairs are judged by: the host's F, unless it has an exact motion; else the motion by their depths,
-/// joined with the host's; else the host's motion, refined by them; else the F of the flow, or its motion up to scale;
-/// and where there is neither, the host's motion as it is.
+/// What the pairs of the undistorted image are judged by: the host's F, unless it has an exact motion; else the motion
+/// by their depths, joined with the host's; else the host's motion, refined by them; else the F of the flow, or its
+/// motion up to scale; and where there is neither, the host's motion as it is. The pairs become those that it judges:
+/// model_by_depths.
 template <typename Scalar>
-[[nodiscard]] FlowModel<Scalar> flow_model(const Frame<Scalar>& frame, const FlowPairs<Scalar>& undistorted_flow,
-                                           const PinholeCamera<Scalar>& camera, const CoarseOptions& coarse,
+[[nodiscard]] FlowModel<Scalar> flow_model(const Frame<Scalar>& frame, const PinholeCamera<Scalar>& camera,
+                                           const CoarseOptions& coarse, FlowPairs<Scalar>& flow,
                                            FrameState<Scalar>& state) {
   const span<const char> outside(state.scratch.outside);
   std::optional<UncertainMotion<double>> given = frame.T_cur_prev;
@@ -125,14 +131,14 @@ template <typename Scalar>
   const bool exact = given && given->covariance.isZero(0);
   FlowModel<Scalar> model, as_given;
   if (frame.fundamental && !exact) {
-    return fundamental_model(*frame.fundamental, RansacStatus::ok, FlowSupport::caller, undistorted_flow, outside,
-                             coarse.flow, state.scratch.flow.distances);
+    return fundamental_model(*frame.fundamental, RansacStatus::ok, FlowSupport::caller, flow, outside, coarse.flow,
+                             state.scratch.flow.distances);
   }
-  if (!exact) model = model_by_depths(given, undistorted_flow, camera, coarse, state);
+  if (!exact) model = model_by_depths(given, camera, coarse, flow, state);
   if (model.kind != FlowModelKind::none) return model;
-  if (given && (take_given(*given, undistorted_flow, camera, coarse.flow, state, as_given) || exact)) return as_given;
-  model = estimate_flow_model(FlowPairs<Scalar>{undistorted_flow.previous, undistorted_flow.current, {}}, outside,
-                              camera, coarse.flow, state.scratch.flow);
+  if (given && (take_given(*given, flow, camera, coarse.flow, state, as_given) || exact)) return as_given;
+  model = estimate_flow_model(FlowPairs<Scalar>{flow.previous, flow.current, {}}, outside, camera, coarse.flow,
+                              state.scratch.flow);
   return model.kind == FlowModelKind::none ? as_given : model;
 }
 

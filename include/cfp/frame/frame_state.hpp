@@ -108,7 +108,7 @@ struct FrameScratch {
   ForegroundWorkspace<Scalar> foreground;
   DescriptorMatchWorkspace<Scalar> matching;
   detail::PointGrid<Scalar> grid, resting;
-  std::vector<std::array<Scalar, 2>> points, undistorted_previous, undistorted_current;
+  std::vector<std::array<Scalar, 2>> points, undistorted_previous, undistorted_current, straight;
   std::vector<Scalar> depths, projection, epipolar, samples, values, room_distances;
   std::vector<std::int32_t> members;
   std::vector<char> mask, outside;

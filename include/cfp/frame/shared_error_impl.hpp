@@ -51,13 +51,13 @@ struct ResidualPart {
 
 /// The error that the pairs with a point share under the motion that was fitted to them. In each of 4 x 3 parts of what
 /// they cover the mean of n residuals has the variance sigma^2 / n + e^2 per coordinate; e is had from the upper
-/// quartile of the parts, as what errs may be a part of the image, and what moves there may be another. Six parameters
-/// were fitted to the two coordinates of every part, so that e^2 is n / (n - 3) times what is left of it. Fewer than
-/// four parts with five pairs that agree tell nothing.
+/// quartile of the parts, as what errs may be a part of the image, and what moves there may be another. So many
+/// parameters were fitted to the two coordinates of all n parts: e^2 is n / (n - parameters / 2) times what is left of
+/// it, and n times at most. Fewer than four parts with five pairs that agree tell nothing.
 template <typename Scalar>
 [[nodiscard]] SharedError shared_error(const FlowPairs<Scalar>& flow, const std::vector<std::array<Scalar, 3>>& points,
                                        const SE3<Scalar>& T_cur_prev, const PinholeCamera<Scalar>& camera,
-                                       Scalar sigma_px, const MotionDistanceOptions& options) noexcept {
+                                       Scalar sigma_px, const MotionDistanceOptions& options, int parameters) noexcept {
   constexpr std::size_t columns = 4, rows = 3, fewest_parts = 4;
   constexpr double fewest_pairs = 5, upper_quartile = 1.386;  // of half a chi-squared with two degrees of freedom
   const Scalar huge = std::numeric_limits<Scalar>::infinity();
@@ -90,8 +90,8 @@ template <typename Scalar>
     pairs += part.pairs();
   }
   if (n < fewest_parts) return {};
-  const double told = static_cast<double>(n);
-  const double e_sq = (std::max)(quantile(span<double>(error_sq.data(), n), 0.75), 0.0) * told / (told - 3);
+  const double told = static_cast<double>(n), free = (std::max)(told - 0.5 * parameters, 1.0);
+  const double e_sq = (std::max)(quantile(span<double>(error_sq.data(), n), 0.75), 0.0) * told / free;
   return {static_cast<double>(sigma_px) * std::sqrt(e_sq), 1 + e_sq * pairs / told};
 }
 

@@ -80,26 +80,33 @@ template <typename Camera, typename Scalar>
   return motion_residual(pixel_prev, z, pixel_cur, T_cur_prev, camera, out);
 }
 
-/// Adds a pair in units of the noise: H += w M^T W^-1 M, g -= w M^T W^-1 r, W of the noise and of the depth's error, w
-/// of the loss at xi = `moved`.
-template <typename Scalar>
-PairTerm add_pair(const MotionResidual<Scalar>& pair, double sigma_px, const Vector6<double>& moved,
-                  NormalEquations<6>& sums) noexcept {
+/// Adds a pair in units of the noise: H += w M^T W^-1 M, g -= w M^T W^-1 r, W of the noise and of the depth's error
+/// along j, w of the loss at `moved`.
+template <int N>
+PairTerm add_pair(const Eigen::Matrix<double, 2, N>& M, const Vector2<double>& r, const Vector2<double>& j,
+                  const Eigen::Matrix<double, N, 1>& moved, NormalEquations<N>& sums) noexcept {
   constexpr double loss_sq = 32;  // 4 sigma per coordinate
-  const Eigen::Matrix<double, 2, 6> M = pair.M.template cast<double>() / sigma_px;
-  const Vector2<double> r = pair.r.template cast<double>() / sigma_px, e = r - M.lazyProduct(moved);
-  const Vector2<double> j = (pair.along * pair.sigma_z).template cast<double>() / sigma_px;
+  const Vector2<double> e = r - M.lazyProduct(moved);
   const double kept = 1 / (1 + j[0] * j[0] + j[1] * j[1]), across = j[0] * e[1] - j[1] * e[0];
   const double distance_sq = (e[0] * e[0] + e[1] * e[1] + across * across) * kept;
   if (!is_finite(distance_sq)) return {};
   const double root = 1 / (1 + distance_sq / loss_sq), w = root * root;
-  for (int a = 0; a < 6; ++a) {
+  for (int a = 0; a < N; ++a) {
     const double share = (j[0] * M(0, a) + j[1] * M(1, a)) * kept;
     const double m0 = w * (M(0, a) - j[0] * share), m1 = w * (M(1, a) - j[1] * share);
     sums.g[a] -= m0 * r[0] + m1 * r[1];
-    for (int b = a; b < 6; ++b) sums.H(a, b) += m0 * M(0, b) + m1 * M(1, b);
+    for (int b = a; b < N; ++b) sums.H(a, b) += m0 * M(0, b) + m1 * M(1, b);
   }
   return {w, distance_sq, 1 + kept};
+}
+
+/// The same of a pair against the motion alone.
+template <typename Scalar>
+PairTerm add_pair(const MotionResidual<Scalar>& pair, double sigma_px, const Vector6<double>& moved,
+                  NormalEquations<6>& sums) noexcept {
+  const Eigen::Matrix<double, 2, 6> M = pair.M.template cast<double>() / sigma_px;
+  return add_pair<6>(M, pair.r.template cast<double>() / sigma_px,
+                     (pair.along * pair.sigma_z).template cast<double>() / sigma_px, moved, sums);
 }
 
 }  // namespace CFP_ISA
