@@ -96,22 +96,17 @@ template <typename Scalar>
 [[nodiscard]] bool straighten(const PinholeCamera<Scalar>& camera, const CameraMotionOptions& options,
                               CameraMotionWorkspace<Scalar>& workspace, std::vector<std::array<Scalar, 2>>& straight,
                               FlowPairs<Scalar>& flow, CameraMotion<Scalar>& motion) {
-  constexpr int steps = 2;
   const Scalar near_m = depth_at_share(workspace.points, options.nearest_share, workspace.distances);
   SmoothErrorFit<Scalar> fit{flow, camera, options, workspace, motion.T_cur_prev.template cast<double>()};
-  Scalar sigma_px = motion.sigma_px;
-  FlowPairs<Scalar> rest = flow;
-  for (int k = 0; k < steps; ++k) {
-    if (!fit.step(sigma_px, near_m)) return false;
-    fit.straighten(straight);
-    rest.current = PointSpan<Scalar, 2>(straight);
-    sigma_px =
-        PairsWithDepth<Scalar>{rest, camera, options, workspace, 0, near_m}.noise_under(fit.T_cur_prev, sigma_px);
-  }
-  if (!fit.stands_out()) return false;
+  straight.resize(flow.current.size());
+  if (!fit.step(motion.sigma_px, near_m) || !fit.stands_out() || !fit.step(motion.sigma_px, near_m)) return false;
+  fit.straighten(straight);
+  const FlowPairs<Scalar> rest{flow.previous, PointSpan<Scalar, 2>(straight), flow.previous_depths};
+  const PairsWithDepth<Scalar> pairs{rest, camera, options, workspace, 0, near_m};
+  const Scalar sigma_px = pairs.noise_under(fit.T_cur_prev, motion.sigma_px), shrunk = sigma_px / motion.sigma_px;
   flow = rest;
   motion.T_cur_prev = fit.T_cur_prev.template cast<Scalar>();
-  motion.covariance = fit.covariance.template topLeftCorner<6, 6>().template cast<Scalar>();
+  motion.covariance = shrunk * shrunk * fit.covariance.template topLeftCorner<6, 6>().template cast<Scalar>();
   motion.sigma_px = sigma_px;
   return true;
 }
