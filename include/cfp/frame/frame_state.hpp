@@ -43,10 +43,10 @@ struct FrameReport {
   FlowModelKind flow_model = FlowModelKind::none;            ///< what the flow pairs were judged by,
   FlowSupport flow_support = FlowSupport::none;              ///< what that rests on,
   RansacStatus flow_status = RansacStatus::not_enough_data;  ///< and how its estimation ended
-  bool motion_refused = false;  ///< T_cur_prev: not finite, no covariance, or the flow contradicts it
-  double flow_sigma_px = 0;     ///< noise of the flow as measured; 0: not
-  double flow_shared_px = 0;    ///< what neighbours err by together beside it, as judged; 0: not known
-  int flow_coordinates = 2;     ///< of a pixel that most of its distances see: 1 across lines
+  bool motion_refused = false;      ///< T_cur_prev: not finite, no covariance, or the flow contradicts it
+  double flow_sigma_px = 0;         ///< noise of the flow as measured; 0: not
+  double flow_shared_px = 0;        ///< what neighbours err by together beside it, as judged; 0: not known
+  int flow_coordinates = 2;         ///< of a pixel that most of its distances see: 1 across lines
   std::size_t unknown_objects = 0;  ///< boxes whose O is not known
   // keypoints
   std::size_t outside = 0, foreground = 0, background = 0, invalid = 0;  ///< by label
