@@ -51,6 +51,8 @@ struct CameraMotion : UncertainMotion<Scalar> {
 template <typename Scalar>
 struct CameraMotionWorkspace {
   std::vector<std::array<Scalar, 3>> points;  // of the pairs, in the previous camera; NaN: takes no part
+  std::size_t taken = 0;                      // of them
+  Scalar near_m{};  // a point nearer than that tells no more of the translation than one there
   detail::LoneDepthsWorkspace<Scalar> depths;
   std::vector<Scalar> sigmas, distances;
   PoseWorkspace<Scalar> pose;
@@ -82,16 +84,26 @@ template <typename Scalar>
   return std::clamp(robust_sigma(distances, coordinates), Scalar(options.min_sigma_px), Scalar(options.max_sigma_px));
 }
 
-/// The pairs that tell, those with a point in workspace.points, and what can be had of them. Points nearer than near_m
-/// tell no more of the translation than one there.
+/// The pairs that tell, those with a point in workspace.points, and what can be had of them.
 template <typename Scalar>
 struct PairsWithDepth {
   const FlowPairs<Scalar>& flow;
   const PinholeCamera<Scalar>& camera;
   const CameraMotionOptions& options;
   CameraMotionWorkspace<Scalar>& workspace;
-  std::size_t count;
-  Scalar near_m;
+
+  [[nodiscard]] bool tells(std::size_t i) const noexcept { return is_finite(workspace.points[i][0]); }
+
+  /// expected_residual of pair i under a motion.
+  [[nodiscard]] bool residual_of(std::size_t i, const SE3<Scalar>& T, MotionResidual<Scalar>& out) const noexcept {
+    return expected_residual<PinholeCamera<Scalar>, Scalar>(flow.previous[i], workspace.points[i][2], flow.current[i],
+                                                            T, camera, options.distance, out);
+  }
+
+  /// The noise of pair i's pixel: what is near is no lever.
+  [[nodiscard]] Scalar pixel_sigma_of(std::size_t i, Scalar sigma_px) const noexcept {
+    return sigma_px * (std::max)(Scalar(1), workspace.near_m / workspace.points[i][2]);
+  }
 
   /// The noise that they show under a motion.
   [[nodiscard]] Scalar noise_under(const SE3<double>& T_cur_prev, Scalar sigma_px) const {
@@ -101,19 +113,16 @@ struct PairsWithDepth {
                      UncertainMotion<Scalar>(T_cur_prev.template cast<Scalar>()), camera, sigma_px, options.distance,
                      distances);
     for (std::size_t i = 0; i < distances.size(); ++i) {
-      if (!is_finite(workspace.points[i][0])) distances[i] = Scalar(no_distance<double>);
+      if (!tells(i)) distances[i] = Scalar(no_distance<double>);
     }
     return flow_sigma(span<Scalar>(distances), 2, options);
   }
 
-  /// The noise of pair i under a motion: what is near is no lever, and where the camera moves the error of a depth
-  /// shows.
+  /// The same with the error of its depth, which shows where the camera moves.
   [[nodiscard]] Scalar sigma_of(std::size_t i, Scalar sigma_px, const SE3<Scalar>& T) const noexcept {
-    const Scalar z = workspace.points[i][2], of_pixel = sigma_px * (std::max)(Scalar(1), near_m / z);
+    const Scalar of_pixel = pixel_sigma_of(i, sigma_px);
     MotionResidual<Scalar> pair;
-    if (T.translation.isZero(0) || !expected_residual<PinholeCamera<Scalar>, Scalar>(
-                                       flow.previous[i], z, flow.current[i], T, camera, options.distance, pair))
-      return of_pixel;
+    if (T.translation.isZero(0) || !residual_of(i, T, pair)) return of_pixel;
     return std::sqrt(of_pixel * of_pixel + pair.sigma_z * pair.sigma_z * pair.along.squaredNorm());
   }
 
@@ -129,9 +138,10 @@ struct PairsWithDepth {
     const PoseResult refined = refine_pose(observations, camera, T, rounds, workspace.pose);
     CameraMotion<Scalar> motion;
     Matrix6<double> covariance;
-    motion.known = is_solved(refined.status) &&
-                   static_cast<double>(refined.inliers) >= options.min_inlier_share * static_cast<double>(count) &&
-                   invert_normal_equations<6>(refined.information, 1e-12, covariance);
+    motion.known =
+        is_solved(refined.status) &&
+        static_cast<double>(refined.inliers) >= options.min_inlier_share * static_cast<double>(workspace.taken) &&
+        invert_normal_equations<6>(refined.information, 1e-12, covariance);
     if (!motion.known) return motion;
     T = refined.T_cam_world;
     motion.T_cur_prev = T.template cast<Scalar>();
@@ -149,8 +159,8 @@ struct PairsWithDepth {
     ransac.max_iterations = 50;
     workspace.sigmas.assign(workspace.points.size(), Scalar(0));
     for (std::size_t i = 0, k = 0; i < workspace.points.size(); ++i) {
-      if (!is_finite(workspace.points[i][0])) continue;
-      if (k * most / count != (k + 1) * most / count) workspace.sigmas[i] = Scalar(1);
+      if (!tells(i)) continue;
+      if (k * most / workspace.taken != (k + 1) * most / workspace.taken) workspace.sigmas[i] = Scalar(1);
       ++k;
     }
     const PnpRansacResult<Scalar> found = pnp_ransac(PointSpan<Scalar, 3>(workspace.points), flow.current,
@@ -187,16 +197,15 @@ template <typename Scalar>
                                                           CameraMotionWorkspace<Scalar>& workspace) {
   CFP_ASSERT(outside.size() == flow.current.size());
   detail::place_points(flow, outside, camera, workspace.points);
-  const std::size_t taken =
-      detail::leave_out_lone_depths(flow.previous, Scalar(options.shared_depth_ratio),
-                                    span<std::array<Scalar, 3>>(workspace.points), workspace.depths);
-  if (taken < options.min_pairs) return {};
+  workspace.taken = detail::leave_out_lone_depths(flow.previous, Scalar(options.shared_depth_ratio),
+                                                  span<std::array<Scalar, 3>>(workspace.points), workspace.depths);
+  if (workspace.taken < options.min_pairs) return {};
 
   if (workspace.search.observations.index.size() < outside.size())  // a later call may search and must not allocate
     workspace.search.observations.begin(outside.size());
   workspace.search.sampling.reserve(outside.size());
-  const Scalar near_m = detail::depth_at_share(workspace.points, options.nearest_share, workspace.distances);
-  const detail::PairsWithDepth<Scalar> pairs{flow, camera, options, workspace, taken, near_m};
+  workspace.near_m = detail::depth_at_share(workspace.points, options.nearest_share, workspace.distances);
+  const detail::PairsWithDepth<Scalar> pairs{flow, camera, options, workspace};
   SE3<double> T = start;
   const CameraMotion<Scalar> first = pairs.refine(Scalar(options.max_sigma_px), options.pose, T);
   const Scalar noise_px = first.known ? first.sigma_px : Scalar(options.max_sigma_px);
@@ -208,7 +217,8 @@ template <typename Scalar>
   const CameraMotion<Scalar> tight = pairs.refine(found_px, detail::last_round(options.pose, 1.0 / 3), T);
   if (!tight.known) return tight;
   const CameraMotion<Scalar> usual = pairs.refine(tight.sigma_px, detail::last_round(options.pose, 1), T);
-  return usual.known && usual.sigma_px <= tight.sigma_px * (1 + 20 / static_cast<Scalar>(taken)) ? usual : tight;
+  return usual.known && usual.sigma_px <= tight.sigma_px * (1 + 20 / static_cast<Scalar>(workspace.taken)) ? usual
+                                                                                                           : tight;
 }
 
 }  // namespace CFP_ISA

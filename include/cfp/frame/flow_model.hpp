@@ -98,12 +98,10 @@ template <typename Scalar>
 /// The same where depths are known: its covariance counts what neighbours err by together, under a motion to which, and
 /// to what was taken out of the pairs before, so many parameters were fitted.
 template <typename Scalar>
-[[nodiscard]] FlowModel<Scalar> model_of(const CameraMotion<Scalar>& motion, int parameters,
-                                         const FlowPairs<Scalar>& flow, const PinholeCamera<Scalar>& camera,
-                                         const FlowModelOptions& options, const CameraMotionWorkspace<Scalar>& from) {
+[[nodiscard]] FlowModel<Scalar> model_of(const CameraMotion<Scalar>& motion, const PairsWithDepth<Scalar>& pairs,
+                                         int parameters) {
   FlowModel<Scalar> model = model_of(FlowModelKind::motion, FlowSupport::outside_pairs, motion);
-  const SharedError shared =
-      shared_error(flow, from.points, motion.T_cur_prev, camera, motion.sigma_px, options.motion.distance, parameters);
+  const SharedError shared = shared_error(pairs, motion, parameters);
   model.motion.covariance *= static_cast<Scalar>(shared.variance_factor);
   model.shared_error_px = shared.error_px;
   return model;
@@ -203,7 +201,7 @@ FlowModel<Scalar> estimate_flow_model(const FlowPairs<Scalar>& flow, span<const 
   };
   CameraMotion<Scalar> motion;
   if (options.use_depth) motion = motion_from(flow);
-  if (motion.known) return detail::model_of(motion, 6, flow, camera, options, workspace.motion);
+  if (motion.known) return detail::model_of(motion, {flow, camera, options.motion, workspace.motion}, 6);
   FlowModel<Scalar> model = detail::estimate_fundamental(flow, outside, camera, options, workspace);
   if (model.kind != FlowModelKind::none || !options.use_motion_up_to_scale) return model;
   const RansacStatus status = model.status;

@@ -80,17 +80,16 @@ template <typename Scalar>
   const bool few_known =
       state.boxes.empty() && !given && share_with_depth(flow, outside) < coarse.unreported.min_known_depths;
   if (!options.use_depth || flow.previous_depths.empty() || few_known) return {};
-  FlowModelWorkspace<Scalar>& workspace = state.scratch.flow;
-  CameraMotion<Scalar> motion =
-      estimate_camera_motion(flow, outside, SE3<double>(), camera, options.motion, workspace.motion);
+  CameraMotionWorkspace<Scalar>& workspace = state.scratch.flow.motion;
+  CameraMotion<Scalar> motion = estimate_camera_motion(flow, outside, SE3<double>(), camera, options.motion, workspace);
   if (!motion.known) return {};
   const bool straightened =
-      !given && straighten(camera, options.motion, workspace.motion, state.scratch.straight, flow, motion);
-  FlowModel<Scalar> model = model_of(motion, straightened ? 9 : 6, flow, camera, options, workspace.motion);
+      !given && straighten(camera, options.motion, workspace, state.scratch.straight, flow, motion);
+  FlowModel<Scalar> model = model_of<Scalar>(motion, {flow, camera, options.motion, workspace}, straightened ? 9 : 6);
   const double time_s = elapsed_s(state), acceleration = options.camera_acceleration_m_s2;
   const TimedMotion<double>& last = state.previous.motion;
   if (given)
-    state.report.motion_refused = !join_with_given(*given, flow, outside, camera, options, model, workspace.motion);
+    state.report.motion_refused = !join_with_given(*given, flow, outside, camera, options, model, workspace);
   else if (acceleration > 0 && last.time_s > 0 && time_s > 0)  // where the two agree: a camera may be pushed
     model.motion = joined(predicted_motion(last, time_s, acceleration), model.motion, most_motion_distance_sq);
   state.current.motion = {model.motion.template cast<double>(), time_s};

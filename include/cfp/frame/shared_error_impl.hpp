@@ -10,8 +10,7 @@
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
-#include "cfp/frame/frame.hpp"
-#include "cfp/geometry/camera.hpp"
+#include "cfp/frame/camera_motion.hpp"
 #include "cfp/geometry/motion_residual_impl.hpp"
 #include "cfp/math/order_statistic.hpp"
 
@@ -55,15 +54,15 @@ struct ResidualPart {
 /// parameters were fitted to the two coordinates of all n parts: e^2 is n / (n - parameters / 2) times what is left of
 /// it, and n times at most. Fewer than four parts with five pairs that agree tell nothing.
 template <typename Scalar>
-[[nodiscard]] SharedError shared_error(const FlowPairs<Scalar>& flow, const std::vector<std::array<Scalar, 3>>& points,
-                                       const SE3<Scalar>& T_cur_prev, const PinholeCamera<Scalar>& camera,
-                                       Scalar sigma_px, const MotionDistanceOptions& options, int parameters) noexcept {
+[[nodiscard]] SharedError shared_error(const PairsWithDepth<Scalar>& pairs, const CameraMotion<Scalar>& motion,
+                                       int parameters) noexcept {
   constexpr std::size_t columns = 4, rows = 3, fewest_parts = 4;
   constexpr double fewest_pairs = 5, upper_quartile = 1.386;  // of half a chi-squared with two degrees of freedom
   const Scalar huge = std::numeric_limits<Scalar>::infinity();
   Vector2<Scalar> low(huge, huge), high = -low;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (is_finite(points[i][0])) low = low.cwiseMin(flow.previous[i]), high = high.cwiseMax(flow.previous[i]);
+  for (std::size_t i = 0; i < pairs.flow.previous.size(); ++i) {
+    const Vector2<Scalar> at = pairs.flow.previous[i];
+    if (pairs.tells(i)) low = low.cwiseMin(at), high = high.cwiseMax(at);
   }
   const auto cell = [](Scalar at, Scalar size, std::size_t cells) {
     const Scalar share = at / size * static_cast<Scalar>(cells);
@@ -71,28 +70,25 @@ template <typename Scalar>
   };
   std::array<ResidualPart, columns * rows> parts;
   MotionResidual<Scalar> pair;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!is_finite(points[i][0]) ||
-        !expected_residual<PinholeCamera<Scalar>, Scalar>(flow.previous[i], points[i][2], flow.current[i], T_cur_prev,
-                                                          camera, options, pair))
-      continue;
-    const Vector2<Scalar> at = flow.previous[i] - low, size = high - low;
-    parts[cell(at[1], size[1], rows) * columns + cell(at[0], size[0], columns)].add(pair,
-                                                                                    static_cast<double>(sigma_px));
+  for (std::size_t i = 0; i < pairs.flow.previous.size(); ++i) {
+    if (!pairs.tells(i) || !pairs.residual_of(i, motion.T_cur_prev, pair)) continue;
+    const Vector2<Scalar> at = pairs.flow.previous[i] - low, size = high - low;
+    parts[cell(at[1], size[1], rows) * columns + cell(at[0], size[0], columns)].add(
+        pair, static_cast<double>(motion.sigma_px));
   }
 
   std::array<double, columns * rows> error_sq;  // in squares of the noise
   std::size_t n = 0;
-  double pairs = 0;
+  double told_by = 0;
   for (const ResidualPart& part : parts) {
     if (part.agreeing < fewest_pairs) continue;
     error_sq[n++] = (part.sum.squaredNorm() / (part.variance * upper_quartile) - 1) / part.pairs();
-    pairs += part.pairs();
+    told_by += part.pairs();
   }
   if (n < fewest_parts) return {};
   const double told = static_cast<double>(n), free = (std::max)(told - 0.5 * parameters, 1.0);
   const double e_sq = (std::max)(quantile(span<double>(error_sq.data(), n), 0.75), 0.0) * told / free;
-  return {static_cast<double>(sigma_px) * std::sqrt(e_sq), 1 + e_sq * pairs / told};
+  return {static_cast<double>(motion.sigma_px) * std::sqrt(e_sq), 1 + e_sq * told_by / told};
 }
 
 }  // namespace CFP_ISA

@@ -35,27 +35,20 @@ template <typename Scalar>
 /// forward would be an error, and what errs a motion.
 template <typename Scalar>
 struct SmoothErrorFit {
-  const FlowPairs<Scalar>& flow;
-  const PinholeCamera<Scalar>& camera;
-  const CameraMotionOptions& options;
-  CameraMotionWorkspace<Scalar>& workspace;
+  const PairsWithDepth<Scalar>& pairs;
   SE3<double> T_cur_prev;
   Vector3<double> coefficients = Vector3<double>::Zero();                            // px
   Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Identity();  // of the motion and of them
 
   /// A Gauss-Newton step of a robust fit at a noise; false where the pairs do not tell all of it.
-  [[nodiscard]] bool step(Scalar sigma_px, Scalar near_m) noexcept {
+  [[nodiscard]] bool step(Scalar sigma_px) noexcept {
     const SE3<Scalar> T = T_cur_prev.cast<Scalar>();
     NormalEquations<9> sums;
     MotionResidual<Scalar> pair;
-    for (std::size_t i = 0; i < workspace.points.size(); ++i) {
-      const Scalar z = workspace.points[i][2];
-      if (!is_finite(workspace.points[i][0]) ||
-          !expected_residual<PinholeCamera<Scalar>, Scalar>(flow.previous[i], z, flow.current[i], T, camera,
-                                                            options.distance, pair))
-        continue;
-      const double sigma = static_cast<double>(sigma_px * (std::max)(Scalar(1), near_m / z));
-      const Matrix23<double> error = smooth_error_at<Scalar>(flow.current[i], camera);
+    for (std::size_t i = 0; i < pairs.flow.current.size(); ++i) {
+      if (!pairs.tells(i) || !pairs.residual_of(i, T, pair)) continue;
+      const auto sigma = static_cast<double>(pairs.pixel_sigma_of(i, sigma_px));
+      const Matrix23<double> error = smooth_error_at<Scalar>(pairs.flow.current[i], pairs.camera);
       Eigen::Matrix<double, 2, 9> M;
       M << pair.M.template cast<double>(), error;
       const Vector2<double> r = pair.r.template cast<double>() - error.lazyProduct(coefficients);
@@ -65,19 +58,18 @@ struct SmoothErrorFit {
     // Before a bare wall what errs from the middle of the image is the way forward, and no pair tells them apart.
     constexpr double as_good_as_one = 3e-4;
     if (!invert_normal_equations<9>(sums.H, as_good_as_one, covariance)) return false;
-    const Eigen::Matrix<double, 9, 1> step = -covariance.lazyProduct(sums.g);
-    T_cur_prev = se3_exp(Vector6<double>(step.template head<6>())) * T_cur_prev;
-    coefficients += step.template tail<3>();
+    const Eigen::Matrix<double, 9, 1> change = -covariance.lazyProduct(sums.g);
+    T_cur_prev = se3_exp(Vector6<double>(change.template head<6>())) * T_cur_prev;
+    coefficients += change.template tail<3>();
     return true;
   }
 
   /// The current pixels without the error.
-  void straighten(std::vector<std::array<Scalar, 2>>& out) const {
-    out.resize(flow.current.size());
+  void straighten(span<std::array<Scalar, 2>> out) const noexcept {
     for (std::size_t i = 0; i < out.size(); ++i) {
-      const Vector2<double> error = smooth_error_at<Scalar>(flow.current[i], camera).lazyProduct(coefficients);
-      out[i] = {flow.current(i, 0) - static_cast<Scalar>(error.x()),
-                flow.current(i, 1) - static_cast<Scalar>(error.y())};
+      const Vector2<Scalar> pixel = pairs.flow.current[i];
+      const Vector2<double> error = smooth_error_at<Scalar>(pixel, pairs.camera).lazyProduct(coefficients);
+      out[i] = {pixel.x() - static_cast<Scalar>(error.x()), pixel.y() - static_cast<Scalar>(error.y())};
     }
   }
 
@@ -98,13 +90,13 @@ template <typename Scalar>
 [[nodiscard]] bool straighten(const PinholeCamera<Scalar>& camera, const CameraMotionOptions& options,
                               CameraMotionWorkspace<Scalar>& workspace, std::vector<std::array<Scalar, 2>>& straight,
                               FlowPairs<Scalar>& flow, CameraMotion<Scalar>& motion) {
-  const Scalar near_m = depth_at_share(workspace.points, options.nearest_share, workspace.distances);
-  SmoothErrorFit<Scalar> fit{flow, camera, options, workspace, motion.T_cur_prev.template cast<double>()};
+  const PairsWithDepth<Scalar> bent{flow, camera, options, workspace};
+  SmoothErrorFit<Scalar> fit{bent, motion.T_cur_prev.template cast<double>()};
   straight.resize(flow.current.size());
-  if (!fit.step(motion.sigma_px, near_m) || !fit.stands_out() || !fit.step(motion.sigma_px, near_m)) return false;
-  fit.straighten(straight);
+  if (!fit.step(motion.sigma_px) || !fit.stands_out() || !fit.step(motion.sigma_px)) return false;
+  fit.straighten(span<std::array<Scalar, 2>>(straight));
   const FlowPairs<Scalar> rest{flow.previous, PointSpan<Scalar, 2>(straight), flow.previous_depths};
-  const PairsWithDepth<Scalar> pairs{rest, camera, options, workspace, 0, near_m};
+  const PairsWithDepth<Scalar> pairs{rest, camera, options, workspace};
   const Scalar sigma_px = pairs.noise_under(fit.T_cur_prev, motion.sigma_px), shrunk = sigma_px / motion.sigma_px;
   flow = rest;
   motion.T_cur_prev = fit.T_cur_prev.template cast<Scalar>();
