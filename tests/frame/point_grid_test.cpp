@@ -23,7 +23,7 @@ void fill(const Pixels& pixels, const Keep& keep, double reach, Grid& grid) {
 std::vector<std::size_t> near(const Grid& grid, double x, double y) {
   std::vector<std::size_t> found;
   cfp::detail::visit_near(grid, x, y, [&](const auto& point) {
-    found.push_back(point.index);
+    if (std::abs(point.x - x) <= grid.reach && std::abs(point.y - y) <= grid.reach) found.push_back(point.index);
     return false;
   });
   std::sort(found.begin(), found.end());

@@ -125,16 +125,14 @@ template <typename Scalar, typename Camera>
   return fitted;
 }
 
-/// What the fine stage knows of keypoint i, which is in a box; its M is m, negative: none.
+/// Sets state.evidence of keypoint i, which is in a box: what the fine stage knows of it; its M is m, negative: none.
 template <typename Scalar>
-[[nodiscard]] SecondStageKeypoint<Scalar> second_stage_keypoint(std::size_t i,
-                                                                const FrameConstraints<Scalar>& constraints, Scalar m,
-                                                                Scalar way_at_metre_px,
-                                                                const FrameState<Scalar>& state) noexcept {
+void gather_evidence(std::size_t i, const FrameConstraints<Scalar>& constraints, Scalar m, Scalar way_at_metre_px,
+                     FrameState<Scalar>& state) noexcept {
   const FrameScratch<Scalar>& scratch = state.scratch;
   const ConstraintModel<Scalar>&projection = constraints.projection, &epipolar = constraints.epipolar;
   const std::size_t b = static_cast<std::size_t>(state.box[i]);
-  SecondStageKeypoint<Scalar> keypoint;
+  SecondStageKeypoint<Scalar>& keypoint = state.evidence[i];
   keypoint.projection = evidence_of(projection, scratch.projection[i], constraints.projection_confidence);
   keypoint.epipolar = evidence_of(epipolar, scratch.epipolar[i], constraints.epipolar_confidence);
   keypoint.object_probability = static_cast<Scalar>(state.objects[b].static_probability);
@@ -143,9 +141,9 @@ template <typename Scalar>
   keypoint.matched = is_finite(scratch.points[i][0]) && is_finite(scratch.points[i][1]);
   keypoint.box_associated = state.boxes[b].associated;
   const Scalar seen_px = projection.status != Status::not_enough_data ? projection.threshold_px : epipolar.threshold_px;
-  if (way_at_metre_px > Scalar(0) && is_valid_depth(scratch.depths[i]))
-    keypoint.visibility = visibility_of(way_at_metre_px / scratch.depths[i], seen_px);
-  return keypoint;
+  keypoint.visibility = way_at_metre_px > Scalar(0) && is_valid_depth(scratch.depths[i])
+                            ? visibility_of(way_at_metre_px / scratch.depths[i], seen_px)
+                            : Scalar(1);
 }
 
 }  // namespace CFP_ISA
@@ -183,8 +181,8 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
   for (std::size_t i = 0; i < n; ++i) {
     if (state.box[i] == no_box) continue;
     const Scalar m = detail::map_point_at(map_point_probability, i);
-    const SecondStageKeypoint<Scalar> keypoint = state.evidence[i] =
-        detail::second_stage_keypoint(i, constraints, m, way_at_metre_px, state);
+    detail::gather_evidence(i, constraints, m, way_at_metre_px, state);
+    const SecondStageKeypoint<Scalar>& keypoint = state.evidence[i];
     state.static_probability[i] =
         posterior ? second_stage_evidence(keypoint, threshold) : second_stage_probability(keypoint, threshold);
     ++state.report.constrained;

@@ -29,12 +29,16 @@ template <typename Scalar, typename DetectionAt>
 ObjectMembers find_members(const TrackedBox<Scalar>& box, const PointSpan<Scalar, 2>& pixels, span<const Scalar> depths,
                            const DetectionAt& detection_at, const FrameOptions& options, FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
-  scratch.members.clear();
   const auto take = [&](const auto& belongs) {
-    for (std::size_t i = 0; i < pixels.size(); ++i) {
-      if (belongs(i)) scratch.members.push_back(static_cast<std::int32_t>(i));
+    scratch.members.resize(pixels.size());
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < pixels.size(); ++i) {  // a branch would be guessed wrong too often
+      scratch.members[count] = static_cast<std::int32_t>(i);
+      count += belongs(i) ? 1U : 0U;
     }
+    scratch.members.resize(count);
   };
+  scratch.members.clear();
   if (!box.compensated()) take([&](std::size_t i) { return detection_at(i) == box.detection; });
   const bool by_mask = !scratch.members.empty();
   if (!by_mask) take([&](std::size_t i) { return contains(box.box, pixels(i, 0), pixels(i, 1)); });

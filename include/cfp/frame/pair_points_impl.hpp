@@ -75,6 +75,7 @@ template <typename Scalar>
     const Scalar depth = points[point.index][2];
     int neighbours = -1, alike = -1;  // itself is none
     visit_near(grid, point.x, point.y, [&](const auto& other) {
+      if (std::abs(other.x - point.x) > grid.reach || std::abs(other.y - point.y) > grid.reach) return false;
       const Scalar its = points[other.index][2];
       ++neighbours;
       alike += std::abs(depth - its) <= ratio * (std::min)(depth, its) ? 1 : 0;

@@ -66,18 +66,21 @@ void fill_grid(const PointSpan<Scalar, 2>& points, const Keep& keep, Scalar reac
   for (const auto& p : grid.unsorted) grid.points[grid.first[cell(p) + 1]++] = p;
 }
 
-/// Calls visit(point) for the points at most the reach away in x and in y, until it returns true.
+/// Calls visit(point) for the points of the cells that hold what is at most the reach away in x and in y, until it
+/// returns true.
 template <typename Scalar, typename Visit>
-void visit_near(const PointGrid<Scalar>& grid, Scalar x, Scalar y, const Visit& visit) {
+CFP_INLINE void visit_near(const PointGrid<Scalar>& grid, Scalar x, Scalar y, const Visit& visit) {
   const Scalar from_left = x - grid.left, from_top = y - grid.top;
+  if (!(from_left >= -grid.reach && from_left - grid.width <= grid.reach && from_top >= -grid.reach &&
+        from_top - grid.height <= grid.reach))
+    return;
   const auto column = [&](Scalar offset) { return cell_at(from_left + offset, grid.columns_per_px); };
   const auto row = [&](Scalar offset) { return cell_at(from_top + offset, grid.rows_per_px); };
   const std::size_t left = column(-grid.reach), right = column(grid.reach), bottom = row(grid.reach);
   for (std::size_t r = row(-grid.reach); r <= bottom; ++r) {
-    const std::size_t end = grid.first[r * grid.side + right + 1];
-    for (std::size_t k = grid.first[r * grid.side + left]; k < end; ++k) {
-      const auto& p = grid.points[k];
-      if (std::abs(p.x - x) <= grid.reach && std::abs(p.y - y) <= grid.reach && visit(p)) return;
+    const auto* const end = grid.points.data() + grid.first[r * grid.side + right + 1];
+    for (const auto* p = grid.points.data() + grid.first[r * grid.side + left]; p != end; ++p) {
+      if (visit(*p)) return;
     }
   }
 }
