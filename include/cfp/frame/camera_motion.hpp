@@ -108,12 +108,12 @@ struct PairsWithDepth {
   /// The noise that they show under a motion.
   [[nodiscard]] Scalar noise_under(const SE3<double>& T_cur_prev, Scalar sigma_px) const {
     std::vector<Scalar>& distances = workspace.distances;
-    distances.resize(workspace.points.size());
-    motion_distances(flow.previous, flow.previous_depths, flow.current,
-                     UncertainMotion<Scalar>(T_cur_prev.template cast<Scalar>()), camera, sigma_px, options.distance,
-                     distances);
-    for (std::size_t i = 0; i < distances.size(); ++i) {
-      if (!tells(i)) distances[i] = Scalar(no_distance<double>);
+    distances.clear();
+    distances.reserve(workspace.points.size());
+    const SE3<Scalar> T = T_cur_prev.template cast<Scalar>();
+    MotionResidual<Scalar> pair;
+    for (std::size_t i = 0; i < workspace.points.size(); ++i) {
+      if (tells(i) && residual_of(i, T, pair)) distances.push_back(distance_of(pair, sigma_px));
     }
     return flow_sigma(span<Scalar>(distances), 2, options);
   }

@@ -34,26 +34,12 @@ template <typename Real>
   return motion;
 }
 
-/// motion_distance under T_cur_prev with the covariance of `motion`; null: it is exact.
-template <typename Camera, typename Scalar>
-[[nodiscard]] CFP_INLINE Scalar distance_under(const Vector2<Scalar>& pixel_prev, const Scalar& depth_prev,
-                                               const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
-                                               const UncertainMotion<AtLeastDouble<Scalar>>* motion,
-                                               const Camera& camera, const Scalar& sigma_px,
-                                               const MotionDistanceOptions& options) noexcept {
+/// The distance of a pair where the error of the motion adds (a b; b c) sigma^2 to the noise of its pixel.
+template <typename Scalar, typename Real = AtLeastDouble<Scalar>>
+[[nodiscard]] CFP_INLINE Scalar distance_of(const MotionResidual<Scalar>& pair, const Scalar& sigma_px,
+                                            const Real& a = Real(0), const Real& b = Real(0),
+                                            const Real& c = Real(0)) noexcept {
   using std::sqrt;
-  using Real = AtLeastDouble<Scalar>;
-  const Scalar none = Scalar(no_distance<double>);
-  MotionResidual<Scalar> pair;
-  if (!expected_residual(pixel_prev, depth_prev, pixel_cur, T_cur_prev, camera, options, pair)) return none;
-  // W = I + A with A = M C M^T / sigma^2, and its inverse.
-  Real a(0), b(0), c(0);
-  if (motion != nullptr) {
-    const Real per_sigma = Real(1) / Real(sigma_px);
-    const Eigen::Matrix<Real, 6, 2> M = pair.M.transpose().template cast<Real>() * per_sigma,
-                                    CM = motion->covariance.lazyProduct(M);
-    a = M.col(0).dot(CM.col(0)), b = M.col(0).dot(CM.col(1)), c = M.col(1).dot(CM.col(1));
-  }
   const Real rank_two = a * c - b * b;  // not below 0 but for rounding
   const Real det = Real(1) + a + c + (rank_two > Real(0) ? rank_two : Real(0));
   const auto adjugate = [&](Real x, Real y) {
@@ -66,7 +52,26 @@ template <typename Camera, typename Scalar>
   const Scalar distance_sq = static_cast<Scalar>((adjugate(r[0], r[1]) + kappa * across * across) /
                                                  (det + kappa * adjugate(along[0], along[1])));
   const Scalar distance = sqrt(distance_sq > Scalar(0) ? distance_sq : Scalar(0));
-  return has_distance(distance) && is_finite(distance_sq) ? distance : none;
+  return has_distance(distance) && is_finite(distance_sq) ? distance : Scalar(no_distance<double>);
+}
+
+/// motion_distance under T_cur_prev with the covariance of `motion`; null: it is exact.
+template <typename Camera, typename Scalar>
+[[nodiscard]] CFP_INLINE Scalar distance_under(const Vector2<Scalar>& pixel_prev, const Scalar& depth_prev,
+                                               const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
+                                               const UncertainMotion<AtLeastDouble<Scalar>>* motion,
+                                               const Camera& camera, const Scalar& sigma_px,
+                                               const MotionDistanceOptions& options) noexcept {
+  using Real = AtLeastDouble<Scalar>;
+  MotionResidual<Scalar> pair;
+  if (!expected_residual(pixel_prev, depth_prev, pixel_cur, T_cur_prev, camera, options, pair))
+    return Scalar(no_distance<double>);
+  if (motion == nullptr) return distance_of(pair, sigma_px);
+  // W = I + A with A = M C M^T / sigma^2.
+  const Real per_sigma = Real(1) / Real(sigma_px);
+  const Eigen::Matrix<Real, 6, 2> M = pair.M.transpose().template cast<Real>() * per_sigma,
+                                  CM = motion->covariance.lazyProduct(M);
+  return distance_of(pair, sigma_px, M.col(0).dot(CM.col(0)), M.col(0).dot(CM.col(1)), M.col(1).dot(CM.col(1)));
 }
 
 }  // namespace CFP_ISA

@@ -44,7 +44,7 @@ template <typename Camera, typename Scalar>
   Matrix23<Scalar> jacobian;
   if (!camera.project(point, projected, &jacobian)) return false;
   out.r = pixel_cur - projected;
-  out.along = jacobian * turned;
+  out.along = jacobian.lazyProduct(turned);
   out.M.template leftCols<3>() = jacobian;
   for (int row = 0; row < 2; ++row) out.M.template block<1, 3>(row, 3) = cross(point, jacobian.row(row)).transpose();
   return true;
