@@ -13,7 +13,8 @@
 // the motion of the frame before adds, by FlowModelOptions::camera_acceleration_m_s2, where the camera's velocity
 // changes (a hand: 0.6 m/s^2 in the truth of TUM's fr3_walking_xyz at 30 Hz). Then with one camera, no depths at all,
 // in five kinds of scene and at three frame rates: with the fundamental matrix alone, and with the motion up to scale
-// where there is none, or with a host's motion, which the flow refines.
+// where there is none, or with a host's motion, which the flow refines. Then through a fisheye of 147 x 110 degrees, as
+// it is and with the noise of all pairs of its undistorted image taken as alike.
 //   cfp_object_motion_study [N per cell, default 20] [seed, default 1] | --smoke
 //
 // The simulator: 640 x 480 at 30 Hz, f = 535 px. Camera: still; sideways or forward 0.3 m/s; rotating 20 deg/s; both;
@@ -37,6 +38,7 @@
 #include "cfp/core/random.hpp"
 #include "cfp/frame/begin_frame.hpp"
 #include "cfp/frame/estimate_objects.hpp"
+#include "cfp/geometry/kannala_brandt_camera.hpp"
 
 namespace {
 
@@ -44,6 +46,7 @@ using V2 = cfp::Vector2<double>;
 using V3 = cfp::Vector3<double>;
 
 const cfp::PinholeCamera<double> camera{535.4, 539.2, 320.1, 247.6};
+const cfp::KannalaBrandtCamera<double> fisheye{250, 250, 320.1, 247.6, -0.01, 0.003, -0.002, 0.0003};
 constexpr std::array<double, 5> noises = {0.1, 0.15, 0.2, 0.3, 0.4};
 const std::array<const char*, 6> cameras = {"still", "sideways", "forward", "rotating", "both", "slow"};
 const std::array<const char*, 5> people = {"at rest", "across", "along", "axis", "with"};
@@ -122,6 +125,7 @@ struct Room {
   double nearest_m, farthest_m;    // a person in it
   bool wrong_anywhere = false;     // a wrong depth is any from 0.5 to 8 m, not that of the other side of a silhouette
   double fewest = 30, most = 120;  // points on the person
+  double margin_px = 150;          // whose centre is so far from the left and the right of the image
 };
 constexpr std::array<Room, 5> rooms = {{{"a furnished room", 350, furnished_depth, 1.5, 3.5},
                                         {"a bare room", 60, bare_depth, 0.8, 1.6},
@@ -129,14 +133,19 @@ constexpr std::array<Room, 5> rooms = {{{"a furnished room", 350, furnished_dept
                                         {"a floor and a slanted wall", 200, slanted_depth, 1.5, 3.5},
                                         {"a street", 250, street_depth, 3, 10}}};
 constexpr std::size_t rooms_with_depth = 2;
+constexpr std::array<Room, 3> rooms_of_fisheye = {
+    {{"a furnished room", 350, furnished_depth, 1.5, 3.5, false, 30, 120, 60},
+     {"a bare room", 60, bare_depth, 0.8, 1.6, false, 30, 120, 60},
+     {"a cluttered room", 200, cluttered_depth, 1, 3, false, 30, 120, 60}}};
 constexpr Room few_pairs = {"10 to 14 pairs", 350, furnished_depth, 1.5, 3.5, false, 10, 15};
 constexpr std::array<Room, 3> rooms_of_wrong_depths = {{{"a furnished room", 350, furnished_depth, 1.5, 3.5, true},
                                                         {"a slanted wall", 200, wall_depth, 1.5, 2.4, true},
                                                         {"a far wall", 60, far_wall_depth, 1.5, 4, true}}};
 
 /// One frame of a camera that moves as it is told. `who` draws the person, `random` the points and the noise.
+template <typename Lens = cfp::PinholeCamera<double>>
 Scene simulate(const Cell& cell, const Room& room, double frame_s, double wrong_depths, const Velocity& moving,
-               cfp::Random& who, cfp::Random& random, const Fault& fault = faults[0]) {
+               cfp::Random& who, cfp::Random& random, const Fault& fault = faults[0], const Lens& lens = camera) {
   Scene scene;
   const auto& [velocity, turn] = moving;
   const double side = who.uniform() < 0.5 ? -1 : 1;
@@ -160,7 +169,7 @@ Scene simulate(const Cell& cell, const Room& room, double frame_s, double wrong_
   const auto add = [&](const V2& p, double z, const V3& step, double other_side) {
     V3 ray;
     V2 q;
-    if (!camera.unproject(p, ray) || !camera.project(scene.T_cur_prev * V3(z * ray + step), q)) return;
+    if (!lens.unproject(p, ray) || !lens.project(scene.T_cur_prev * V3(z * ray + step), q)) return;
     if (q.x() < 5 || q.y() < 5 || q.x() > 634 || q.y() > 474) return;
     q = seen(q, scene.T_cur_prev * V3(z * ray + step));
     const V2 before = seen(p, z * ray);
@@ -173,9 +182,9 @@ Scene simulate(const Cell& cell, const Room& room, double frame_s, double wrong_
     scene.depths.push_back(measured + depth_noise.sigma_m(measured) * random.normal());
   };
 
-  const double z = who.uniform(room.nearest_m, room.farthest_m), half_width = camera.fx * 0.28 / z,
-               half_height = camera.fy * 0.8 / z;
-  const V2 centre(who.uniform(150, 490), who.uniform(220, 280));
+  const double z = who.uniform(room.nearest_m, room.farthest_m), half_width = lens.fx * 0.28 / z,
+               half_height = lens.fy * 0.8 / z;
+  const V2 centre(who.uniform(room.margin_px, 640 - room.margin_px), who.uniform(220, 280));
   scene.box = {centre.x() - 1.1 * half_width, centre.y() - 1.05 * half_height, centre.x() + 1.1 * half_width,
                centre.y() + 1.05 * half_height};
   for (int i = 0; i < room.points; ++i) {
@@ -203,6 +212,7 @@ struct Way {
   cfp::FrameOptions options;
   std::size_t depth_of_every = 1;  // so many pairs; 0: none, as with one camera
   Given given = Given::nothing;
+  bool noise_alike = false;  // of all pairs of the undistorted image
 };
 
 constexpr double host_error_m = 0.003, host_error_rad = 0.001;
@@ -305,25 +315,39 @@ void report(const char* name, const std::vector<Outcome>& outcomes, double thres
               most > 0 && worst != nullptr ? worst->name().c_str() : "");
 }
 
+/// What takes back that the noise of a pair grows with the place in the undistorted image.
+template <typename Lens>
+std::vector<double> against_lens(const Lens& lens, const std::vector<std::array<double, 2>>& pixels) {
+  std::vector<std::array<double, 2>> ideal;
+  std::vector<double> memory, inverse;
+  const auto points = cfp::undistorted(lens, cfp::PointSpan<double, 2>(pixels), ideal);
+  for (const double sigma : cfp::undistorted_sigmas(lens, points, {}, memory)) inverse.push_back(1 / sigma);
+  return inverse;
+}
+
 /// O of every cell, `repetitions` scenes each (at rest four times as many), as a row of the table.
+template <typename Lens = cfp::PinholeCamera<double>>
 void judge(const char* name, const Way& way, const std::vector<Cell>& cells, const Room& room, double frame_s,
-           double wrong_depths, int repetitions, std::uint64_t seed) {
+           double wrong_depths, int repetitions, std::uint64_t seed, const Lens& lens = camera) {
   cfp::Random random(seed, "object_motion_study"), host(seed, "host");
   cfp::FrameState<double> state;
   std::vector<Outcome> outcomes;
   for (const Cell& cell : cells) {
     for (int i = 0; i < repetitions * (cell.at_rest() ? 4 : 1); ++i) {
-      Scene scene = simulate(cell, room, frame_s, wrong_depths, draw_camera(cell.camera, random), random, random);
+      Scene scene = simulate(cell, room, frame_s, wrong_depths, draw_camera(cell.camera, random), random, random,
+                             faults[0], lens);
       for (std::size_t k = 0; k < scene.depths.size(); ++k) {
         if (way.depth_of_every > 0 && k % way.depth_of_every != 0) scene.depths[k] = -1;
       }
       cfp::Frame<double> frame;
       frame.flow = {scene.previous, scene.current};
       if (way.depth_of_every > 0) frame.flow.previous_depths = scene.depths;
+      std::vector<double> inverse;
+      if (way.noise_alike) frame.flow.relative_sigmas = inverse = against_lens(lens, scene.current);
       give_motion(way.given, scene, host, frame);
       state.boxes.resize(1);
       state.boxes[0].box = scene.box;
-      estimate_objects(frame, camera, way.options, state);
+      estimate_objects(frame, lens, way.options, state);
       outcomes.push_back({&cell, state.objects[0].static_probability, state.objects[0].status == cfp::Status::ok});
     }
   }
@@ -456,6 +480,26 @@ void print_accelerated(const std::vector<Cell>& cells, int repetitions, std::uin
   }
 }
 
+void print_fisheye(const std::vector<Cell>& cells, int repetitions, std::uint64_t seed) {
+  print_head("through a fisheye; and the noise of all pairs alike");
+  for (const bool alike : {false, true}) {
+    Way way;
+    way.noise_alike = alike;
+    const auto row = [&](const Room& room, const char* what, double hz, double wrong_depths) {
+      char name[64];
+      std::snprintf(name, sizeof name, "%s%s%s", alike ? "  " : "", room.name, what);
+      judge(name, way, cells, room, 1 / hz, wrong_depths, repetitions, seed, fisheye);
+    };
+    for (const Room& room : {rooms_of_fisheye[0], rooms_of_fisheye[1]}) {
+      row(room, "", 30, 0);
+      row(room, ", 15 % wrong", 30, 0.15);
+    }
+    way.depth_of_every = 0;
+    row(rooms_of_fisheye[0], ", no depths", 30, 0);
+    row(rooms_of_fisheye[2], ", no depths, 10 Hz", 10, 0);
+  }
+}
+
 void print_shared(int repetitions, std::uint64_t seed) {
   constexpr std::array<double, 6> errors_px = {0, 0.1, 0.06, 0.04, 0.03, 0.02};
   std::printf("\na furnished room, 5 %% wrong depths: called moving (%%), by shared_error_px\n%-34s", "");
@@ -530,6 +574,7 @@ int main(int argc, char** argv) {
   }
   print_shared(repetitions, seed);
   print_accelerated(cells, (repetitions + 4) / 5, seed);
+  print_fisheye(cells, repetitions, seed);
 
   print_head("one camera, no depths; then F alone; a host's motion, and a wrong one");
   Way one_camera;

@@ -72,6 +72,8 @@
   CFP_LAYOUT_OPAQUE(cfp::FundamentalResult<float>)                       \
   CFP_LAYOUT_OPAQUE(cfp::FundamentalResult<double>)                      \
   CFP_LAYOUT(cfp::FundamentalRansacWorkspace, scratch)                   \
+  CFP_LAYOUT(cfp::KannalaBrandtCamera<float>, k4)                        \
+  CFP_LAYOUT(cfp::KannalaBrandtCamera<double>, k4)                       \
   CFP_LAYOUT(cfp::RadialTangentialCamera<float>, k3)                     \
   CFP_LAYOUT(cfp::RadialTangentialCamera<double>, k3)                    \
   CFP_LAYOUT_OPAQUE(cfp::MinimalSampler<7>)                              \
@@ -150,8 +152,8 @@
   CFP_LAYOUT(cfp::HealthOptions, min_effective_points)                   \
   CFP_LAYOUT(cfp::FrameHealth, fallback)                                 \
   CFP_LAYOUT(cfp::ObjectClass, non_rigid)                                \
-  CFP_LAYOUT(cfp::FlowPairs<float>, current) \
-  CFP_LAYOUT(cfp::FlowPairs<double>, current) \
+  CFP_LAYOUT(cfp::FlowPairs<float>, relative_sigmas) \
+  CFP_LAYOUT(cfp::FlowPairs<double>, relative_sigmas) \
   CFP_LAYOUT(cfp::Frame<float>, image_motion) \
   CFP_LAYOUT(cfp::Frame<double>, image_motion) \
   CFP_LAYOUT(cfp::PoseEstimate, inliers) \

@@ -380,8 +380,8 @@ TEST_CASE("Both stages through a lens equal both stages through the pinhole on u
   CHECK(pinhole.state.report.foreground > 200);
   pinhole.fine({}, c);
   const cfp::FrameReport report = through_lens.fine({}, lens);
+  // d^T and d^F are measured in pixels of the lens' image, so that K agrees up to its magnification.
   CHECK_THAT(report.projection.threshold_px, WithinAbs(pinhole.state.report.projection.threshold_px, 0.1));
-  CHECK_THAT(report.epipolar.threshold_px, WithinAbs(pinhole.state.report.epipolar.threshold_px, 1e-6));
-  // d^T is measured among distorted pixels, so that K agrees up to the lens' magnification.
+  CHECK_THAT(report.epipolar.threshold_px, WithinAbs(pinhole.state.report.epipolar.threshold_px, 0.1));
   for (std::size_t i = 0; i < object.size(); ++i) CHECK_THAT(through_lens.k(i), WithinAbs(pinhole.k(i), 0.15));
 }

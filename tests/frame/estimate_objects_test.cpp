@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "cfp/geometry/kannala_brandt_camera.hpp"
 #include "cfp/geometry/radial_tangential_camera.hpp"
 #include "support/catch.hpp"
 #include "support/frame_runs.hpp"
@@ -210,7 +211,8 @@ TEST_CASE("What is known of an object fades with the time between two frames, wh
   }
 }
 
-TEST_CASE("Through a lens O is measured in the undistorted image", "[frame]") {
+TEST_CASE("Through a lens O is measured in the undistorted image, whose noise is the lens' times the flow's own",
+          "[frame]") {
   const DynamicScene<double> straight = make_dynamic_scene<double>({}, 62);
   const auto& c = straight.camera;
   const cfp::RadialTangentialCamera<double> lens{c.fx, c.fy, c.cx, c.cy, 0.15, -0.25, 0.002, -0.001, 0.1};
@@ -228,6 +230,12 @@ TEST_CASE("Through a lens O is measured in the undistorted image", "[frame]") {
   FrameRun<double> plain(straight), bent(straight);
   cfp::Frame<double> frame = plain.frame(), bent_frame = bent.frame();
   bent_frame.flow = {previous, current};
+  // The flow of as much less noise where the lens makes more of it is that of the pinhole.
+  std::vector<std::array<double, 2>> ideal;
+  std::vector<double> of_lens, relative;
+  const auto points = cfp::undistorted(lens, cfp::PointSpan<double, 2>(current), ideal);
+  for (const double sigma : cfp::undistorted_sigmas(lens, points, {}, of_lens)) relative.push_back(1 / sigma);
+  bent_frame.flow.relative_sigmas = relative;
   frame.fundamental = bent_frame.fundamental = cfp::fundamental_from_pose(c, straight.T_cur_prev);
   const auto whole_image = [](FrameRun<double>& run) { run.scene.boxes = {{-100, -100, 900, 700}}; };
   whole_image(plain);
@@ -239,8 +247,49 @@ TEST_CASE("Through a lens O is measured in the undistorted image", "[frame]") {
   // Taken for a pinhole's, the bent pixels are off their lines.
   FrameRun<double> wrong(straight);
   whole_image(wrong);
+  bent_frame.flow.relative_sigmas = {};
   wrong.coarse({}, bent_frame, c);
   CHECK(wrong.state.objects[0].static_probability < plain.state.objects[0].static_probability - 0.01);
+}
+
+TEST_CASE("At the edge of a fisheye who stands is not called moving, and who walks is", "[frame]") {
+  const cfp::KannalaBrandtCamera<double> lens{250, 250, 320, 240, -0.02, 0.003, -0.002, 0.0004};
+  const cfp::DepthNoise depth_noise;
+  const auto called_moving = [&](double walk_m, std::uint64_t seed) {
+    cfp::Random random(seed, "fisheye");
+    const cfp::SE3<double> T{cfp::so3_exp<double>({0.004, 0.006, -0.002}), cfp::Vector3<double>(0.006, -0.003, 0.008)};
+    std::vector<std::array<double, 2>> previous, current;
+    std::vector<double> depths;
+    const auto add = [&](double x, double y, double z, double moved_m) {
+      cfp::Vector3<double> ray;
+      cfp::Vector2<double> pixel;
+      if (!lens.unproject({x, y}, ray) ||
+          !lens.project(T * cfp::Vector3<double>(ray * z + cfp::Vector3<double>(0, moved_m, 0)), pixel))
+        return;
+      previous.push_back({x, y});
+      current.push_back({pixel.x() + 0.2 * random.normal(), pixel.y() + 0.2 * random.normal()});
+      depths.push_back(z + depth_noise.sigma_m(z) * random.normal());
+    };
+    const cfp::Box<double> box{60, 150, 130, 330};
+    for (int i = 0; i < 150; ++i) add(random.uniform(140, 620), random.uniform(20, 460), random.uniform(1.5, 5), 0);
+    for (int i = 0; i < 50; ++i) add(random.uniform(62, 128), random.uniform(152, 328), 1.2, walk_m);
+    cfp::Frame<double> frame;
+    frame.flow = {previous, current, depths};
+    cfp::FrameState<double> state;
+    state.boxes.resize(1);
+    state.boxes[0].box = box;
+    const cfp::FrameOptions options;
+    cfp::estimate_objects(frame, lens, options, state);
+    REQUIRE(state.objects[0].status == cfp::Status::ok);
+    return state.objects[0].static_probability <= options.object_threshold ? 1 : 0;
+  };
+  int at_rest = 0, walking = 0;
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    at_rest += called_moving(0, seed);
+    walking += called_moving(0.015, seed);
+  }
+  CHECK(at_rest <= 5);
+  CHECK(walking >= 95);
 }
 
 TEST_CASE("With a label image, the pairs on an object are those on its label", "[frame]") {

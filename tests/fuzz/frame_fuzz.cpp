@@ -13,7 +13,7 @@ namespace {
 using cfp_fuzz::FuzzInput;
 
 struct Arrays {
-  std::vector<float> keypoints, depths, flow_from, flow_to, flow_depths, m;
+  std::vector<float> keypoints, depths, flow_from, flow_to, flow_depths, flow_sigmas, m;
   std::vector<cfp::Detection<float>> detections;
   std::vector<std::int32_t> object, match;
   std::vector<std::uint8_t> descriptors, labels;
@@ -111,6 +111,7 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
     a.flow_to = a.flow_from;
     for (float& x : a.flow_to) x += FuzzInput::to<float>(in.number(-3, 3));
     if (in.flag()) a.flow_depths = in.numbers<float>(pairs, 0, 6);
+    if (in.byte() < 64) a.flow_sigmas = in.numbers<float>(pairs, 0.5, 4);
     a.detections.resize(in.count(3));
     for (auto& d : a.detections) {
       d.box = {FuzzInput::to<float>(in.number(0, 300)), FuzzInput::to<float>(in.number(0, 300)),
@@ -122,7 +123,7 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
     frame.keypoints = points(a.keypoints);
     frame.depths = a.depths;
     if (in.flag()) frame.detections = a.detections;
-    frame.flow = {points(a.flow_from), points(a.flow_to), a.flow_depths};
+    frame.flow = {points(a.flow_from), points(a.flow_to), a.flow_depths, a.flow_sigmas};
     if (in.byte() < 64) {
       for (std::size_t i = 0; i < n; ++i) a.object.push_back(index(in, a.detections.size()));
       frame.object_of_keypoint = a.object;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "cfp/geometry/fundamental.hpp"
+#include "cfp/geometry/kannala_brandt_camera.hpp"
 #include "cfp/geometry/p3p.hpp"
 #include "cfp/geometry/radial_tangential_camera.hpp"
 #include "cfp/math/matrix3.hpp"
@@ -127,6 +128,10 @@ void minimal(FuzzInput& in) {
     CFP_PROMISE((again - pixel).norm() <= Scalar(0.01) + Scalar(1e-4) * pixel.norm());
   }
   if (camera.project(problem.world[0], again)) CFP_PROMISE(again.allFinite());
+  cfp::KannalaBrandtCamera<Scalar> fisheye{camera.fx, camera.fy, camera.cx, camera.cy, camera.k1, camera.k2};
+  fisheye.k3 = FuzzInput::to<Scalar>(in.number(-0.5, 0.5));
+  if (fisheye.unproject(pixel, ray)) CFP_PROMISE(ray.allFinite() && ray.z() == Scalar(1));
+  if (fisheye.project(problem.world[0], again)) CFP_PROMISE(again.allFinite());
 }
 
 void two_views(FuzzInput& in) {

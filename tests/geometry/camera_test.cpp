@@ -4,10 +4,12 @@
 #include <limits>
 #include <vector>
 
+#include "cfp/geometry/kannala_brandt_camera.hpp"
 #include "cfp/geometry/radial_tangential_camera.hpp"
 #include "support/catch.hpp"
 #include "support/numbers.hpp"
 
+using cfp::KannalaBrandtCamera;
 using cfp::PinholeCamera;
 using cfp::RadialTangentialCamera;
 using cfp::Vector2;
@@ -46,6 +48,16 @@ RadialTangentialCamera<float> make() {
   return {520.9F, 521.0F, 325.1F, 249.7F, 0.2312F, -0.7849F, -0.0033F, -0.0001F, 0.9172F};
 }
 
+// TUM VI, the published coefficients of its first camera; 79 degrees in the corners of a picture of 640 x 480.
+template <>
+KannalaBrandtCamera<double> make() {
+  return {300.4, 300.3, 318.9, 241.2, 0.0034824, 0.00071503, -0.0020532, 0.00020294};
+}
+template <>
+KannalaBrandtCamera<float> make() {
+  return make<KannalaBrandtCamera<double>>().cast<float>();
+}
+
 /// A grid before, at and behind the camera.
 template <typename Scalar>
 std::vector<Vector3<Scalar>> points() {
@@ -70,7 +82,7 @@ constexpr double fused_roundings = 0;
 
 TEMPLATE_TEST_CASE("project agrees with finite differences and rejects what is behind", "[geometry]",
                    PinholeCamera<float>, PinholeCamera<double>, RadialTangentialCamera<float>,
-                   RadialTangentialCamera<double>) {
+                   RadialTangentialCamera<double>, KannalaBrandtCamera<float>, KannalaBrandtCamera<double>) {
   using Scalar = typename TestType::ScalarType;
   const auto camera = make<TestType>();
   int valid = 0;
@@ -111,7 +123,8 @@ TEMPLATE_TEST_CASE("project agrees with finite differences and rejects what is b
 }
 
 TEMPLATE_TEST_CASE("unproject inverts project", "[geometry]", PinholeCamera<float>, PinholeCamera<double>,
-                   RadialTangentialCamera<float>, RadialTangentialCamera<double>) {
+                   RadialTangentialCamera<float>, RadialTangentialCamera<double>, KannalaBrandtCamera<float>,
+                   KannalaBrandtCamera<double>) {
   using Scalar = typename TestType::ScalarType;
   const auto camera = make<TestType>();
   for (int u = 0; u <= 640; u += 40) {
@@ -145,7 +158,7 @@ TEMPLATE_TEST_CASE("a pixel beyond the scalar's range is none; the camera withou
 
 TEMPLATE_TEST_CASE("cameras answer hostile input with false and leave the outputs alone", "[geometry]",
                    PinholeCamera<float>, PinholeCamera<double>, RadialTangentialCamera<float>,
-                   RadialTangentialCamera<double>) {
+                   RadialTangentialCamera<double>, KannalaBrandtCamera<float>, KannalaBrandtCamera<double>) {
   using Scalar = typename TestType::ScalarType;
   const auto camera = make<TestType>();
   for (const Scalar a : cfp_test::hostile_numbers<Scalar>()) {

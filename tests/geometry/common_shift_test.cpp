@@ -20,13 +20,12 @@ constexpr double sigma_px = 0.3;
 /// Points of somebody about 2 m away, seen before and after.
 struct Object {
   std::vector<std::array<double, 2>> previous, current;
-  std::vector<double> depths;
+  std::vector<double> depths, relative_sigmas;
   std::vector<std::int32_t> members;
 
   [[nodiscard]] double shift(const cfp::UncertainMotion<double>& motion, double shared_error_px = 0) const {
-    return cfp::common_shift(cfp::PointSpan<double, 2>(previous), cfp::span<const double>(depths),
-                             cfp::PointSpan<double, 2>(current), cfp::span<const std::int32_t>(members), motion,
-                             pinhole, sigma_px, cfp::MotionDistanceOptions(), shared_error_px);
+    return cfp::common_shift({previous, current, depths, relative_sigmas}, cfp::span<const std::int32_t>(members),
+                             motion, pinhole, sigma_px, cfp::MotionDistanceOptions(), shared_error_px);
   }
 };
 
@@ -168,9 +167,30 @@ TEST_CASE("The common shift allocates nothing, and float sees what double sees",
   const std::vector<float> depths(object.depths.begin(), object.depths.end());
   const std::size_t before = cfp_test::allocation_count();
   const double shift =
-      cfp::common_shift(cfp::PointSpan<float, 2>(previous), cfp::span<const float>(depths),
-                        cfp::PointSpan<float, 2>(current), cfp::span<const std::int32_t>(object.members),
+      cfp::common_shift({previous, current, depths}, cfp::span<const std::int32_t>(object.members),
                         motion.cast<float>(), pinhole.cast<float>(), 0.3F, cfp::MotionDistanceOptions(), 0.05);
   CHECK(cfp_test::allocation_count() == before);
   CHECK_THAT(shift, WithinAbs(object.shift(motion, 0.05), 0.02 * shift));
+}
+
+TEST_CASE("A pair of thrice the noise says as much as one whose pixels all err by thrice as much",
+          "[geometry][common_shift]") {
+  cfp::Random random(11, "relative");
+  const cfp::SE3<double> T{cfp::so3_exp<double>({0.01, -0.005, 0.002}), V3(0.01, 0, 0.02)};
+  Object object = make_object(T, V3(0.004, 0, 0), 60, random);
+  const cfp::UncertainMotion<double> motion(T, 0.0005, 0.0002);
+  const double alike = object.shift(motion);
+  object.relative_sigmas.assign(object.depths.size(), 1.0);
+  CHECK(object.shift(motion) == alike);
+  object.relative_sigmas.assign(object.depths.size(), 3.0);
+  CHECK_THAT(object.shift(motion), WithinAbs(cfp::common_shift({object.previous, object.current, object.depths},
+                                                               cfp::span<const std::int32_t>(object.members), motion,
+                                                               pinhole, 3 * sigma_px, cfp::MotionDistanceOptions(), 0),
+                                             1e-9 * alike));
+  CHECK(object.shift(motion) < 0.8 * alike);
+  // Pairs of no sensible noise take no part.
+  object.relative_sigmas.assign(object.depths.size(), std::numeric_limits<double>::quiet_NaN());
+  CHECK(object.shift(motion) == 0);
+  object.relative_sigmas.assign(object.depths.size(), 0);
+  CHECK(object.shift(motion) == 0);
 }

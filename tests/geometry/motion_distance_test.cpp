@@ -184,18 +184,35 @@ TEST_CASE("Pairs that have no distance get none, and float is near double", "[ge
                                             {double(current[i][0]), double(current[i][1])}, cfp::UncertainMotion(T),
                                             camera, 0.2, options));
   }
-  cfp::motion_distances(previous, depths, current, cfp::UncertainMotion(T.cast<float>()), camera.cast<float>(), 0.2F,
+  cfp::motion_distances({previous, current, depths}, cfp::UncertainMotion(T.cast<float>()), camera.cast<float>(), 0.2F,
                         options, out);
   for (std::size_t i = 0; i < out.size(); ++i)
     CHECK_THAT(double(out[i]), WithinAbs(expected[i], 1e-2 + 1e-4 * expected[i]));
 
   const std::vector<float> none_known(out.size(), 0.0F);
   std::vector<float> without(out.size());
-  cfp::motion_distances(previous, none_known, current, cfp::UncertainMotion(T.cast<float>()), camera.cast<float>(),
+  cfp::motion_distances({previous, current, none_known}, cfp::UncertainMotion(T.cast<float>()), camera.cast<float>(),
                         0.2F, options, out);
-  cfp::motion_distances(previous, {}, current, cfp::UncertainMotion(T.cast<float>()), camera.cast<float>(), 0.2F,
-                        options, without);
+  cfp::motion_distances({previous, current}, cfp::UncertainMotion(T.cast<float>()), camera.cast<float>(), 0.2F, options,
+                        without);
   CHECK(without == out);
+
+  // Of relative noise r: the distance at r sigma, over r. Nothing of a pair whose noise is none.
+  std::vector<float> relative(out.size());
+  for (std::size_t i = 0; i < out.size(); ++i)
+    relative[i] = i % 5 == 0 ? 1.0F : i % 5 == 1 ? 0.0F : 0.5F * float(i % 5);
+  cfp::motion_distances({previous, current, depths, relative}, cfp::UncertainMotion(T.cast<float>()),
+                        camera.cast<float>(), 0.2F, options, out);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const double r = double(relative[i]);
+    const double at_sigma =
+        r > 0 ? cfp::motion_distance({double(previous[i][0]), double(previous[i][1])}, double(depths[i]),
+                                     {double(current[i][0]), double(current[i][1])}, cfp::UncertainMotion(T), camera,
+                                     0.2 * r, options)
+              : 0;
+    if (r > 0 && at_sigma >= 0) CHECK_THAT(double(out[i]), WithinAbs(at_sigma / r, 2e-2 + 1e-4 * at_sigma / r));
+    if (!(r > 0)) CHECK_FALSE(cfp::has_distance(out[i]));
+  }
 }
 
 TEST_CASE("Where the motion is uncertain in one direction alone a float sees what a double does",

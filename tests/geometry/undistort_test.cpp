@@ -5,6 +5,8 @@
 #include <limits>
 #include <vector>
 
+#include "cfp/core/random.hpp"
+#include "cfp/geometry/kannala_brandt_camera.hpp"
 #include "cfp/geometry/radial_tangential_camera.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
@@ -79,4 +81,38 @@ TEST_CASE("What has no ray becomes NaN", "[geometry]") {
   const cfp::PinholeCamera<double> none = cfp::undistorted_camera(BlindCamera{});
   CHECK((none.fx == 0 && none.fy == 0 && none.cx == 0 && none.cy == 0));
   CHECK(std::isnan(cfp::undistorted(BlindCamera{}, pixels, storage)(1, 0)));
+}
+
+TEST_CASE("The noise of undistorted points is that of pixels moved by one, root mean square", "[geometry]") {
+  const cfp::KannalaBrandtCamera<double> fisheye{250, 240, 320, 250, -0.02, 0.003, -0.002, 0.0004};
+  const cfp::PinholeCamera<double> ideal = cfp::undistorted_camera(fisheye);
+  const std::vector<std::array<double, 2>> pixels = {{320, 250}, {100, 90}, {600, 400},
+                                                     {420, 250}, {320, 20}, {900, 0}};
+  std::vector<std::array<double, 2>> storage;
+  std::vector<double> sigmas;
+  const auto points = cfp::undistorted(fisheye, cfp::PointSpan<double, 2>(pixels), storage);
+  const cfp::span<const double> found = cfp::undistorted_sigmas(fisheye, points, {}, sigmas);
+  REQUIRE(found.size() == pixels.size());
+  CHECK_THAT(found[0], WithinAbs(1, 1e-9));
+  CHECK(found[5] == 1);  // has no ray
+  for (std::size_t i = 0; i < 5; ++i) {
+    double sum_sq = 0;
+    constexpr int directions = 72;
+    for (int k = 0; k < directions; ++k) {
+      const double angle = 2 * cfp::pi<double> * k / directions, step = 1e-4;
+      cfp::Vector3<double> ray(0, 0, 1);
+      cfp::Vector2<double> moved(0, 0);
+      REQUIRE(fisheye.unproject({pixels[i][0] + step * std::cos(angle), pixels[i][1] + step * std::sin(angle)}, ray));
+      REQUIRE(ideal.project(ray, moved));
+      sum_sq += (moved - points[i]).squaredNorm() / (step * step) / directions;
+    }
+    CHECK_THAT(found[i], WithinAbs(std::sqrt(sum_sq), 1e-3 * found[i]));
+  }
+  CHECK(found[1] > 2);
+  // Times the host's own; a pinhole camera adds nothing and copies nothing.
+  const std::vector<double> own(pixels.size(), 3.0), alone = sigmas;
+  const cfp::span<const double> both = cfp::undistorted_sigmas(fisheye, points, own, sigmas);
+  for (std::size_t i = 0; i < both.size(); ++i) CHECK_THAT(both[i], WithinAbs(3 * alone[i], 1e-12 * alone[i]));
+  CHECK(cfp::undistorted_sigmas(ideal, points, own, sigmas).data() == own.data());
+  CHECK(cfp::undistorted_sigmas(ideal, points, {}, sigmas).empty());
 }

@@ -102,7 +102,7 @@ struct PairsWithDepth {
 
   /// The noise of pair i's pixel: what is near is no lever.
   [[nodiscard]] Scalar pixel_sigma_of(std::size_t i, Scalar sigma_px) const noexcept {
-    return sigma_px * (std::max)(Scalar(1), workspace.near_m / workspace.points[i][2]);
+    return sigma_px * flow.relative_sigma(i) * (std::max)(Scalar(1), workspace.near_m / workspace.points[i][2]);
   }
 
   /// The noise that they show under a motion.
@@ -113,7 +113,8 @@ struct PairsWithDepth {
     const SE3<Scalar> T = T_cur_prev.template cast<Scalar>();
     MotionResidual<Scalar> pair;
     for (std::size_t i = 0; i < workspace.points.size(); ++i) {
-      if (tells(i) && residual_of(i, T, pair)) distances.push_back(distance_of(pair, sigma_px));
+      const Scalar relative = flow.relative_sigma(i);
+      if (tells(i) && residual_of(i, T, pair)) distances.push_back(distance_of(pair, sigma_px * relative) / relative);
     }
     return flow_sigma(span<Scalar>(distances), 2, options);
   }

@@ -38,7 +38,8 @@ void gather_matches(FrameState<Scalar>& state) {
   }
 }
 
-/// The distances of all matches from the epipolar lines of the pose, in the undistorted image.
+/// The distances of all matches from the epipolar lines of the pose, in the undistorted image, on the scale of its
+/// middle.
 template <typename Scalar, typename Camera>
 void pose_epipolar_distances(const SE3<double>& T_cur_prev, const Camera& camera, FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
@@ -47,7 +48,8 @@ void pose_epipolar_distances(const SE3<double>& T_cur_prev, const Camera& camera
   const PointSpan<Scalar, 2> current =
       undistorted(camera, PointSpan<Scalar, 2>(state.current.keypoints), scratch.undistorted_current);
   const Matrix3<Scalar> F = fundamental_from_pose(undistorted_camera(camera), T_cur_prev.template cast<Scalar>());
-  epipolar_distances(F, previous, current, span<Scalar>(scratch.epipolar));
+  const span<const Scalar> sigmas = undistorted_sigmas(camera, current, {}, scratch.relative_sigmas);
+  line_distances(F, FlowPairs<Scalar>{previous, current, {}, sigmas}, span<Scalar>(scratch.epipolar));
 }
 
 /// One constraint, fitted to the distances of the keypoints outside all boxes. Too few of those: to what is more likely

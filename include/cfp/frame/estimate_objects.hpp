@@ -146,6 +146,7 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   detail::find_flow_depths(frame, coarse, state);
   FlowPairs<Scalar> flow{undistorted(camera, frame.flow.previous, scratch.undistorted_previous),
                          undistorted(camera, frame.flow.current, scratch.undistorted_current), state.flow_depths};
+  flow.relative_sigmas = undistorted_sigmas(camera, flow.current, frame.flow.relative_sigmas, scratch.relative_sigmas);
   const PinholeCamera<Scalar> pinhole = undistorted_camera(camera);
   detail::label_pairs(frame, options, state);
   const FlowSupport support = detail::mark_outside(n, coarse.flow, scratch);

@@ -107,6 +107,13 @@ template <typename Scalar>
   return model;
 }
 
+/// The distances of all pairs from the lines of F, on the scale of their relative_sigmas.
+template <typename Scalar>
+void line_distances(const Matrix3<Scalar>& F, const FlowPairs<Scalar>& flow, span<Scalar> out) noexcept {
+  epipolar_distances(F, flow.previous, flow.current, out);
+  for (std::size_t i = 0; i < flow.relative_sigmas.size(); ++i) out[i] /= flow.relative_sigmas[i];
+}
+
 /// F as a model, with the noise of the pairs marked in `outside` if enough of them have a distance.
 template <typename Scalar>
 [[nodiscard]] FlowModel<Scalar> fundamental_model(const Matrix3<Scalar>& F, RansacStatus status, FlowSupport support,
@@ -117,7 +124,7 @@ template <typename Scalar>
   model.F = F;
   model.coordinates = 1;
   distances.resize(outside.size());
-  epipolar_distances(F, flow.previous, flow.current, span<Scalar>(distances));
+  line_distances(F, flow, span<Scalar>(distances));
   std::size_t kept = 0;
   for (std::size_t i = 0; i < outside.size(); ++i) {
     if (outside[i] != 0 && has_distance(distances[i])) distances[kept++] = distances[i];
@@ -136,7 +143,12 @@ FlowModel<Scalar> estimate_fundamental(const FlowPairs<Scalar>& flow, span<const
   const auto inside = static_cast<std::size_t>(std::count(outside.begin(), outside.end(), char(0)));
   if (outside.size() - inside < options.min_outside_pairs) return model;
   workspace.weights.clear();
-  for (const char mark : outside) workspace.weights.push_back(mark == 0 ? Scalar(0) : Scalar(1));
+  for (std::size_t i = 0; i < outside.size(); ++i) {
+    // The threshold is one for all pairs, and more noise than that is a mismatch: the square of 1 / sigma^2 keeps most
+    // of such pairs out (cfp_object_motion_study, a fisheye).
+    const Scalar variance = flow.relative_sigma(i) * flow.relative_sigma(i);
+    workspace.weights.push_back(outside[i] == 0 ? Scalar(0) : 1 / (variance * variance));
+  }
   const FundamentalResult<Scalar> estimate = fundamental_ransac(
       PointPairs<Scalar>{flow.previous, flow.current, workspace.weights}, camera, options.ransac, workspace.ransac);
   model.status = estimate.status;
@@ -164,15 +176,14 @@ template <typename Scalar>
 void flow_distances(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow, const PinholeCamera<Scalar>& camera,
                     const FlowModelOptions& options, span<Scalar> out) noexcept {
   if (model.kind == FlowModelKind::none) return std::fill(out.begin(), out.end(), Scalar(no_distance<double>));
-  if (model.kind == FlowModelKind::fundamental) return epipolar_distances(model.F, flow.previous, flow.current, out);
+  if (model.kind == FlowModelKind::fundamental) return detail::line_distances(model.F, flow, out);
   MotionDistanceOptions distance = options.motion.distance;
-  span<const Scalar> depths = flow.previous_depths;
+  FlowPairs<Scalar> pairs = flow;
   if (model.kind == FlowModelKind::motion_up_to_scale) {
     distance.unknown_depth = options.nearer_than_room;
-    depths = {};
+    pairs.previous_depths = {};
   }
-  motion_distances(flow.previous, depths, flow.current, model.motion, camera, detail::noise_of(model, options),
-                   distance, out);
+  motion_distances(pairs, model.motion, camera, detail::noise_of(model, options), distance, out);
 }
 
 /// What the pairs `members` share beyond the camera's motion and its error (common_shift); 0 where depths are not
@@ -182,8 +193,7 @@ template <typename Scalar>
                                 span<const std::int32_t> members, const PinholeCamera<Scalar>& camera,
                                 const FlowModelOptions& options, double shared_error_px) noexcept {
   if (model.kind != FlowModelKind::motion || model.motion.covariance.isZero(0)) return 0;
-  return common_shift(flow.previous, flow.previous_depths, flow.current, members, model.motion, camera,
-                      detail::noise_of(model, options), options.motion.distance,
+  return common_shift(flow, members, model.motion, camera, detail::noise_of(model, options), options.motion.distance,
                       (std::max)(shared_error_px, model.shared_error_px));
 }
 
@@ -206,7 +216,7 @@ FlowModel<Scalar> estimate_flow_model(const FlowPairs<Scalar>& flow, span<const 
   if (model.kind != FlowModelKind::none || !options.use_motion_up_to_scale) return model;
   const RansacStatus status = model.status;
   workspace.distances.assign(outside.size(), Scalar(1));
-  motion = motion_from({flow.previous, flow.current, workspace.distances});
+  motion = motion_from({flow.previous, flow.current, workspace.distances, flow.relative_sigmas});
   if (motion.known) model = detail::model_of(FlowModelKind::motion_up_to_scale, FlowSupport::outside_pairs, motion);
   model.status = status;
   return model;

@@ -10,6 +10,7 @@
 #include "cfp/detection/box_tracker_types.hpp"
 #include "cfp/frame/descriptor_matching.hpp"
 #include "cfp/frame/label_image.hpp"
+#include "cfp/geometry/flow_pairs.hpp"
 #include "cfp/math/se3.hpp"
 #include "cfp/math/uncertain_motion.hpp"
 
@@ -29,17 +30,6 @@ inline constexpr std::int32_t no_box = -1;
 inline constexpr std::int32_t no_match = -1;
 /// The object of a keypoint on none.
 inline constexpr std::int32_t no_object = -1;
-
-/// Optical-flow pairs: element i of both is the same point. Pixels.
-template <typename Scalar>
-struct FlowPairs {
-  PointSpan<Scalar, 2> previous;  ///< in frame k-1
-  PointSpan<Scalar, 2> current;   ///< in frame k
-  /// Metres along z in frame k-1; not positive or not finite: none there. Empty: those of the frame's keypoints that
-  /// lie next to it, see CoarseOptions::flow_depth_radius_px. Where depth does not fit the image to the pixel, none is
-  /// better than what stands at an edge: `edge_px` of sample_depth (opencv_matrices.hpp).
-  span<const Scalar> previous_depths = {};
-};
 
 /// Frame k. All pixels are those of the image in which the objects were detected; the camera knows its distortion.
 template <typename Scalar>

@@ -136,8 +136,8 @@ template <typename Scalar>
   if (!exact) model = model_by_depths(given, camera, coarse, flow, state);
   if (model.kind != FlowModelKind::none) return model;
   if (given && (take_given(*given, flow, camera, coarse.flow, state, as_given) || exact)) return as_given;
-  model = estimate_flow_model(FlowPairs<Scalar>{flow.previous, flow.current, {}}, outside, camera, coarse.flow,
-                              state.scratch.flow);
+  model = estimate_flow_model(FlowPairs<Scalar>{flow.previous, flow.current, {}, flow.relative_sigmas}, outside, camera,
+                              coarse.flow, state.scratch.flow);
   return model.kind == FlowModelKind::none ? as_given : model;
 }
 

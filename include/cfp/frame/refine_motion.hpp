@@ -59,12 +59,12 @@ struct RefinementModel {
       distances[i] = Scalar(no_distance<double>);
       if (outside[i] == 0) continue;
       ++pairs;
-      const Scalar depth = flow.previous_depths.empty() ? Scalar(0) : flow.previous_depths[i];
+      const Scalar sigma = sigma_px * flow.relative_sigma(i);
       MotionResidual<Scalar> pair;
-      if (!likely_residual<PinholeCamera<Scalar>, Scalar>(flow.previous[i], depth, flow.current[i], T, camera, sigma_px,
-                                                          options, pair))
+      if (!likely_residual<PinholeCamera<Scalar>, Scalar>(flow.previous[i], flow.depth(i), flow.current[i], T, camera,
+                                                          sigma, options, pair))
         continue;
-      const PairTerm term = add_pair(pair, static_cast<double>(sigma_px), Vector6<double>::Zero(), equations);
+      const PairTerm term = add_pair(pair, static_cast<double>(sigma), Vector6<double>::Zero(), equations);
       if (!(term.weight > 0)) continue;
       agreeing += term.weight;
       coordinates += term.weight * term.coordinates;

@@ -74,7 +74,7 @@ template <typename Scalar>
     if (!pairs.tells(i) || !pairs.residual_of(i, motion.T_cur_prev, pair)) continue;
     const Vector2<Scalar> at = pairs.flow.previous[i] - low, size = high - low;
     parts[cell(at[1], size[1], rows) * columns + cell(at[0], size[0], columns)].add(
-        pair, static_cast<double>(motion.sigma_px));
+        pair, static_cast<double>(motion.sigma_px * pairs.flow.relative_sigma(i)));
   }
 
   std::array<double, columns * rows> error_sq;  // in squares of the noise

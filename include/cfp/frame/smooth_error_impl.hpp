@@ -95,7 +95,8 @@ template <typename Scalar>
   straight.resize(flow.current.size());
   if (!fit.step(motion.sigma_px) || !fit.stands_out() || !fit.step(motion.sigma_px)) return false;
   fit.straighten(span<std::array<Scalar, 2>>(straight));
-  const FlowPairs<Scalar> rest{flow.previous, PointSpan<Scalar, 2>(straight), flow.previous_depths};
+  const FlowPairs<Scalar> rest{flow.previous, PointSpan<Scalar, 2>(straight), flow.previous_depths,
+                               flow.relative_sigmas};
   const PairsWithDepth<Scalar> pairs{rest, camera, options, workspace};
   const Scalar sigma_px = pairs.noise_under(fit.T_cur_prev, motion.sigma_px), shrunk = sigma_px / motion.sigma_px;
   flow = rest;

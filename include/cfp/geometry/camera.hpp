@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <type_traits>
 #include <vector>
 
@@ -70,6 +71,13 @@ struct PinholeCamera {
   }
 };
 
+namespace detail {
+
+template <typename Camera>
+inline constexpr bool is_pinhole = std::is_same_v<Camera, PinholeCamera<typename Camera::ScalarType>>;
+
+}  // namespace detail
+
 inline namespace CFP_ISA {
 
 /// The pinhole camera of a camera's undistorted image: focal lengths and principal point of its projection at the
@@ -93,7 +101,7 @@ template <typename Camera>
     const Camera& camera, const PointSpan<typename Camera::ScalarType, 2>& points,
     std::vector<std::array<typename Camera::ScalarType, 2>>& storage) {
   using Scalar = typename Camera::ScalarType;
-  if constexpr (std::is_same_v<Camera, PinholeCamera<Scalar>>) {
+  if constexpr (detail::is_pinhole<Camera>) {
     return points;
   } else {
     const PinholeCamera<Scalar> pinhole = undistorted_camera(camera);
@@ -106,6 +114,38 @@ template <typename Camera>
       storage[i] = {pixel.x(), pixel.y()};
     }
     return PointSpan<Scalar, 2>(storage);
+  }
+}
+
+/// The noise of points of the camera's undistorted image over that of its own pixels, of which one at the edge of a
+/// fisheye becomes many: root mean square over both directions, times `relative` where that is not empty. Kept in
+/// `storage`, which the returned view refers to; of a pinhole camera `relative` itself. 1 for a point that the camera
+/// does not see. Allocates only to grow storage.
+template <typename Camera>
+[[nodiscard]] span<const typename Camera::ScalarType> undistorted_sigmas(
+    const Camera& camera, const PointSpan<typename Camera::ScalarType, 2>& undistorted_points,
+    span<const typename Camera::ScalarType> relative, std::vector<typename Camera::ScalarType>& storage) {
+  using Scalar = typename Camera::ScalarType;
+  if constexpr (detail::is_pinhole<Camera>) {
+    return relative;
+  } else {
+    using std::sqrt;
+    const PinholeCamera<Scalar> pinhole = undistorted_camera(camera);
+    storage.resize(undistorted_points.size());
+    for (std::size_t i = 0; i < undistorted_points.size(); ++i) {
+      Vector3<Scalar> ray;
+      Vector2<Scalar> pixel;
+      Matrix23<Scalar> J;  // its left part inverted: d undistorted pixel / d pixel is that times the focal lengths
+      Scalar sigma(1);
+      if (pinhole.unproject(undistorted_points[i], ray) && camera.project(ray, pixel, &J)) {
+        const Scalar x = pinhole.fx * pinhole.fx * (J(1, 1) * J(1, 1) + J(0, 1) * J(0, 1)),
+                     y = pinhole.fy * pinhole.fy * (J(0, 0) * J(0, 0) + J(1, 0) * J(1, 0)),
+                     found = sqrt(Scalar(0.5) * (x + y)) / (J(0, 0) * J(1, 1) - J(0, 1) * J(1, 0));
+        if (found > Scalar(0) && is_finite(found)) sigma = found;
+      }
+      storage[i] = relative.empty() ? sigma : sigma * relative[i];
+    }
+    return storage;
   }
 }
 

@@ -14,9 +14,9 @@ namespace cfp {
 
 inline namespace CFP_ISA {
 
-/// How much better the pairs `members` are explained by one translation D of what they show than by a world at rest:
-/// D^T Cov(D)^-1 D of the D that fits best, chi-squared with three degrees of freedom at rest. With r, M, J and the
-/// motion's covariance C of motion_distance,
+/// How much better `members`, indices of pairs, are explained by one translation D of what they show than by a world at
+/// rest: D^T Cov(D)^-1 D of the D that fits best, chi-squared with three degrees of freedom at rest. With r, M, J and
+/// the motion's covariance C of motion_distance,
 ///
 ///   r_i = M_i (xi + (D, 0)) + J_i dz_i + noise,   xi ~ N(0, C) the same for all pairs, dz_i the error of a depth,
 ///
@@ -24,21 +24,20 @@ inline namespace CFP_ISA {
 /// part, and of a shift far beyond the noise little is left, which the pairs' distances tell. Neighbours share errors
 /// that are no noise (rolling shutter, lens, focal length), of about `shared_error_px` >= 0, which no number of pairs
 /// makes smaller: n pairs count as n / (1 + n (shared_error_px / sigma_px)^2) independent ones. Pairs without a depth
-/// take no part; 0 where nothing can be fitted. sigma_px > 0. O(members), allocates nothing.
+/// take no part; 0 where nothing can be fitted. sigma_px > 0, times each pair's relative_sigma. O(members), allocates
+/// nothing.
 template <typename Camera, typename Scalar = typename Camera::ScalarType>
-[[nodiscard]] double common_shift(const PointSpan<non_deduced<Scalar>, 2>& prev,
-                                  span<const non_deduced<Scalar>> depths_prev,
-                                  const PointSpan<non_deduced<Scalar>, 2>& cur, span<const std::int32_t> members,
+[[nodiscard]] double common_shift(const FlowPairs<non_deduced<Scalar>>& pairs, span<const std::int32_t> members,
                                   const UncertainMotion<non_deduced<Scalar>>& motion, const Camera& camera,
                                   non_deduced<Scalar> sigma_px, const MotionDistanceOptions& options,
                                   double shared_error_px) noexcept {
-  CFP_ASSERT(cur.size() == prev.size() && detail::fits(prev.size(), depths_prev));
+  CFP_ASSERT(pairs.current.size() == pairs.previous.size());
   constexpr int passes = 2;
   const double shared = shared_error_px / static_cast<double>(sigma_px);
   // A micrometre and a microradian of error are none, and give every covariance an inverse.
   Matrix6<double> covariance = motion.template cast<double>().covariance, information, inverse;
   for (int k = 0; k < 6; ++k) covariance(k, k) += 1e-12;
-  if (depths_prev.empty() || !invert_normal_equations<6>(covariance, 1e-14, information)) return 0;
+  if (pairs.previous_depths.empty() || !invert_normal_equations<6>(covariance, 1e-14, information)) return 0;
 
   double chi_squared = 0;
   Vector6<double> moved = Vector6<double>::Zero();  // xi + (D, 0)
@@ -47,11 +46,11 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
     double count = 0;
     for (const std::int32_t member : members) {
       const auto i = static_cast<std::size_t>(member);
-      const Scalar depth = depths_prev[i];
+      const Scalar depth = pairs.depth(i);
       detail::MotionResidual<Scalar> pair;
-      if (is_valid_depth(depth) &&
-          detail::expected_residual<Camera, Scalar>(prev[i], depth, cur[i], motion.T_cur_prev, camera, options, pair))
-        count += detail::add_pair(pair, static_cast<double>(sigma_px), moved, sums).weight;
+      if (is_valid_depth(depth) && detail::expected_residual<Camera, Scalar>(pairs.previous[i], depth, pairs.current[i],
+                                                                             motion.T_cur_prev, camera, options, pair))
+        count += detail::add_pair(pair, static_cast<double>(sigma_px * pairs.relative_sigma(i)), moved, sums).weight;
     }
     const double share = 1 / (1 + count * shared * shared);
     const Vector6<double> g = -share * sums.g;

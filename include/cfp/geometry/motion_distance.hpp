@@ -13,6 +13,7 @@
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/depth_noise.hpp"
 #include "cfp/geometry/distance.hpp"
+#include "cfp/geometry/flow_pairs.hpp"
 #include "cfp/geometry/motion_residual_impl.hpp"
 #include "cfp/math/se3.hpp"
 #include "cfp/math/uncertain_motion.hpp"
@@ -103,22 +104,24 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
                                                 sigma_px, options);
 }
 
-/// motion_distance of every pair. `depths_prev` may be empty: none is known. Sizes must agree. Allocates nothing.
+/// motion_distance of every pair, sigma_px times its relative_sigma in the place of sigma_px, over relative_sigma: the
+/// distances of all pairs are on one scale. Sizes must agree. Allocates nothing.
 template <typename Camera, typename Scalar = typename Camera::ScalarType>
-void motion_distances(const PointSpan<non_deduced<Scalar>, 2>& prev, span<const non_deduced<Scalar>> depths_prev,
-                      const PointSpan<non_deduced<Scalar>, 2>& cur, const UncertainMotion<non_deduced<Scalar>>& motion,
+void motion_distances(const FlowPairs<non_deduced<Scalar>>& pairs, const UncertainMotion<non_deduced<Scalar>>& motion,
                       const Camera& camera, non_deduced<Scalar> sigma_px, const MotionDistanceOptions& options,
                       span<non_deduced<Scalar>> out) noexcept {
-  CFP_ASSERT(prev.size() == out.size() && cur.size() == out.size());
-  CFP_ASSERT(detail::fits(out.size(), depths_prev));
+  CFP_ASSERT(pairs.previous.size() == out.size() && pairs.current.size() == out.size());
+  CFP_ASSERT(detail::fits(out.size(), pairs.previous_depths) && detail::fits(out.size(), pairs.relative_sigmas));
   const auto precise = motion.template cast<detail::AtLeastDouble<Scalar>>();
   const auto without_depth = detail::at_unknown_depth(precise, options.unknown_depth);
   const bool exact = motion.covariance.isZero(0);
   for (std::size_t i = 0; i < out.size(); ++i) {
-    const Scalar depth = depths_prev.empty() ? Scalar(0) : depths_prev[i];
+    const Scalar depth = pairs.depth(i), relative = pairs.relative_sigma(i);
     const auto& uncertain = is_valid_depth(depth) ? precise : without_depth;
-    out[i] = detail::distance_under<Camera, Scalar>(prev[i], depth, cur[i], motion.T_cur_prev,
-                                                    exact ? nullptr : &uncertain, camera, sigma_px, options);
+    out[i] =
+        detail::distance_under<Camera, Scalar>(pairs.previous[i], depth, pairs.current[i], motion.T_cur_prev,
+                                               exact ? nullptr : &uncertain, camera, sigma_px * relative, options) /
+        relative;
   }
 }
 

@@ -11,9 +11,6 @@
 
 namespace cfp::detail {
 
-template <typename Camera>
-inline constexpr bool is_pinhole = std::is_same_v<Camera, PinholeCamera<typename Camera::ScalarType>>;
-
 /// Slots [0, mono_end) hold pixels, [stereo_begin, stereo_end) pixels with u_right; both are padded to whole packets
 /// with weight 0.
 template <typename Scalar>

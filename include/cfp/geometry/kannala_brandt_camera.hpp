@@ -1,0 +1,118 @@
+/// @file kannala_brandt_camera.hpp
+/// Fisheye camera of Kannala and Brandt with four coefficients: OpenCV's fisheye model, Kalibr's "equidistant",
+/// ORB-SLAM3's KannalaBrandt8. Source: Kannala and Brandt, "A generic camera model and calibration method for
+/// conventional, wide-angle, and fish-eye lenses", PAMI 2006.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "cfp/core/numeric.hpp"
+#include "cfp/geometry/camera.hpp"
+
+namespace cfp {
+
+/// With the angle t of a ray from the axis, and x, y = X/Z, Y/Z:
+///   r(t) = t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8)
+///   u = fx r(t) x / |(x, y)| + cx, v = fy r(t) y / |(x, y)| + cy.
+///
+/// The polynomial is a model of the lens only as far as it rises; its slope is asked at the angle and at fifteen
+/// before it. A ray is scaled to z = 1, so that what is 90 degrees and more from the axis has none.
+template <typename Scalar>
+struct KannalaBrandtCamera {
+  using ScalarType = Scalar;
+  Scalar fx = Scalar(1);  ///< focal length in pixels, > 0
+  Scalar fy = Scalar(1);  ///< focal length in pixels, > 0
+  Scalar cx = Scalar(0);  ///< principal point in pixels
+  Scalar cy = Scalar(0);
+  Scalar k1 = Scalar(0);
+  Scalar k2 = Scalar(0);
+  Scalar k3 = Scalar(0);
+  Scalar k4 = Scalar(0);
+
+  /// The camera that looks along the same axis and sees the same there.
+  [[nodiscard]] CFP_INLINE PinholeCamera<Scalar> pinhole() const noexcept { return {fx, fy, cx, cy}; }
+
+  /// r(t) / t.
+  [[nodiscard]] CFP_INLINE Scalar stretch(const Scalar& angle) const noexcept {
+    const Scalar s = angle * angle;
+    return Scalar(1) + s * (k1 + s * (k2 + s * (k3 + s * k4)));
+  }
+  /// d r / d t.
+  [[nodiscard]] CFP_INLINE Scalar slope(const Scalar& angle) const noexcept {
+    const Scalar s = angle * angle;
+    return Scalar(1) + s * (Scalar(3) * k1 + s * (Scalar(5) * k2 + s * (Scalar(7) * k3 + s * Scalar(9) * k4)));
+  }
+  /// Whether r rises up to there.
+  [[nodiscard]] CFP_INLINE bool rises_to(const Scalar& angle) const noexcept {
+    constexpr int angles = 16;
+    for (int k = angles; k > 0; --k) {
+      if (!(slope(Scalar(angle * Scalar(k) / Scalar(angles))) > Scalar(0))) return false;
+    }
+    return true;
+  }
+
+  /// Projects a point of the camera frame. Returns whether the projection is valid: a finite z >
+  /// Tolerance::min_depth, an angle up to which r rises, a finite pixel; otherwise pixel and jacobian are left as they
+  /// were. jacobian: d pixel / d point.
+  [[nodiscard]] CFP_INLINE bool project(const Vector3<Scalar>& point, Vector2<Scalar>& pixel,
+                                        Matrix23<Scalar>* jacobian = nullptr) const noexcept {
+    using std::atan;
+    using std::sqrt;
+    if (!(point.z() > Scalar(Tolerance<Scalar>::min_depth)) || !is_finite(point.z())) return false;
+    const Scalar inv_z = Scalar(1) / point.z(), x = point.x() * inv_z, y = point.y() * inv_z, s = x * x + y * y;
+    // Near the axis r / |(x, y)| by its series: a dual number has no slope of a root there.
+    const bool near = s < Scalar(std::numeric_limits<Scalar>::epsilon());
+    const Scalar radius = near ? Scalar(0) : Scalar(sqrt(s)), angle = near ? Scalar(0) : Scalar(atan(radius));
+    const Scalar ratio =
+        near ? Scalar(Scalar(1) + (k1 - Scalar(1) / Scalar(3)) * s) : Scalar(angle * stretch(angle) / radius);
+    if (!rises_to(angle) || !pinhole().project({x * ratio, y * ratio, Scalar(1)}, pixel)) return false;
+    if (jacobian != nullptr) {
+      // The slope of the ratio along x is x times this, along y y times this.
+      const Scalar twice_slope = near ? Scalar(Scalar(2) * (k1 - Scalar(1) / Scalar(3)))
+                                      : Scalar((slope(angle) / (Scalar(1) + s) - ratio) / s);
+      const Scalar xx = ratio + x * x * twice_slope, xy = x * y * twice_slope, yy = ratio + y * y * twice_slope;
+      const Scalar fx_z = fx * inv_z, fy_z = fy * inv_z;
+      *jacobian = Matrix23<Scalar>{{fx_z * xx, fx_z * xy, -fx_z * (xx * x + xy * y)},
+                                   {fy_z * xy, fy_z * yy, -fy_z * (xy * x + yy * y)}};
+    }
+    return true;
+  }
+
+  /// The ray through a pixel, scaled to z = 1, by Newton's method on the angle. False, and ray untouched, when no ray
+  /// before 90 degrees and up to which r rises gives the pixel, or anything is not finite.
+  [[nodiscard]] CFP_INLINE bool unproject(const Vector2<Scalar>& pixel, Vector3<Scalar>& ray) const noexcept {
+    using std::sqrt;
+    using std::tan;
+    const Scalar x = (pixel.x() - cx) / fx, y = (pixel.y() - cy) / fy, s = x * x + y * y;
+    if (!is_finite(s)) return false;
+    if (s < Scalar(std::numeric_limits<Scalar>::epsilon())) {
+      if (!is_finite(Scalar(k1 + k2 + k3 + k4))) return false;
+      const Scalar ratio = Scalar(1) - (k1 - Scalar(1) / Scalar(3)) * s;
+      ray = {x * ratio, y * ratio, Scalar(1)};
+      return true;
+    }
+    const Scalar radius = sqrt(s), last = Scalar(0.4999) * Scalar(pi<double>);
+    const Scalar most = Scalar(8) * Scalar(std::numeric_limits<Scalar>::epsilon()) * (Scalar(1) + radius);
+    Scalar angle = radius < last ? radius : last;
+    const auto found = [&](const Scalar& error) { return error <= most && -error <= most; };
+    for (int step = 0; step < 20; ++step) {
+      const Scalar error = angle * stretch(angle) - radius;
+      if (found(error)) break;
+      const Scalar next = angle - error / slope(angle);
+      angle = !(next > Scalar(0)) ? Scalar(0.5) * angle : next < last ? next : last;
+    }
+    if (!found(angle * stretch(angle) - radius) || !rises_to(angle)) return false;
+    const Scalar ratio = tan(angle) / radius;
+    ray = {x * ratio, y * ratio, Scalar(1)};
+    return true;
+  }
+
+  template <typename Other>
+  [[nodiscard]] CFP_INLINE KannalaBrandtCamera<Other> cast() const noexcept {
+    const auto to = [](const Scalar& value) { return static_cast<Other>(value); };
+    return {to(fx), to(fy), to(cx), to(cy), to(k1), to(k2), to(k3), to(k4)};
+  }
+};
+
+}  // namespace cfp
