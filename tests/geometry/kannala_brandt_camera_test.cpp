@@ -14,7 +14,7 @@ using cfp::Vector3;
 
 namespace {
 
-const KannalaBrandtCamera<double> lens{250, 240, 320, 250, -0.02, 0.003, -0.002, 0.0004};
+const KannalaBrandtCamera<double> wide_lens{250, 240, 320, 250, -0.02, 0.003, -0.002, 0.0004};
 
 Vector3<double> ray_at(double angle, double around) {
   return {std::sin(angle) * std::cos(around), std::sin(angle) * std::sin(around), std::cos(angle)};
@@ -30,11 +30,11 @@ TEST_CASE("A fisheye sees a ray at the polynomial of its angle, on the side wher
       CAPTURE(degrees, around);
       for (const double distance_m : {0.1, 1.0, 30.0}) {
         Vector2<double> pixel(0, 0);
-        REQUIRE(lens.project(distance_m * ray_at(t, around), pixel));
+        REQUIRE(wide_lens.project(distance_m * ray_at(t, around), pixel));
         CHECK_THAT(pixel.x(), WithinAbs(320 + 250 * r * std::cos(around), 1e-9));
         CHECK_THAT(pixel.y(), WithinAbs(250 + 240 * r * std::sin(around), 1e-9));
         Vector3<double> ray(0, 0, 0);
-        REQUIRE(lens.unproject(pixel, ray));
+        REQUIRE(wide_lens.unproject(pixel, ray));
         CHECK(ray.z() == 1);
         CHECK_THAT((ray.normalized() - ray_at(t, around)).norm(), WithinAbs(0, 1e-12));
       }
