@@ -134,7 +134,7 @@ template <typename Scalar, typename Camera>
 void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const FrameOptions& options,
                       FrameState<Scalar>& state) {
   const std::size_t n = frame.flow.current.size();
-  CFP_ASSERT(frame.flow.previous.size() == n);
+  CFP_ASSERT(frame.flow.previous.size() == n && detail::fits(n, frame.flow.relative_sigmas));
   const CoarseOptions& coarse = options.coarse;
   state.objects.assign(state.boxes.size(), {coarse.object.unknown_object_probability, 0, Status::not_enough_data});
   FrameReport& report = state.report;

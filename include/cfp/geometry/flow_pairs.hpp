@@ -15,8 +15,8 @@ struct FlowPairs {
   /// lie next to it, see CoarseOptions::flow_depth_radius_px. Where depth does not fit the image to the pixel, none is
   /// better than what stands at an edge: `edge_px` of sample_depth (opencv_matrices.hpp).
   span<const Scalar> previous_depths = {};
-  /// The noise of each pair over that of the others, as of a tracker that knows it, > 0; empty: all alike. What a lens
-  /// adds is counted already.
+  /// The noise of each pair over that of the others, as of a tracker that knows it, > 0; empty: all alike. To those of
+  /// Frame::flow estimate_objects adds what the lens makes of a pixel.
   span<const Scalar> relative_sigmas = {};
 
   [[nodiscard]] CFP_INLINE Scalar depth(std::size_t i) const noexcept {
