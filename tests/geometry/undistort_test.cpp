@@ -5,7 +5,6 @@
 #include <limits>
 #include <vector>
 
-#include "cfp/core/random.hpp"
 #include "cfp/geometry/kannala_brandt_camera.hpp"
 #include "cfp/geometry/radial_tangential_camera.hpp"
 #include "support/allocation_counter.hpp"

@@ -49,7 +49,7 @@ void pose_epipolar_distances(const SE3<double>& T_cur_prev, const Camera& camera
       undistorted(camera, PointSpan<Scalar, 2>(state.current.keypoints), scratch.undistorted_current);
   const Matrix3<Scalar> F = fundamental_from_pose(undistorted_camera(camera), T_cur_prev.template cast<Scalar>());
   const span<const Scalar> sigmas = undistorted_sigmas(camera, current, {}, scratch.relative_sigmas);
-  line_distances(F, FlowPairs<Scalar>{previous, current, {}, sigmas}, span<Scalar>(scratch.epipolar));
+  epipolar_distances(F, {previous, current, {}, sigmas}, scratch.epipolar);
 }
 
 /// One constraint, fitted to the distances of the keypoints outside all boxes. Too few of those: to what is more likely

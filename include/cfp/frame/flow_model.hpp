@@ -107,13 +107,6 @@ template <typename Scalar>
   return model;
 }
 
-/// The distances of all pairs from the lines of F, on the scale of their relative_sigmas.
-template <typename Scalar>
-void line_distances(const Matrix3<Scalar>& F, const FlowPairs<Scalar>& flow, span<Scalar> out) noexcept {
-  epipolar_distances(F, flow.previous, flow.current, out);
-  for (std::size_t i = 0; i < flow.relative_sigmas.size(); ++i) out[i] /= flow.relative_sigmas[i];
-}
-
 /// F as a model, with the noise of the pairs marked in `outside` if enough of them have a distance.
 template <typename Scalar>
 [[nodiscard]] FlowModel<Scalar> fundamental_model(const Matrix3<Scalar>& F, RansacStatus status, FlowSupport support,
@@ -124,7 +117,7 @@ template <typename Scalar>
   model.F = F;
   model.coordinates = 1;
   distances.resize(outside.size());
-  line_distances(F, flow, span<Scalar>(distances));
+  epipolar_distances(F, flow, distances);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < outside.size(); ++i) {
     if (outside[i] != 0 && has_distance(distances[i])) distances[kept++] = distances[i];
@@ -176,7 +169,7 @@ template <typename Scalar>
 void flow_distances(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow, const PinholeCamera<Scalar>& camera,
                     const FlowModelOptions& options, span<Scalar> out) noexcept {
   if (model.kind == FlowModelKind::none) return std::fill(out.begin(), out.end(), Scalar(no_distance<double>));
-  if (model.kind == FlowModelKind::fundamental) return detail::line_distances(model.F, flow, out);
+  if (model.kind == FlowModelKind::fundamental) return epipolar_distances(model.F, flow, out);
   MotionDistanceOptions distance = options.motion.distance;
   FlowPairs<Scalar> pairs = flow;
   if (model.kind == FlowModelKind::motion_up_to_scale) {

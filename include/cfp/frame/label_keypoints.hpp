@@ -83,8 +83,8 @@ void take_what_masks_leave_out(const Box<Scalar>& box, const DetectionAt& detect
 template <typename Scalar>
 [[nodiscard]] std::size_t stray_labels(const Frame<Scalar>& frame, const FrameState<Scalar>& state) noexcept {
   const std::size_t detections = frame.detections ? frame.detections->size() : 0;
-  const bool by_mask = frame.object_of_keypoint.empty() && !frame.labels.empty();
-  if (frame.object_of_keypoint.empty() && !by_mask) return 0;
+  const bool by_mask = frame.object_of_keypoint.empty();
+  if (by_mask && frame.labels.empty()) return 0;
   std::size_t count = 0;
   for (std::size_t i = 0; i < state.size(); ++i) {
     if (state.label[i] == KeypointLabel::invalid) continue;

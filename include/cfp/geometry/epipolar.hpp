@@ -14,6 +14,7 @@
 #include "cfp/core/span.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/distance.hpp"
+#include "cfp/geometry/flow_pairs.hpp"
 #include "cfp/math/matrix3.hpp"
 #include "cfp/math/se3.hpp"
 
@@ -110,6 +111,15 @@ void epipolar_distances(const Matrix3<Scalar>& F, const PointSpan<non_deduced<Sc
   const Matrix3<Scalar> G = detail::unit_scale(F);
   const Vector3<Scalar> noise = detail::line_noise(G);
   for (std::size_t i = 0; i < out.size(); ++i) out[i] = detail::scaled_epipolar_distance(G, noise, prev[i], cur[i]);
+}
+
+/// The same of pairs, each over its relative_sigma: the distances of all pairs are on one scale.
+template <typename Scalar>
+void epipolar_distances(const Matrix3<Scalar>& F, const FlowPairs<non_deduced<Scalar>>& pairs,
+                        span<non_deduced<Scalar>> out) noexcept {
+  CFP_ASSERT(detail::fits(out.size(), pairs.relative_sigmas));
+  epipolar_distances(F, pairs.previous, pairs.current, out);
+  for (std::size_t i = 0; i < pairs.relative_sigmas.size(); ++i) out[i] /= pairs.relative_sigmas[i];
 }
 
 }  // namespace CFP_ISA

@@ -4,13 +4,49 @@
 /// conventional, wide-angle, and fish-eye lenses", PAMI 2006.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/geometry/camera.hpp"
+#include "cfp/geometry/distorted_point_impl.hpp"
 
 namespace cfp {
+
+template <typename Scalar>
+struct KannalaBrandtCamera;
+
+namespace detail {
+inline namespace CFP_ISA {
+
+/// Whether a squared radius of the plane z = 1 is so small that sqrt, which has no slope at 0 for a dual number, is to
+/// be avoided.
+template <typename Scalar>
+[[nodiscard]] bool is_on_axis(const Scalar& radius_sq) noexcept {
+  return radius_sq < Scalar(std::numeric_limits<Scalar>::epsilon());
+}
+
+/// Distorts the point (x, y) of the plane z = 1; false beyond the angle to which r rises.
+template <typename Scalar>
+[[nodiscard]] bool distort(const KannalaBrandtCamera<Scalar>& camera, const Scalar& x, const Scalar& y,
+                           DistortedPoint<Scalar>& d) noexcept {
+  using std::atan;
+  using std::sqrt;
+  const Scalar s = x * x + y * y, third = Scalar(1) / Scalar(3);
+  const bool on_axis = is_on_axis(s);
+  const Scalar radius = on_axis ? Scalar(0) : Scalar(sqrt(s)), angle = on_axis ? Scalar(0) : Scalar(atan(radius));
+  if (!camera.rises_to(angle)) return false;
+  // r / |(x, y)|; its slope along x is x times twice_slope, along y y times that.
+  const Scalar ratio =
+      on_axis ? Scalar(Scalar(1) + (camera.k1 - third) * s) : Scalar(angle * camera.stretch(angle) / radius);
+  const Scalar twice_slope =
+      on_axis ? Scalar(Scalar(2) * (camera.k1 - third)) : Scalar((camera.slope(angle) / (Scalar(1) + s) - ratio) / s);
+  d = {x * ratio, y * ratio, ratio + x * x * twice_slope, x * y * twice_slope, ratio + y * y * twice_slope};
+  return true;
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
 
 /// With the angle t of a ray from the axis, and x, y = X/Z, Y/Z:
 ///   r(t) = t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8)
@@ -57,26 +93,7 @@ struct KannalaBrandtCamera {
   /// were. jacobian: d pixel / d point.
   [[nodiscard]] CFP_INLINE bool project(const Vector3<Scalar>& point, Vector2<Scalar>& pixel,
                                         Matrix23<Scalar>* jacobian = nullptr) const noexcept {
-    using std::atan;
-    using std::sqrt;
-    if (!(point.z() > Scalar(Tolerance<Scalar>::min_depth)) || !is_finite(point.z())) return false;
-    const Scalar inv_z = Scalar(1) / point.z(), x = point.x() * inv_z, y = point.y() * inv_z, s = x * x + y * y;
-    // Near the axis r / |(x, y)| by its series: a dual number has no slope of a root there.
-    const bool near = s < Scalar(std::numeric_limits<Scalar>::epsilon());
-    const Scalar radius = near ? Scalar(0) : Scalar(sqrt(s)), angle = near ? Scalar(0) : Scalar(atan(radius));
-    const Scalar ratio =
-        near ? Scalar(Scalar(1) + (k1 - Scalar(1) / Scalar(3)) * s) : Scalar(angle * stretch(angle) / radius);
-    if (!rises_to(angle) || !pinhole().project({x * ratio, y * ratio, Scalar(1)}, pixel)) return false;
-    if (jacobian != nullptr) {
-      // The slope of the ratio along x is x times this, along y y times this.
-      const Scalar twice_slope = near ? Scalar(Scalar(2) * (k1 - Scalar(1) / Scalar(3)))
-                                      : Scalar((slope(angle) / (Scalar(1) + s) - ratio) / s);
-      const Scalar xx = ratio + x * x * twice_slope, xy = x * y * twice_slope, yy = ratio + y * y * twice_slope;
-      const Scalar fx_z = fx * inv_z, fy_z = fy * inv_z;
-      *jacobian = Matrix23<Scalar>{{fx_z * xx, fx_z * xy, -fx_z * (xx * x + xy * y)},
-                                   {fy_z * xy, fy_z * yy, -fy_z * (xy * x + yy * y)}};
-    }
-    return true;
+    return detail::project_distorted(*this, point, pixel, jacobian);
   }
 
   /// The ray through a pixel, scaled to z = 1, by Newton's method on the angle. False, and ray untouched, when no ray
@@ -86,7 +103,7 @@ struct KannalaBrandtCamera {
     using std::tan;
     const Scalar x = (pixel.x() - cx) / fx, y = (pixel.y() - cy) / fy, s = x * x + y * y;
     if (!is_finite(s)) return false;
-    if (s < Scalar(std::numeric_limits<Scalar>::epsilon())) {
+    if (detail::is_on_axis(s)) {
       if (!is_finite(Scalar(k1 + k2 + k3 + k4))) return false;
       const Scalar ratio = Scalar(1) - (k1 - Scalar(1) / Scalar(3)) * s;
       ray = {x * ratio, y * ratio, Scalar(1)};

@@ -6,6 +6,7 @@
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/geometry/camera.hpp"
+#include "cfp/geometry/distorted_point_impl.hpp"
 
 namespace cfp {
 
@@ -33,12 +34,6 @@ template <typename Scalar>
   const auto fails_at = [&](const Scalar& s) { return s > zero && s < end && !(value(s) > zero); };
   return !fails_at(q / (Scalar(3) * c)) && !fails_at(a / q);
 }
-
-/// A distorted point of the plane z = 1 and the (symmetric) Jacobian of the distortion.
-template <typename Scalar>
-struct DistortedPoint {
-  Scalar x{}, y{}, xx{}, xy{}, yy{};
-};
 
 /// Distorts the point (x, y) of the plane z = 1; false beyond the fold or when not finite.
 template <typename Scalar>
@@ -124,19 +119,7 @@ struct RadialTangentialCamera {
   /// jacobian: d pixel / d point.
   [[nodiscard]] CFP_INLINE bool project(const Vector3<Scalar>& point, Vector2<Scalar>& pixel,
                                         Matrix23<Scalar>* jacobian = nullptr) const noexcept {
-    if (!(point.z() > Scalar(Tolerance<Scalar>::min_depth)) || !is_finite(point.z())) return false;
-    const Scalar inv_z = Scalar(1) / point.z();
-    const Scalar x = point.x() * inv_z;
-    const Scalar y = point.y() * inv_z;
-    detail::DistortedPoint<Scalar> d;
-    if (!detail::distort(*this, x, y, d) || !pinhole().project({d.x, d.y, Scalar(1)}, pixel)) return false;
-    if (jacobian != nullptr) {
-      const Scalar fx_z = fx * inv_z;
-      const Scalar fy_z = fy * inv_z;
-      *jacobian = Matrix23<Scalar>{{fx_z * d.xx, fx_z * d.xy, -fx_z * (d.xx * x + d.xy * y)},
-                                   {fy_z * d.xy, fy_z * d.yy, -fy_z * (d.xy * x + d.yy * y)}};
-    }
-    return true;
+    return detail::project_distorted(*this, point, pixel, jacobian);
   }
 
   /// The ray through a pixel, scaled to z = 1, by Newton's method from the axis with step halving. False, and ray
