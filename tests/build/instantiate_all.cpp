@@ -74,7 +74,10 @@ static void instantiate_geometry() noexcept {
   use(&cfp::has_distance<Scalar>);
   use(&cfp::epipolar_line<Scalar>);
   use(&cfp::epipolar_distance<Scalar>);
-  use(&cfp::epipolar_distances<Scalar>);
+  use(static_cast<void (*)(const cfp::Matrix3<Scalar>&, const cfp::PointSpan<Scalar, 2>&,
+                           const cfp::PointSpan<Scalar, 2>&, cfp::span<Scalar>)>(&cfp::epipolar_distances<Scalar>));
+  use(static_cast<void (*)(const cfp::Matrix3<Scalar>&, const cfp::FlowPairs<Scalar>&, cfp::span<Scalar>)>(
+      &cfp::epipolar_distances<Scalar>));
   use(&cfp::nearest_fundamental<Scalar>);
   use(&cfp::fundamental_8point<Scalar>);
   use(&cfp::p3p<Scalar>);
