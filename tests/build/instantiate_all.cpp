@@ -78,6 +78,8 @@ static void instantiate_geometry() noexcept {
                            const cfp::PointSpan<Scalar, 2>&, cfp::span<Scalar>)>(&cfp::epipolar_distances<Scalar>));
   use(static_cast<void (*)(const cfp::Matrix3<Scalar>&, const cfp::FlowPairs<Scalar>&, cfp::span<Scalar>)>(
       &cfp::epipolar_distances<Scalar>));
+  use(static_cast<void (*)(const cfp::Matrix3<Scalar>&, const cfp::FundamentalCovariance&, const Scalar&,
+                           const cfp::FlowPairs<Scalar>&, cfp::span<Scalar>)>(&cfp::epipolar_distances<Scalar>));
   use(&cfp::nearest_fundamental<Scalar>);
   use(&cfp::fundamental_8point<Scalar>);
   use(&cfp::p3p<Scalar>);

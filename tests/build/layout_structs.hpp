@@ -134,8 +134,8 @@
   CFP_LAYOUT_OPAQUE(cfp::PnpRansacResult<double>)                        \
   CFP_LAYOUT(cfp::BundleWorkspace, schur)                            \
   CFP_LAYOUT(cfp::FlowModelOptions, ransac)                              \
-  CFP_LAYOUT(cfp::FlowModel<float>, coordinates)                         \
-  CFP_LAYOUT(cfp::FlowModel<double>, coordinates)                        \
+  CFP_LAYOUT(cfp::FlowModel<float>, shared_factor)                       \
+  CFP_LAYOUT(cfp::FlowModel<double>, shared_factor)                      \
   CFP_LAYOUT(cfp::CameraMotionOptions, pose)                             \
   CFP_LAYOUT(cfp::CameraMotion<float>, coordinates)                      \
   CFP_LAYOUT(cfp::RefinedMotion<float>, contradicted)                    \

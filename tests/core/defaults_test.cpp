@@ -168,7 +168,8 @@ TEST_CASE("A report that nothing was counted for counts nothing", "[core]") {
   CHECK((model.calculation_confidence == 0 && model.samples == 0 && model.status == cfp::Status::not_enough_data));
   const cfp::FlowModel<double> flow;
   CHECK((flow.kind == cfp::FlowModelKind::none && flow.support == cfp::FlowSupport::none && flow.sigma_px == 0));
-  CHECK((flow.status == cfp::RansacStatus::not_enough_data && flow.F.isZero(0)));
+  CHECK((flow.status == cfp::RansacStatus::not_enough_data && flow.F.isZero(0) && flow.F_covariance.isZero(0)));
+  CHECK((flow.shared_error_px == 0 && flow.shared_factor == 1));
   const cfp::FrameMemory<double> before;
   CHECK(
       (!before.known && before.timestamp_s == 0 && before.descriptor_bytes == 0 && before.descriptor_view().size == 0));
@@ -189,7 +190,7 @@ TEST_CASE("A report that nothing was counted for counts nothing", "[core]") {
   CHECK((!motion.known && motion.sigma_px == 1));
   const cfp::FundamentalResult<double> F;
   CHECK((F.status == cfp::RansacStatus::not_enough_data && F.used == 0 && F.inliers == 0 && F.iterations == 0));
-  CHECK((F.inlier_share == 0 && F.F.isZero(0) && F.homography.isZero(0)));
+  CHECK((F.inlier_share == 0 && F.F.isZero(0) && F.covariance.isZero(0) && F.homography.isZero(0)));
   const cfp::P3PSolutions<double> p3p;
   CHECK((p3p.count == 0 && p3p.status == cfp::Status::degenerate));
 }

@@ -509,6 +509,51 @@ TEST_CASE("Where the image errs by more than its noise nobody who stands moves f
   CHECK(called(0.6, 0.03) >= 95);
 }
 
+TEST_CASE("With one camera nobody who stands moves for what F errs by, beside its pairs and before them", "[frame]") {
+  const auto called = [](bool all_around, double error_px, double person_motion_m) {
+    return called_moving("one camera", false, [&](DynamicScene<double>& scene, cfp::Random& random) {
+      scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.005, 0.045, 0.02, 0.001, -0.002, 0.001));
+      const double phase = random.uniform(0, 6.28), length_px = random.uniform(90, 160);
+      const auto add = [&](double x, double y, double z, double shift) {
+        add_pair(scene, {x, y}, z, shift, 0.2, random);
+        scene.keypoints.back()[0] += error_px * std::sin(x / length_px + phase);
+        scene.keypoints.back()[1] += error_px * std::sin(y / length_px + 2 * phase);
+      };
+      for (int k = 0; k < 200; ++k)
+        add(random.uniform(20, all_around ? 620 : 200), random.uniform(20, 460), random.uniform(2.5, 5), 0);
+      for (int k = 0; k < 60; ++k)
+        add(random.uniform(270, 370), random.uniform(120, 420), random.uniform(1.0, 1.1), person_motion_m);
+    });
+  };
+  for (const bool all_around : {false, true}) {
+    CAPTURE(all_around);
+    CHECK(called(all_around, 0, 0) <= 8);
+    CHECK(called(all_around, 0.6, 0) <= (all_around ? 4 : 18));
+    CHECK(called(all_around, 0, 0.02) >= 95);
+    CHECK(called(all_around, 0.6, 0.02) >= 95);
+  }
+}
+
+TEST_CASE("With one camera that turns the rows of a rolling shutter hide nobody and move nobody", "[frame]") {
+  const auto called = [](double error_px, double person_motion_m) {
+    return called_moving("rows, one camera", false, [&](DynamicScene<double>& scene, cfp::Random& random) {
+      scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.0002, 0.0018, 0.0008, 0.001, -0.002, 0.001));
+      const cfp::Vector2<double> error(error_px * random.normal(), error_px * random.normal());
+      const auto add = [&](double x, double y, double z, double shift) {
+        add_pair(scene, {x, y}, z, shift, 0.2, random);
+        scene.keypoints.back()[0] += error.x() * (y / 240 - 1);
+        scene.keypoints.back()[1] += error.y() * (y / 240 - 1);
+      };
+      for (int k = 0; k < 200; ++k) add(random.uniform(20, 620), random.uniform(20, 460), random.uniform(2.5, 5), 0);
+      for (int k = 0; k < 60; ++k)
+        add(random.uniform(270, 370), random.uniform(120, 420), random.uniform(2.0, 2.1), person_motion_m);
+    });
+  };
+  CHECK(called(0, 0) <= 4);
+  CHECK(called(1, 0) <= 6);
+  CHECK(called(1, 0.01) >= 95);
+}
+
 TEST_CASE("The motion that a far, bare wall gives does not make a near person at rest move", "[frame]") {
   const auto called = [](double person_motion_m) {
     return called_moving("bare wall", true, [&](DynamicScene<double>& scene, cfp::Random& random) {

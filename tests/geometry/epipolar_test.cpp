@@ -1,5 +1,6 @@
 #include "cfp/geometry/epipolar.hpp"
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -116,6 +117,42 @@ TEMPLATE_TEST_CASE("epipolar distances of arrays equal the scalar function", "[g
       CHECK((out[i] < 0) == (expected < 0));
       CHECK_THAT(out[i], WithinAbs(expected, pixel_tolerance<TestType> * (1 + std::abs(expected))));
     }
+  }
+}
+
+TEMPLATE_TEST_CASE("What an uncertain F may have moved a line by is no distance", "[geometry]", float, double) {
+  const TwoViews<TestType> views(60);
+  const Matrix3<TestType> F =
+      cfp::fundamental_from_pose(views.camera_prev, views.camera_cur, views.T_cur_prev).normalized();
+  std::vector<std::array<TestType, 2>> previous, current;
+  for (std::size_t i = 0; i < views.prev.size(); ++i) {
+    previous.push_back({views.prev[i][0], views.prev[i][1]});
+    current.push_back({views.cur[i][0], views.cur[i][1] + TestType(3)});
+  }
+  current[5][0] = std::numeric_limits<TestType>::quiet_NaN();
+  const cfp::FlowPairs<TestType> pairs{previous, current};
+  const auto distances = [&](const cfp::FundamentalCovariance& covariance) {
+    std::vector<TestType> out(current.size());
+    cfp::epipolar_distances(F, covariance, TestType(0.5), pairs, cfp::span<TestType>(out));
+    return out;
+  };
+  std::vector<TestType> plain(current.size());
+  cfp::epipolar_distances(F, pairs, cfp::span<TestType>(plain));
+  CHECK(distances(cfp::FundamentalCovariance::Zero()) == plain);
+
+  // An error of the last entry alone moves every line by itself over the length of its normal.
+  cfp::FundamentalCovariance last = cfp::FundamentalCovariance::Zero();
+  last(8, 8) = 0.04 * static_cast<double>(F.template topRows<2>().squaredNorm());
+  const std::vector<TestType> moved = distances(last), lost = distances(1e6 * cfp::FundamentalCovariance::Identity());
+  for (std::size_t i = 0; i < current.size(); ++i) {
+    if (i == 5) {
+      CHECK((moved[i] == no_distance<TestType> && lost[i] == no_distance<TestType>));
+      continue;
+    }
+    const double normal = static_cast<double>(cfp::epipolar_line(F, views.prev[i]).template head<2>().norm()),
+                 expected = static_cast<double>(plain[i]) * 0.5 / std::hypot(0.5, std::sqrt(last(8, 8)) / normal);
+    CHECK_THAT(static_cast<double>(moved[i]), WithinAbs(expected, 1e-3));
+    CHECK((lost[i] >= TestType(0) && lost[i] < TestType(1e-3)));
   }
 }
 

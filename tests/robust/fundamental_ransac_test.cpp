@@ -133,6 +133,43 @@ TEST_CASE("F is nearly as good as from the true inliers alone", "[robust]") {
   }
 }
 
+TEMPLATE_TEST_CASE("F is as uncertain as it says, at its own pairs and where it has none", "[robust]", float, double) {
+  double inside = 0, beside = 0;
+  std::size_t n_inside = 0, n_beside = 0;
+  FundamentalRansacWorkspace workspace;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    cfp::Random random(seed, "covariance of F");
+    const auto scene = make_two_view_scene<TestType>(random, noisy(300, 0.1));
+    std::vector<TestType> weights;  // the right part of the image has no pairs
+    for (const auto& pixel : scene.prev) weights.push_back(pixel[0] < TestType(440) ? TestType(1) : TestType(0));
+    const FundamentalResult<TestType> result =
+        fundamental_ransac(PointPairs<TestType>{scene.prev, scene.cur, weights}, FundamentalRansacOptions{}, workspace);
+    REQUIRE(result.found());
+    for (std::size_t i = 0; i < scene.prev.size(); ++i) {
+      const cfp::Vector3<double> p(static_cast<double>(scene.exact_prev[i][0]),
+                                   static_cast<double>(scene.exact_prev[i][1]), 1),
+          q(static_cast<double>(scene.exact_cur[i][0]), static_cast<double>(scene.exact_cur[i][1]), 1);
+      Eigen::Matrix<double, 9, 1> a;
+      a << q[0] * p, q[1] * p, p;
+      const double error = q.dot(result.F.template cast<double>() * p),
+                   ratio = error * error / a.dot(result.covariance * a);
+      (weights[i] > 0 ? inside : beside) += ratio;
+      ++(weights[i] > 0 ? n_inside : n_beside);
+    }
+  }
+  CHECK_THAT(inside / static_cast<double>(n_inside), WithinAbs(1.0, 0.35));
+  CHECK_THAT(beside / static_cast<double>(n_beside), WithinAbs(1.0, 0.35));
+}
+
+TEST_CASE("Without F there is no covariance of it", "[robust]") {
+  cfp::Random random(1, "no F");
+  const auto scene = make_two_view_scene<double>(random, without_parallax(200, 0, 0.2, 0.05));
+  FundamentalRansacWorkspace workspace;
+  const auto result = fundamental_ransac(PointPairs{scene.prev, scene.cur}, FundamentalRansacOptions{}, workspace);
+  REQUIRE_FALSE(result.found());
+  CHECK(result.covariance.isZero(0));
+}
+
 TEST_CASE("Few pairs and many mismatches: F is found as far as samples go", "[robust]") {
   FundamentalRansacWorkspace workspace;
   cfp::Random random(46, "hard");

@@ -81,12 +81,13 @@ template <typename Scalar>
 /// tell nothing.
 template <typename Scalar>
 [[nodiscard]] ObjectProbabilityOptions beyond_strays(ObjectProbabilityOptions scored, std::size_t min_outside_pairs,
-                                                     const FrameState<Scalar>& state) noexcept {
+                                                     const FrameScratch<Scalar>& scratch) noexcept {
   std::size_t all = 0, stray = 0;
-  for (std::size_t i = 0; i < state.flow_distances.size(); ++i) {
-    if (state.scratch.outside[i] == 0 || !has_distance(state.flow_distances[i])) continue;
+  for (std::size_t i = 0; i < scratch.object_distances.size(); ++i) {
+    const Scalar distance = scratch.object_distances[i];
+    if (scratch.outside[i] == 0 || !has_distance(distance)) continue;
     ++all;
-    stray += object_score(state.flow_distances[i], scored) < Scalar(0.5) ? 1U : 0U;
+    stray += object_score(distance, scored) < Scalar(0.5) ? 1U : 0U;
   }
   if (all < min_outside_pairs) return scored;
   const double share = (std::min)(static_cast<double>(stray) / static_cast<double>(all), scored.max_stray_share);
@@ -101,7 +102,7 @@ void score_objects(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow
   FrameScratch<Scalar>& scratch = state.scratch;
   const std::size_t n = flow.current.size();
   const ObjectProbabilityOptions scored =
-      beyond_strays(scaled_to_flow(coarse.object, state.report), coarse.flow.min_outside_pairs, state);
+      beyond_strays(scaled_to_flow(coarse.object, state.report), coarse.flow.min_outside_pairs, scratch);
   scratch.values.resize(n);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     // What lies behind an object says nothing of it, and a pair on its silhouette may have either depth.
@@ -109,7 +110,7 @@ void score_objects(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow
     scratch.members.clear();
     for (std::size_t i = 0; i < n; ++i) {
       if (scratch.pair_label[b * n + i] != PairLabel::foreground) continue;
-      scratch.samples.push_back(state.flow_distances[i]);
+      scratch.samples.push_back(scratch.object_distances[i]);
       scratch.members.push_back(static_cast<std::int32_t>(i));
     }
     ObjectProbability& object = state.objects[b];
@@ -159,8 +160,11 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   report.flow_coordinates = model.coordinates;
   if (model.kind == FlowModelKind::none) return;
 
-  state.flow_distances.resize(n);
-  flow_distances(model, flow, pinhole, coarse.flow, span<Scalar>(state.flow_distances));
+  scratch.object_distances.resize(n);
+  flow_distances(model, flow, pinhole, coarse.flow, span<Scalar>(scratch.object_distances));
+  state.flow_distances = scratch.object_distances;
+  if (model.kind != FlowModelKind::motion)
+    flow_distances(among_neighbours(model), flow, pinhole, coarse.flow, span<Scalar>(state.flow_distances));
   if (model.kind == FlowModelKind::motion_up_to_scale && looks_for_unreported(options))
     detail::measure_room(model, flow, pinhole, coarse, scratch.room_distances);
   detail::score_objects(model, flow, pinhole, coarse, state);

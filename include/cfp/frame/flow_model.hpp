@@ -60,10 +60,12 @@ struct FlowModel {
   FlowSupport support = FlowSupport::none;
   RansacStatus status = RansacStatus::not_enough_data;  ///< of kind none or motion_up_to_scale: why there is no F
   Matrix3<Scalar> F = Matrix3<Scalar>::Zero();          ///< of kind fundamental, previous to current
-  UncertainMotion<Scalar> motion;                       ///< of both kinds of motion; up to scale in depths of the room
-  Scalar sigma_px = Scalar(0);  ///< noise of one coordinate, measured on the pairs on no object; 0: not measured
-  int coordinates = 2;          ///< of a pixel that most distances see: 1 across lines
-  double shared_error_px = 0;   ///< what neighbours err by together beside it; the motion's covariance counts it
+  FundamentalCovariance F_covariance = FundamentalCovariance::Zero();  ///< zero for the caller's
+  UncertainMotion<Scalar> motion;  ///< of both kinds of motion; up to scale in depths of the room
+  Scalar sigma_px = Scalar(0);     ///< noise of one coordinate, measured on the pairs on no object; 0: not measured
+  int coordinates = 2;             ///< of a pixel that most distances see: 1 across lines
+  double shared_error_px = 0;      ///< what neighbours err by together beside it
+  double shared_factor = 1;        ///< for which the covariance is so many times that of pairs that err alone
 
   CFP_INLINE FlowModel() noexcept {}  // NOLINT(modernize-use-equals-default): inline
 };
@@ -95,15 +97,37 @@ template <typename Scalar>
   return model;
 }
 
-/// The same where depths are known: its covariance counts what neighbours err by together, under a motion to which, and
-/// to what was taken out of the pairs before, so many parameters were fitted.
+/// Makes the covariance of the model count what neighbours err by together.
+template <typename Scalar>
+void count_shared_error(const SharedError& shared, FlowModel<Scalar>& model) noexcept {
+  model.shared_error_px = shared.error_px;
+  model.shared_factor = shared.variance_factor;
+  model.F_covariance *= shared.variance_factor;
+  model.motion.covariance *= static_cast<Scalar>(shared.variance_factor);
+}
+
+/// The same of a motion to which, and to what was taken out of the pairs before, so many parameters were fitted, with
+/// what the pairs err by together.
 template <typename Scalar>
 [[nodiscard]] FlowModel<Scalar> model_of(const CameraMotion<Scalar>& motion, const PairsWithDepth<Scalar>& pairs,
                                          int parameters) {
   FlowModel<Scalar> model = model_of(FlowModelKind::motion, FlowSupport::outside_pairs, motion);
-  const SharedError shared = shared_error(pairs, motion, parameters);
-  model.motion.covariance *= static_cast<Scalar>(shared.variance_factor);
-  model.shared_error_px = shared.error_px;
+  count_shared_error(shared_error(pairs, motion, parameters), model);
+  return model;
+}
+
+/// The same of a motion up to scale, of pairs at the depth of the room, 1: how far each of them is beside it is no
+/// error.
+template <typename Scalar>
+[[nodiscard]] FlowModel<Scalar> model_up_to_scale(const CameraMotion<Scalar>& motion,
+                                                  const PairsWithDepth<Scalar>& pairs, RansacStatus no_fundamental,
+                                                  int parameters) {
+  CameraMotionOptions any_depth = pairs.options;
+  any_depth.distance.depth_noise = {1, 0, 0};
+  FlowModel<Scalar> model =
+      model_of<Scalar>(motion, {pairs.flow, pairs.camera, any_depth, pairs.workspace}, parameters);
+  model.kind = FlowModelKind::motion_up_to_scale;
+  model.status = no_fundamental;
   return model;
 }
 
@@ -146,8 +170,11 @@ FlowModel<Scalar> estimate_fundamental(const FlowPairs<Scalar>& flow, span<const
       PointPairs<Scalar>{flow.previous, flow.current, workspace.weights}, camera, options.ransac, workspace.ransac);
   model.status = estimate.status;
   if (!estimate.found()) return model;
-  return fundamental_model(estimate.F, estimate.status, FlowSupport::outside_pairs, flow, outside, options,
-                           workspace.distances);
+  model = fundamental_model(estimate.F, estimate.status, FlowSupport::outside_pairs, flow, outside, options,
+                            workspace.distances);
+  model.F_covariance = estimate.covariance;
+  if (model.sigma_px > Scalar(0)) count_shared_error(shared_error(flow, outside, model.F, model.sigma_px), model);
+  return model;
 }
 
 }  // namespace CFP_ISA
@@ -164,12 +191,24 @@ inline namespace CFP_ISA {
   return nested("ransac", invalid_field(o.ransac));
 }
 
+/// The model as how neighbours differ is judged by it. Without depths what F errs by, and what pairs err by together
+/// under a motion up to scale, displaces neighbours alike: whether an object rests depends on it, but not how a
+/// keypoint differs from the wall beside it.
+template <typename Scalar>
+[[nodiscard]] FlowModel<Scalar> among_neighbours(FlowModel<Scalar> model) noexcept {
+  model.F_covariance.setZero();
+  if (model.kind == FlowModelKind::motion_up_to_scale)
+    model.motion.covariance /= static_cast<Scalar>(model.shared_factor);
+  return model;
+}
+
 /// The distance of every pair under the model, in pixels; no_distance for all without one.
 template <typename Scalar>
 void flow_distances(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow, const PinholeCamera<Scalar>& camera,
                     const FlowModelOptions& options, span<Scalar> out) noexcept {
   if (model.kind == FlowModelKind::none) return std::fill(out.begin(), out.end(), Scalar(no_distance<double>));
-  if (model.kind == FlowModelKind::fundamental) return epipolar_distances(model.F, flow, out);
+  if (model.kind == FlowModelKind::fundamental)
+    return epipolar_distances(model.F, model.F_covariance, detail::noise_of(model, options), flow, out);
   MotionDistanceOptions distance = options.motion.distance;
   FlowPairs<Scalar> pairs = flow;
   if (model.kind == FlowModelKind::motion_up_to_scale) {
@@ -209,8 +248,11 @@ FlowModel<Scalar> estimate_flow_model(const FlowPairs<Scalar>& flow, span<const 
   if (model.kind != FlowModelKind::none || !options.use_motion_up_to_scale) return model;
   const RansacStatus status = model.status;
   workspace.distances.assign(outside.size(), Scalar(1));
-  motion = motion_from({flow.previous, flow.current, workspace.distances, flow.relative_sigmas});
-  if (motion.known) model = detail::model_of(FlowModelKind::motion_up_to_scale, FlowSupport::outside_pairs, motion);
+  const FlowPairs<Scalar> at_one_depth{flow.previous, flow.current, workspace.distances, flow.relative_sigmas};
+  motion = motion_from(at_one_depth);
+  if (motion.known)
+    return detail::model_up_to_scale<Scalar>(motion, {at_one_depth, camera, options.motion, workspace.motion}, status,
+                                             6);
   model.status = status;
   return model;
 }

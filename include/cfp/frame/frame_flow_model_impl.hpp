@@ -96,6 +96,27 @@ template <typename Scalar>
   return model;
 }
 
+/// The F of the flow, or its motion up to scale. The pairs then become those that it judges, without their smooth
+/// error, which a wall that is seen from the side looks like where its depths are not known.
+template <typename Scalar>
+[[nodiscard]] FlowModel<Scalar> model_without_depths(const PinholeCamera<Scalar>& camera,
+                                                     const FlowModelOptions& options, FlowPairs<Scalar>& flow,
+                                                     FrameState<Scalar>& state) {
+  const span<const char> outside(state.scratch.outside);
+  FlowModelWorkspace<Scalar>& workspace = state.scratch.flow;
+  FlowPairs<Scalar> pairs{flow.previous, flow.current, {}, flow.relative_sigmas};
+  const FlowModel<Scalar> model = estimate_flow_model(pairs, outside, camera, options, workspace);
+  if (model.kind != FlowModelKind::motion_up_to_scale) return model;
+  CameraMotion<Scalar> motion;
+  motion.T_cur_prev = model.motion.T_cur_prev;
+  motion.sigma_px = model.sigma_px;
+  workspace.distances.assign(outside.size(), Scalar(1));
+  pairs.previous_depths = workspace.distances;
+  if (!straighten(camera, options.motion, workspace.motion, state.scratch.straight, pairs, motion)) return model;
+  flow.current = pairs.current;
+  return model_up_to_scale<Scalar>(motion, {pairs, camera, options.motion, workspace.motion}, model.status, 8);
+}
+
 /// The host's motion as a model: refined by the pairs and with their noise where enough agree to it; false if not.
 template <typename Scalar>
 [[nodiscard]] bool take_given(const UncertainMotion<double>& given, const FlowPairs<Scalar>& flow,
@@ -136,8 +157,7 @@ template <typename Scalar>
   if (!exact) model = model_by_depths(given, camera, coarse, flow, state);
   if (model.kind != FlowModelKind::none) return model;
   if (given && (take_given(*given, flow, camera, coarse.flow, state, as_given) || exact)) return as_given;
-  model = estimate_flow_model(FlowPairs<Scalar>{flow.previous, flow.current, {}, flow.relative_sigmas}, outside, camera,
-                              coarse.flow, state.scratch.flow);
+  model = model_without_depths(camera, coarse.flow, flow, state);
   return model.kind == FlowModelKind::none ? as_given : model;
 }
 

@@ -109,7 +109,7 @@ struct FrameScratch {
   DescriptorMatchWorkspace<Scalar> matching;
   detail::PointGrid<Scalar> grid, resting;
   std::vector<std::array<Scalar, 2>> points, undistorted_previous, undistorted_current, straight;
-  std::vector<Scalar> depths, projection, epipolar, samples, values, room_distances, relative_sigmas;
+  std::vector<Scalar> depths, projection, epipolar, samples, values, room_distances, object_distances, relative_sigmas;
   std::vector<std::int32_t> members;
   std::vector<char> mask, outside;
   std::vector<detail::PairLabel> pair_label;  // per box and flow pair

@@ -6,11 +6,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <vector>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/frame/camera_motion.hpp"
+#include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/motion_residual_impl.hpp"
 #include "cfp/math/order_statistic.hpp"
 
@@ -25,56 +25,64 @@ struct SharedError {
 
 inline namespace CFP_ISA {
 
-/// The pairs in one part of the image: the sum of their residuals in units of the noise, and what it says.
-struct ResidualPart {
-  Vector2<double> sum = Vector2<double>::Zero();
-  double weights = 0, variance = 0;  // of both coordinates of the sum, if the pairs err alone
-  double agreeing = 0;               // pairs, by the weights of the loss: a part that moves has hardly any
-
-  template <typename Scalar>
-  void add(const MotionResidual<Scalar>& pair, double sigma_px) noexcept {
-    constexpr double loss_sq = 64;  // 8 sigma: what neighbours share may be several
-    const Vector2<double> r = pair.r.template cast<double>() / sigma_px;
-    const double of_depth = static_cast<double>(pair.sigma_z) / sigma_px,
-                 v = 2 + of_depth * of_depth * static_cast<double>(pair.along.squaredNorm()),
-                 root = 1 / (1 + r.squaredNorm() / (v * loss_sq)), w = root * root / v;
-    if (!is_finite(r.squaredNorm()) || !is_finite(v)) return;
-    sum += w * r;
-    weights += w;
-    variance += w * w * v;
-    agreeing += root * root;
-  }
-  /// How many pairs of two coordinates without errors of depth would say as much.
-  [[nodiscard]] double pairs() const noexcept { return variance > 0 ? 2 * weights * weights / variance : 0; }
+/// W^-1 r of a pair, W of its noise, the unit, and of what a depth may be: what it says of an error that it shares with
+/// its neighbours, and the share that is left of the coordinate which the depth moves it along, 0 to 1.
+struct SharedResidual {
+  Vector2<double> told = Vector2<double>::Zero();
+  double distance_sq = 0;  // r^T W^-1 r
+  double along = 0;
 };
 
-/// The error that the pairs with a point share under the motion that was fitted to them. In each of 4 x 3 parts of what
-/// they cover the mean of n residuals has the variance sigma^2 / n + e^2 per coordinate; e is had from the upper
-/// quartile of the parts, as what errs may be a part of the image, and what moves there may be another. So many
-/// parameters were fitted to the two coordinates of all n parts: e^2 is n / (n - parameters / 2) times what is left of
-/// it, and n times at most. Fewer than four parts with five pairs that agree tell nothing.
-template <typename Scalar>
-[[nodiscard]] SharedError shared_error(const PairsWithDepth<Scalar>& pairs, const CameraMotion<Scalar>& motion,
-                                       int parameters) noexcept {
+/// The pairs in one part of the image: the sum of their residuals, and what it says.
+struct ResidualPart {
+  Vector2<double> sum = Vector2<double>::Zero();
+  double across = 0, along = 0;  // so many times an error that all share: in the sum, by coordinate
+  double variance = 0;           // of both coordinates of the sum, if the pairs err alone
+  double agreeing = 0;           // pairs, by the weights of the loss: a part that moves has hardly any
+
+  void add(const SharedResidual& pair) noexcept {
+    constexpr double loss_sq = 128;  // 8 sigma per coordinate: what neighbours share may be several
+    if (!is_finite(pair.distance_sq) || !is_finite(pair.along)) return;
+    const double root = 1 / (1 + pair.distance_sq / loss_sq), w = root * root;
+    sum += w * pair.told;
+    across += w;
+    along += w * pair.along;
+    variance += w * w * (1 + pair.along);
+    agreeing += w;
+  }
+  /// How many pairs of two coordinates without errors of depth would say as much.
+  [[nodiscard]] double pairs() const noexcept {
+    return variance > 0 ? (across * across + along * along) / variance : 0;
+  }
+};
+
+/// The error that pairs share under what was fitted to them: `tells(i)`, whether pair i was, `residual(i, out)`, its
+/// residual, false without one. In each of 4 x 3 parts of what they cover the mean of n residuals has the variance
+/// sigma^2 / n + e^2 per coordinate; e is had from the upper quartile of the parts, as what errs may be a part of the
+/// image, and what moves there may be another. So many parameters were fitted to the two coordinates of all n parts:
+/// e^2 is n / (n - parameters / 2) times what is left of it, and n times at most. Fewer than four parts with five pairs
+/// that agree tell nothing.
+template <typename Scalar, typename Tells, typename Residual>
+[[nodiscard]] SharedError shared_error(const FlowPairs<Scalar>& flow, Scalar sigma_px, int parameters, Tells&& tells,
+                                       Residual&& residual) noexcept {
   constexpr std::size_t columns = 4, rows = 3, fewest_parts = 4;
   constexpr double fewest_pairs = 5, upper_quartile = 1.386;  // of half a chi-squared with two degrees of freedom
   const Scalar huge = std::numeric_limits<Scalar>::infinity();
   Vector2<Scalar> low(huge, huge), high = -low;
-  for (std::size_t i = 0; i < pairs.flow.previous.size(); ++i) {
-    const Vector2<Scalar> at = pairs.flow.previous[i];
-    if (pairs.tells(i)) low = low.cwiseMin(at), high = high.cwiseMax(at);
+  for (std::size_t i = 0; i < flow.previous.size(); ++i) {
+    const Vector2<Scalar> at = flow.previous[i];
+    if (tells(i)) low = low.cwiseMin(at), high = high.cwiseMax(at);
   }
   const auto cell = [](Scalar at, Scalar size, std::size_t cells) {
     const Scalar share = at / size * static_cast<Scalar>(cells);
     return share >= Scalar(1) ? (std::min)(static_cast<std::size_t>(share), cells - 1) : 0;
   };
   std::array<ResidualPart, columns * rows> parts;
-  MotionResidual<Scalar> pair;
-  for (std::size_t i = 0; i < pairs.flow.previous.size(); ++i) {
-    if (!pairs.tells(i) || !pairs.residual_of(i, motion.T_cur_prev, pair)) continue;
-    const Vector2<Scalar> at = pairs.flow.previous[i] - low, size = high - low;
-    parts[cell(at[1], size[1], rows) * columns + cell(at[0], size[0], columns)].add(
-        pair, static_cast<double>(motion.sigma_px * pairs.flow.relative_sigma(i)));
+  SharedResidual pair;
+  for (std::size_t i = 0; i < flow.previous.size(); ++i) {
+    if (!tells(i) || !residual(i, pair)) continue;
+    const Vector2<Scalar> at = flow.previous[i] - low, size = high - low;
+    parts[cell(at[1], size[1], rows) * columns + cell(at[0], size[0], columns)].add(pair);
   }
 
   std::array<double, columns * rows> error_sq;  // in squares of the noise
@@ -88,7 +96,44 @@ template <typename Scalar>
   if (n < fewest_parts) return {};
   const double told = static_cast<double>(n), free = (std::max)(told - 0.5 * parameters, 1.0);
   const double e_sq = (std::max)(quantile(span<double>(error_sq.data(), n), 0.75), 0.0) * told / free;
-  return {static_cast<double>(motion.sigma_px) * std::sqrt(e_sq), 1 + e_sq * told_by / told};
+  return {static_cast<double>(sigma_px) * std::sqrt(e_sq), 1 + e_sq * told_by / told};
+}
+
+/// Of the pairs with a point, under the motion that was fitted to them.
+template <typename Scalar>
+[[nodiscard]] SharedError shared_error(const PairsWithDepth<Scalar>& pairs, const CameraMotion<Scalar>& motion,
+                                       int parameters) noexcept {
+  const auto residual = [&](std::size_t i, SharedResidual& out) {
+    MotionResidual<Scalar> pair;
+    if (!pairs.residual_of(i, motion.T_cur_prev, pair)) return false;
+    const auto sigma = static_cast<double>(motion.sigma_px * pairs.flow.relative_sigma(i));
+    const Vector2<double> r = pair.r.template cast<double>() / sigma,
+                          j = (pair.along * pair.sigma_z).template cast<double>() / sigma;
+    out.along = 1 / (1 + j.squaredNorm());
+    out.told = r - j * (j.dot(r) * out.along);
+    out.distance_sq = r.dot(out.told);
+    return true;
+  };
+  return shared_error(
+      pairs.flow, motion.sigma_px, parameters, [&](std::size_t i) { return pairs.tells(i); }, residual);
+}
+
+/// Of the pairs marked in `outside`, under the F that was fitted to them: it has seven parameters.
+template <typename Scalar>
+[[nodiscard]] SharedError shared_error(const FlowPairs<Scalar>& flow, span<const char> outside,
+                                       const Matrix3<Scalar>& F, Scalar sigma_px) noexcept {
+  const auto residual = [&](std::size_t i, SharedResidual& out) {
+    const Vector2<Scalar> current = flow.current[i];
+    const Vector3<double> line = epipolar_line(F, flow.previous[i]).template cast<double>();
+    const double x = static_cast<double>(current[0]), y = static_cast<double>(current[1]),
+                 normal_sq = line[0] * line[0] + line[1] * line[1],
+                 sigma = static_cast<double>(sigma_px * flow.relative_sigma(i));
+    out.told = line.head<2>() * ((line[0] * x + line[1] * y + line[2]) / (normal_sq * sigma));
+    out.distance_sq = out.told.squaredNorm();
+    return true;
+  };
+  return shared_error(
+      flow, sigma_px, 7, [&](std::size_t i) { return outside[i] != 0; }, residual);
 }
 
 }  // namespace CFP_ISA

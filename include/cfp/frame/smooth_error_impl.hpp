@@ -55,9 +55,13 @@ struct SmoothErrorFit {
       add_pair<9>(M / sigma, r / sigma, (pair.along * pair.sigma_z).template cast<double>() / sigma,
                   Eigen::Matrix<double, 9, 1>::Zero(), sums);
     }
-    // Before a bare wall what errs from the middle of the image is the way forward, and no pair tells them apart.
     constexpr double as_good_as_one = 3e-4;
-    if (!invert_normal_equations<9>(sums.H, as_good_as_one, covariance)) return false;
+    if (!invert_normal_equations<9>(sums.H, as_good_as_one, covariance)) {
+      // Before a bare wall, or where all depths count as one, what errs from the middle of the image is the way
+      // forward: there is no such error then.
+      sums.H(6, 6) += 1e9;
+      if (!invert_normal_equations<9>(sums.H, as_good_as_one, covariance)) return false;
+    }
     const Eigen::Matrix<double, 9, 1> change = -covariance.lazyProduct(sums.g);
     T_cur_prev = se3_exp(Vector6<double>(change.template head<6>())) * T_cur_prev;
     coefficients += change.template tail<3>();

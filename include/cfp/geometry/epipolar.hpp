@@ -20,6 +20,9 @@
 
 namespace cfp {
 
+/// Of the entries of a fundamental matrix of unit norm, row by row, in pixels; zero: it is exact.
+using FundamentalCovariance = Eigen::Matrix<double, 9, 9, Eigen::DontAlign>;
+
 inline namespace CFP_ISA {
 
 /// The line (A, B, C) = F x_prev in the current image: A u + B v + C = 0.
@@ -120,6 +123,32 @@ void epipolar_distances(const Matrix3<Scalar>& F, const FlowPairs<non_deduced<Sc
   CFP_ASSERT(detail::fits(out.size(), pairs.relative_sigmas));
   epipolar_distances(F, pairs.previous, pairs.current, out);
   for (std::size_t i = 0; i < pairs.relative_sigmas.size(); ++i) out[i] /= pairs.relative_sigmas[i];
+}
+
+/// The same under an F of unit norm that is not exact: what its error may have moved the line by does not count,
+///
+///   d / sqrt(1 + a^T C a / (sigma^2 (A^2 + B^2))),
+///
+/// a the entries of x_cur x_prev^T row by row, C the covariance of F, sigma = sigma_px relative_sigma > 0. An F tells
+/// little where none of its pairs was: of what stands before them all, or beside them. Not in the paper.
+template <typename Scalar>
+void epipolar_distances(const Matrix3<Scalar>& F, const FundamentalCovariance& covariance,
+                        const non_deduced<Scalar>& sigma_px, const FlowPairs<non_deduced<Scalar>>& pairs,
+                        span<non_deduced<Scalar>> out) noexcept {
+  epipolar_distances(F, pairs, out);
+  if (covariance.isZero(0)) return;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    if (!has_distance(out[i])) continue;
+    const Vector2<Scalar> previous = pairs.previous[i], current = pairs.current[i];
+    const Vector3<double> p(static_cast<double>(previous[0]), static_cast<double>(previous[1]), 1),
+        q(static_cast<double>(current[0]), static_cast<double>(current[1]), 1);
+    Eigen::Matrix<double, 9, 1> a;
+    a << q[0] * p, q[1] * p, p;
+    const double sigma = static_cast<double>(sigma_px * pairs.relative_sigma(i)),
+                 normal_sq = static_cast<double>(epipolar_line(F, previous).template head<2>().squaredNorm()),
+                 variance = a.dot(covariance.lazyProduct(a)) / (sigma * sigma * normal_sq);
+    out[i] /= static_cast<Scalar>(std::sqrt(1 + variance));
+  }
 }
 
 }  // namespace CFP_ISA

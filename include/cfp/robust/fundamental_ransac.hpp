@@ -10,6 +10,7 @@
 
 #include "cfp/core/span.hpp"
 #include "cfp/geometry/camera.hpp"
+#include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/point_pairs.hpp"
 #include "cfp/robust/fundamental_degeneracy_impl.hpp"
 #include "cfp/robust/fundamental_search_impl.hpp"
@@ -23,9 +24,13 @@ struct FundamentalRansacOptions : RansacOptions {};
 
 template <typename Scalar>
 struct FundamentalResult : RansacReport {
-  Matrix3<Scalar> F = Matrix3<Scalar>::Zero();           ///< unit norm, rank 2; zero unless found()
+  Matrix3<Scalar> F = Matrix3<Scalar>::Zero();  ///< unit norm, rank 2; zero unless found()
+  /// Of F, by the noise that its pairs show; zero unless found() and where they do not tell it.
+  FundamentalCovariance covariance = FundamentalCovariance::Zero();
   Matrix3<Scalar> homography = Matrix3<Scalar>::Zero();  ///< previous to current pixels, det > 0, unit norm; set for
                                                          ///< no_motion, pure_rotation, planar, homography
+
+  CFP_INLINE FundamentalResult() noexcept {}  // NOLINT(modernize-use-equals-default): inline
 };
 
 /// Scratch memory of fundamental_ransac: keep one per thread. After a call with n pairs, calls with up to n allocate
@@ -46,7 +51,9 @@ void report_fundamental(const Matrix3<double>& F, const FundamentalSearch<double
                         span<char> inlier_mask, FundamentalResult<Scalar>& result) noexcept {
   const auto is_inlier = [&](std::size_t i) { return search.distances_sq[i] <= search.limit; };
   report_inliers(search.pairs, is_inlier, min_inliers, inlier_mask, result);
-  if (result.found()) result.F = unscaled_fundamental(F, search.pairs.scaling).template cast<Scalar>();
+  if (!result.found()) return;
+  result.F = unscaled_fundamental(F, search.pairs.scaling).template cast<Scalar>();
+  result.covariance = fundamental_covariance(search.pairs, F, search.noise_variance, search.final_scale);
 }
 
 /// In the place of an F: what motion the homography is, its pairs and itself.
