@@ -219,7 +219,7 @@ static void instantiate_frame() noexcept {
   use(&cfp::flow_distances<Scalar>);
   use(&cfp::estimate_camera_motion<Scalar>);
   use(&cfp::refine_camera_motion<Scalar>);
-  use(&cfp::joined<Scalar>);
+  use(&cfp::join<Scalar>);
   use(&cfp::relative_motion<Scalar, Eigen::Matrix<Scalar, 12, 12>>);
   use(&cfp::robust_sigma<Scalar>);
   use(&cfp::remember_objects<Scalar>);

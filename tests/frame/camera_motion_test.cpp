@@ -186,18 +186,26 @@ TEST_CASE("Two estimates of a motion join: the surer leads, an exact one stays, 
     const auto error = [&](const cfp::UncertainMotion<double>& motion, const cfp::SE3<double>& from) {
       return cfp::se3_log(motion.T_cur_prev * from.inverse()).norm();
     };
-    CHECK(error(cfp::joined({T, 0, 0}, measured), T) < 1e-12);
-    CHECK(cfp::joined({T, 0, 0}, measured).covariance.isZero(0));
-    const auto equal = cfp::joined({T, 0.001, 0.001}, measured);  // half way
+    // The measured one where they do not join.
+    const auto joined = [&](const cfp::UncertainMotion<double>& given, double most_distance_sq) {
+      cfp::UncertainMotion<double> result = measured;
+      const bool joins = cfp::join(given, measured, most_distance_sq, result);
+      CHECK((joins || result.T_cur_prev.translation == measured.T_cur_prev.translation));
+      return result;
+    };
+    const double any = std::numeric_limits<double>::infinity();
+    CHECK(error(joined({T, 0, 0}, any), T) < 1e-12);
+    CHECK(joined({T, 0, 0}, any).covariance.isZero(0));
+    const auto equal = joined({T, 0.001, 0.001}, any);  // half way
     CHECK(std::abs(error(equal, T) - error(equal, measured.T_cur_prev)) < 1e-5);
     CHECK(equal.covariance.isApprox(measured.covariance / 2, 1e-9));
-    CHECK(error(cfp::joined({T, 1, 1}, measured), measured.T_cur_prev) < 1e-6);
-    CHECK(error(cfp::joined({T, 0.001, 0.001}, measured, 1e6), equal.T_cur_prev) < 1e-12);
-    CHECK(error(cfp::joined({T, 0.001, 0.001}, measured, 1e-6), measured.T_cur_prev) < 1e-12);
-    CHECK(cfp::joined({T, nan, 1}, measured).T_cur_prev.translation == measured.T_cur_prev.translation);
+    CHECK(error(joined({T, 1, 1}, any), measured.T_cur_prev) < 1e-6);
+    CHECK(error(joined({T, 0.001, 0.001}, 1e6), equal.T_cur_prev) < 1e-12);
+    CHECK(error(joined({T, 0.001, 0.001}, 1e-6), measured.T_cur_prev) < 1e-12);
+    CHECK(joined({T, nan, 1}, any).T_cur_prev.translation == measured.T_cur_prev.translation);
     cfp::SE3<double> bad = T;
     bad.translation[run % 3] = nan;
-    CHECK(cfp::joined({bad, 1, 1}, measured).T_cur_prev.translation == measured.T_cur_prev.translation);
+    CHECK(joined({bad, 1, 1}, any).T_cur_prev.translation == measured.T_cur_prev.translation);
   }
 }
 

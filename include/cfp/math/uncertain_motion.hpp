@@ -2,8 +2,6 @@
 /// A rigid motion with its covariance, two of them as one, and what one says of the next.
 #pragma once
 
-#include <limits>
-
 #include "cfp/core/span.hpp"
 #include "cfp/core/types.hpp"
 #include "cfp/math/normal_equations.hpp"
@@ -96,15 +94,6 @@ template <typename Scalar>
   if (!rounded.covariance.allFinite() || !rounded.T_cur_prev.translation.allFinite()) return false;
   result = rounded;
   return true;
-}
-
-/// The same; the measured one where they do not join.
-template <typename Scalar>
-[[nodiscard]] UncertainMotion<Scalar> joined(
-    const UncertainMotion<double>& given, const UncertainMotion<Scalar>& measured,
-    double most_distance_sq = (std::numeric_limits<double>::infinity)()) noexcept {
-  UncertainMotion<Scalar> result = measured;
-  return join(given, measured, most_distance_sq, result) ? result : measured;
 }
 
 }  // namespace CFP_ISA
