@@ -19,11 +19,6 @@ struct SE3 {
   [[nodiscard]] CFP_INLINE static SE3 from_matrix(const Matrix4<Scalar>& T) noexcept {
     return {T.template topLeftCorner<3, 3>(), T.template topRightCorner<3, 1>()};
   }
-  /// From a quaternion (x, y, z, w), as Eigen::Quaternion::coeffs() and TUM trajectories have it; any length but 0.
-  [[nodiscard]] CFP_INLINE static SE3 from_quaternion(const Vector4<Scalar>& q,
-                                                      const Vector3<Scalar>& translation) noexcept {
-    return {so3_from_quaternion(q), translation};
-  }
 
   [[nodiscard]] CFP_INLINE Vector3<Scalar> operator*(const Vector3<Scalar>& point) const noexcept {
     return rotation * point + translation;

@@ -56,7 +56,7 @@ template <typename Derived, typename = typename Derived::PlainObject>
 }
 
 /// The rotation matrix of the quaternion q = (x, y, z, w) over its length, in the order of Eigen's coefficients and of
-/// TUM trajectories. Not finite for a zero quaternion.
+/// TUM trajectories: a pose is {so3_from_quaternion(q), translation}. Not finite for a zero quaternion.
 template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> so3_from_quaternion(const Vector4<Scalar>& q) noexcept {
   const Vector3<Scalar> v = q.template head<3>();
