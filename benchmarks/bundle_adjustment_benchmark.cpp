@@ -61,7 +61,7 @@ std::vector<Method<Camera>> methods(bool all_of_ceres, double function_tolerance
                   }});
   list.push_back(
       {"cfp, two threads", [=](const cfp::BundleProblem<Camera>& problem, const cfp::BundleOptions& options) {
-         const cfp::BundleResult result = cfp::adjust_bundle(problem, options, *workspace, *second_thread);
+         const cfp::BundleResult result = cfp::adjust_bundle(problem, options, *workspace, {}, *second_thread);
          return Outcome{result.final_cost, result.iterations};
        }});
 #ifdef CFP_HAVE_CERES
@@ -122,7 +122,7 @@ void critical_path(const std::vector<cfp_test::BaScene>& scenes, int repetitions
     cfp_test::BaScene scene = scenes[static_cast<std::size_t>(r) % scenes.size()];
     CriticalPath executor;
     const double start = processor_ms();
-    (void)cfp::adjust_bundle(scene.problem(), cfp::BundleOptions{}, workspace, executor);
+    (void)cfp::adjust_bundle(scene.problem(), cfp::BundleOptions{}, workspace, {}, executor);
     total.push_back(processor_ms() - start);
     gain.push_back(total.back() / (total.back() - executor.saved_ms));
   }
@@ -201,7 +201,7 @@ void scaling(int repetitions) {
       }
       cfp_test::BaScene scene = start;
       total_two.push_back(milliseconds(
-          [&] { result = cfp::adjust_bundle(scene.problem(), cfp::BundleOptions{}, workspace, second_thread); }));
+          [&] { result = cfp::adjust_bundle(scene.problem(), cfp::BundleOptions{}, workspace, {}, second_thread); }));
     }
     const double step = (median(total) - median(one)) / (result.iterations - 1);
     std::printf("%6d %8d %13zu %10.2f %13.3f %12.2f %8d %14zu %8.0f\n", poses, scene_options.points, start.pose.size(),

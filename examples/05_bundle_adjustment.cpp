@@ -94,7 +94,7 @@ int main(int argc, char** argv) {
   cfp::BundleResult result;
   if (arguments.threads == 2) {
     cfp::TwoThreads two_threads;
-    result = cfp::adjust_bundle(data.view(), arguments.options, workspace, two_threads, squared_errors);
+    result = cfp::adjust_bundle(data.view(), arguments.options, workspace, squared_errors, two_threads);
   } else {
     result = cfp::adjust_bundle(data.view(), arguments.options, workspace, squared_errors);
   }

@@ -60,8 +60,8 @@ TEST_CASE("One thread, two threads and any order of the tasks give the same bits
     const cfp_test::BaScene start = cfp_test::make_ba_scene(options, 1);
     cfp_test::BaScene one = start, two = start, backward = start, again = start;
     (void)adjust_bundle(one.problem(), cfp::BundleOptions{}, workspace);
-    (void)adjust_bundle(two.problem(), cfp::BundleOptions{}, workspace, two_threads);
-    (void)adjust_bundle(backward.problem(), cfp::BundleOptions{}, workspace, BackwardExecutor{});
+    (void)adjust_bundle(two.problem(), cfp::BundleOptions{}, workspace, {}, two_threads);
+    (void)adjust_bundle(backward.problem(), cfp::BundleOptions{}, workspace, {}, BackwardExecutor{});
     (void)adjust_bundle(again.problem(), cfp::BundleOptions{}, workspace);
     CHECK(same_bits(one, two));
     CHECK(same_bits(one, backward));
@@ -83,7 +83,7 @@ TEST_CASE("An executor that throws leaves poses and points as they were, and the
   for (int calls = 0; !done; ++calls) {
     cfp_test::BaScene scene = start;
     try {
-      (void)adjust_bundle(scene.problem(), cfp::BundleOptions{}, workspace, EndingExecutor{calls});
+      (void)adjust_bundle(scene.problem(), cfp::BundleOptions{}, workspace, {}, EndingExecutor{calls});
       done = true;
       CHECK(calls > 4);
       CHECK(same_bits(scene, expected));

@@ -40,11 +40,10 @@ inline namespace CFP_ISA {
 ///   test (against 5.991 mono, 7.815 RGB-D; the weight has no part in it); -1 when the camera does not see the point or
 ///   the observation is invalid. Observations of weight 0 are judged, too.
 /// Preconditions (asserted): arrays of one length where they are parallel; cameras: one, or one per pose.
-template <typename Camera, typename Scalar, typename Executor,
-          std::enable_if_t<!std::is_convertible_v<Executor&&, span<double>>, int> = 0>
+template <typename Camera, typename Scalar, typename Executor = SingleThread>
 [[nodiscard]] BundleResult adjust_bundle(const BundleProblem<Camera, Scalar>& problem, const BundleOptions& options,
-                                         BundleWorkspace& workspace, Executor&& executor,
-                                         span<double> squared_errors = {}) {
+                                         BundleWorkspace& workspace, span<double> squared_errors = {},
+                                         Executor&& executor = Executor()) {
   BundleResult result;
   detail::build_index(problem, workspace.index, result);
   detail::prepare(problem, workspace, result);
@@ -65,13 +64,6 @@ template <typename Camera, typename Scalar, typename Executor,
   }
   if (!squared_errors.empty()) detail::write_squared_errors(problem, workspace.index, squared_errors);
   return result;
-}
-
-/// The same on the calling thread.
-template <typename Camera, typename Scalar>
-[[nodiscard]] BundleResult adjust_bundle(const BundleProblem<Camera, Scalar>& problem, const BundleOptions& options,
-                                         BundleWorkspace& workspace, span<double> squared_errors = {}) {
-  return adjust_bundle(problem, options, workspace, SingleThread{}, squared_errors);
 }
 
 }  // namespace CFP_ISA
