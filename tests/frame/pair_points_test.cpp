@@ -15,9 +15,8 @@ using Points = std::vector<std::array<double, 3>>;
 using Pixels = std::vector<std::array<double, 2>>;
 
 std::size_t leave_out(const Pixels& pixels, Points& points) {
-  cfp::detail::LoneDepthsWorkspace<double> workspace;
-  return cfp::detail::leave_out_lone_depths<double>(cfp::PointSpan<double, 2>(pixels), 0.12, cfp::span(points),
-                                                    workspace);
+  cfp::detail::PointGrid<double> grid;
+  return cfp::detail::leave_out_lone_depths<double>(cfp::PointSpan<double, 2>(pixels), 0.12, cfp::span(points), grid);
 }
 
 bool is_in(const std::array<double, 3>& point) { return std::isfinite(point[0]); }

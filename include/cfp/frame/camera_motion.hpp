@@ -53,7 +53,7 @@ struct CameraMotionWorkspace {
   std::vector<std::array<Scalar, 3>> points;  // of the pairs, in the previous camera; NaN: takes no part
   std::size_t taken = 0;                      // of them
   Scalar near_m{};  // a point nearer than that tells no more of the translation than one there
-  detail::LoneDepthsWorkspace<Scalar> depths;
+  detail::PointGrid<Scalar> grid;
   std::vector<Scalar> sigmas, distances;
   PoseWorkspace<Scalar> pose;
   PnpRansacWorkspace search;
@@ -199,7 +199,7 @@ template <typename Scalar>
   CFP_ASSERT(outside.size() == flow.current.size());
   detail::place_points(flow, outside, camera, workspace.points);
   workspace.taken = detail::leave_out_lone_depths(flow.previous, Scalar(options.shared_depth_ratio),
-                                                  span<std::array<Scalar, 3>>(workspace.points), workspace.depths);
+                                                  span<std::array<Scalar, 3>>(workspace.points), workspace.grid);
   if (workspace.taken < options.min_pairs) return {};
 
   if (workspace.search.observations.index.size() < outside.size())  // a later call may search and must not allocate

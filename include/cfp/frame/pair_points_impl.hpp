@@ -16,13 +16,6 @@
 #include "cfp/math/order_statistic.hpp"
 
 namespace cfp::detail {
-
-template <typename Scalar>
-struct LoneDepthsWorkspace {
-  PointGrid<Scalar> grid;
-  std::vector<std::uint32_t> alone;
-};
-
 inline namespace CFP_ISA {
 
 /// The pairs marked in `outside` whose depth is valid, as points of the previous camera; the others as NaN.
@@ -55,9 +48,7 @@ template <typename Scalar>
 /// tells it, and yet bend the motion: what seems far and moves makes a turn of a translation.
 template <typename Scalar>
 [[nodiscard]] std::size_t leave_out_lone_depths(const PointSpan<Scalar, 2>& pixels, Scalar ratio,
-                                                span<std::array<Scalar, 3>> points,
-                                                LoneDepthsWorkspace<Scalar>& workspace) {
-  PointGrid<Scalar>& grid = workspace.grid;
+                                                span<std::array<Scalar, 3>> points, PointGrid<Scalar>& grid) {
   const auto takes_part = [&](std::size_t i) { return is_finite(points[i][0]); };
   fill_grid(pixels, takes_part, Scalar(0), grid);  // the reach follows from their extent
   const std::size_t taken = grid.points.size();
@@ -68,9 +59,9 @@ template <typename Scalar>
   }
   const bool all_alike = farthest - nearest <= ratio * nearest;  // as all are where the motion is up to scale
   grid.reach = std::sqrt(Scalar(7) / 4 * (grid.width * grid.height) / static_cast<Scalar>(taken));
-  workspace.alone.reserve(pixels.size());
-  workspace.alone.clear();
   if (taken == 0 || ratio <= 0 || all_alike || !(grid.reach > 0) || !is_finite(grid.reach)) return taken;
+  auto& alone = grid.unsorted;
+  alone.clear();
   for (const auto& point : grid.points) {
     const Scalar depth = points[point.index][2];
     int neighbours = -1, alike = -1;  // itself is none
@@ -81,11 +72,11 @@ template <typename Scalar>
       alike += std::abs(depth - its) <= ratio * (std::min)(depth, its) ? 1 : 0;
       return alike >= 2;
     });
-    if (neighbours >= 2 && alike < 2) workspace.alone.push_back(point.index);
+    if (neighbours >= 2 && alike < 2) alone.push_back(point);
   }
-  if (8 * workspace.alone.size() > 3 * taken) return taken;
-  for (const std::uint32_t i : workspace.alone) points[i][0] = std::numeric_limits<Scalar>::quiet_NaN();
-  return taken - workspace.alone.size();
+  if (8 * alone.size() > 3 * taken) return taken;
+  for (const auto& point : alone) points[point.index][0] = std::numeric_limits<Scalar>::quiet_NaN();
+  return taken - alone.size();
 }
 
 }  // namespace CFP_ISA

@@ -22,8 +22,9 @@ struct PointGrid {
     Scalar x, y;
     std::uint32_t index;  // in what the grid was made of
   };
-  std::vector<Point> points, unsorted;  // by cell, row by row; of one cell by index
-  std::vector<std::uint32_t> first;     // of each cell
+  std::vector<Point> points;         // by cell, row by row; of one cell by index
+  std::vector<Point> unsorted;       // while the grid is filled; free afterwards
+  std::vector<std::uint32_t> first;  // of each cell
   Scalar left = 0, top = 0, width = 0, height = 0, reach = 0;
   Scalar columns_per_px = 0, rows_per_px = 0;
 

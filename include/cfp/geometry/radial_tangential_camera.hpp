@@ -53,39 +53,6 @@ template <typename Scalar>
          stays_positive(Scalar(Scalar(3) * k1), Scalar(Scalar(5) * k2), Scalar(Scalar(7) * k3), s);
 }
 
-/// RadialTangentialCamera::unproject.
-template <typename Scalar>
-[[nodiscard]] bool find_ray(const RadialTangentialCamera<Scalar>& camera, const Vector2<Scalar>& pixel,
-                            Vector3<Scalar>& ray) noexcept {
-  const Vector2<Scalar> target((pixel.x() - camera.cx) / camera.fx, (pixel.y() - camera.cy) / camera.fy);
-  Scalar error_sq = target.squaredNorm();
-  // With the factors they have in the polynomial of the fold: where that is not finite, nothing is projected.
-  const Scalar radial = Scalar(3) * camera.k1 + Scalar(5) * camera.k2 + Scalar(7) * camera.k3;
-  if (!is_finite(error_sq) || !is_finite(Scalar(radial + camera.p1 + camera.p2))) return false;
-  const Scalar unit_roundoff(std::numeric_limits<Scalar>::epsilon());
-  const Scalar enough_sq = Scalar(256) * unit_roundoff * unit_roundoff * (Scalar(1) + error_sq);
-  // On the axis the distortion is 0 and its Jacobian the identity: the first step is the target itself.
-  Vector2<Scalar> found = Vector2<Scalar>::Zero(), step = target;
-  for (int evaluation = 0; evaluation < 40 && !(error_sq <= enough_sq); ++evaluation) {
-    DistortedPoint<Scalar> d;
-    const Vector2<Scalar> candidate = found + step;
-    const bool valid = distort(camera, candidate.x(), candidate.y(), d);
-    const Vector2<Scalar> error = target - Vector2<Scalar>(d.x, d.y);
-    const Scalar candidate_error_sq = error.squaredNorm();
-    if (!valid || !(candidate_error_sq < error_sq)) {
-      step *= Scalar(0.5);
-      continue;
-    }
-    found = candidate;
-    error_sq = candidate_error_sq;
-    const Scalar inv_determinant = Scalar(1) / (d.xx * d.yy - d.xy * d.xy);
-    step = Vector2<Scalar>(d.yy * error.x() - d.xy * error.y(), d.xx * error.y() - d.xy * error.x()) * inv_determinant;
-  }
-  if (!(error_sq <= enough_sq)) return false;
-  ray = {found.x(), found.y(), Scalar(1)};
-  return true;
-}
-
 }  // namespace CFP_ISA
 }  // namespace detail
 
@@ -127,7 +94,34 @@ struct RadialTangentialCamera {
   /// result is not finite. At most 40 evaluations of the
   /// model.
   [[nodiscard]] CFP_INLINE bool unproject(const Vector2<Scalar>& pixel, Vector3<Scalar>& ray) const noexcept {
-    return detail::find_ray(*this, pixel, ray);
+    const Vector2<Scalar> target((pixel.x() - cx) / fx, (pixel.y() - cy) / fy);
+    Scalar error_sq = target.squaredNorm();
+    // With the factors they have in the polynomial of the fold: where that is not finite, nothing is projected.
+    const Scalar radial = Scalar(3) * k1 + Scalar(5) * k2 + Scalar(7) * k3;
+    if (!is_finite(error_sq) || !is_finite(Scalar(radial + p1 + p2))) return false;
+    const Scalar unit_roundoff(std::numeric_limits<Scalar>::epsilon());
+    const Scalar enough_sq = Scalar(256) * unit_roundoff * unit_roundoff * (Scalar(1) + error_sq);
+    // On the axis the distortion is 0 and its Jacobian the identity: the first step is the target itself.
+    Vector2<Scalar> found = Vector2<Scalar>::Zero(), step = target;
+    for (int evaluation = 0; evaluation < 40 && !(error_sq <= enough_sq); ++evaluation) {
+      detail::DistortedPoint<Scalar> d;
+      const Vector2<Scalar> candidate = found + step;
+      const bool valid = detail::distort(*this, candidate.x(), candidate.y(), d);
+      const Vector2<Scalar> error = target - Vector2<Scalar>(d.x, d.y);
+      const Scalar candidate_error_sq = error.squaredNorm();
+      if (!valid || !(candidate_error_sq < error_sq)) {
+        step *= Scalar(0.5);
+        continue;
+      }
+      found = candidate;
+      error_sq = candidate_error_sq;
+      const Scalar inv_determinant = Scalar(1) / (d.xx * d.yy - d.xy * d.xy);
+      step =
+          Vector2<Scalar>(d.yy * error.x() - d.xy * error.y(), d.xx * error.y() - d.xy * error.x()) * inv_determinant;
+    }
+    if (!(error_sq <= enough_sq)) return false;
+    ray = {found.x(), found.y(), Scalar(1)};
+    return true;
   }
 
   template <typename Other>
