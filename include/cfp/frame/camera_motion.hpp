@@ -11,8 +11,8 @@
 
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
-#include "cfp/frame/frame.hpp"
 #include "cfp/frame/pair_points_impl.hpp"
+#include "cfp/geometry/flow_pairs.hpp"
 #include "cfp/geometry/motion_distance.hpp"
 #include "cfp/optimization/pose/pose_refinement.hpp"
 #include "cfp/robust/pnp_ransac.hpp"
@@ -58,22 +58,6 @@ struct CameraMotionWorkspace {
   PoseWorkspace<Scalar> pose;
   PnpRansacWorkspace search;
 };
-
-inline namespace CFP_ISA {
-
-[[nodiscard]] inline OptionPath invalid_field(const CameraMotionOptions& o) noexcept {
-  if (o.min_pairs < 3) return "min_pairs";
-  if (!(o.min_inlier_share >= 0 && o.min_inlier_share <= 1)) return "min_inlier_share";
-  if (!detail::positive(o.min_sigma_px)) return "min_sigma_px";
-  if (!(o.max_sigma_px >= o.min_sigma_px) || !is_finite(o.max_sigma_px)) return "max_sigma_px";
-  if (!detail::positive(o.search_above_px)) return "search_above_px";
-  if (!detail::non_negative(o.shared_depth_ratio)) return "shared_depth_ratio";
-  if (!(o.nearest_share >= 0 && o.nearest_share <= 1)) return "nearest_share";
-  if (const OptionPath field = nested("distance", invalid_field(o.distance))) return field;
-  return nested("pose", invalid_field(o.pose));
-}
-
-}  // namespace CFP_ISA
 
 namespace detail {
 inline namespace CFP_ISA {
@@ -183,6 +167,18 @@ struct PairsWithDepth {
 }  // namespace detail
 
 inline namespace CFP_ISA {
+
+[[nodiscard]] inline OptionPath invalid_field(const CameraMotionOptions& o) noexcept {
+  if (o.min_pairs < 3) return "min_pairs";
+  if (!(o.min_inlier_share >= 0 && o.min_inlier_share <= 1)) return "min_inlier_share";
+  if (!detail::positive(o.min_sigma_px)) return "min_sigma_px";
+  if (!(o.max_sigma_px >= o.min_sigma_px) || !is_finite(o.max_sigma_px)) return "max_sigma_px";
+  if (!detail::positive(o.search_above_px)) return "search_above_px";
+  if (!detail::non_negative(o.shared_depth_ratio)) return "shared_depth_ratio";
+  if (!(o.nearest_share >= 0 && o.nearest_share <= 1)) return "nearest_share";
+  if (const OptionPath field = nested("distance", invalid_field(o.distance))) return field;
+  return nested("pose", invalid_field(o.pose));
+}
 
 /// The motion of the camera from the pairs of the undistorted image that `outside` marks as on no object and whose
 /// depth is known and shared by neighbours. Unknown where too few pairs have such a depth or agree. O(pairs).

@@ -10,9 +10,9 @@
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
-#include "cfp/frame/frame.hpp"
 #include "cfp/frame/point_grid_impl.hpp"
 #include "cfp/geometry/camera.hpp"
+#include "cfp/geometry/flow_pairs.hpp"
 #include "cfp/math/order_statistic.hpp"
 
 namespace cfp::detail {

@@ -9,7 +9,7 @@
 
 #include "cfp/core/span.hpp"
 #include "cfp/frame/camera_motion.hpp"
-#include "cfp/frame/frame.hpp"
+#include "cfp/geometry/flow_pairs.hpp"
 #include "cfp/geometry/motion_residual_impl.hpp"
 #include "cfp/math/normal_equations.hpp"
 #include "cfp/math/se3.hpp"

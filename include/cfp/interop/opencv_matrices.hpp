@@ -8,8 +8,6 @@
 
 #include <opencv2/core/mat.hpp>
 
-#include <Eigen/Core>
-
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/status.hpp"
