@@ -123,7 +123,7 @@ class StaticProbability {
 // Outside of the class, so that `extern template class` keeps the engines behind them out of a unit.
 
 template <typename Camera>
-StageResult<typename Camera::ScalarType> StaticProbability<Camera>::coarse(const Frame<Scalar>& frame) {
+auto StaticProbability<Camera>::coarse(const Frame<Scalar>& frame) -> StageResult<Scalar> {
   begin_frame(frame, state_);
   track_boxes(frame, options_, tracker_, state_);
   estimate_objects(frame, camera_, options_, state_);
@@ -133,9 +133,8 @@ StageResult<typename Camera::ScalarType> StaticProbability<Camera>::coarse(const
 }
 
 template <typename Camera>
-StageResult<typename Camera::ScalarType> StaticProbability<Camera>::fine(const PoseEstimate& pose,
-                                                                         span<const std::int32_t> match,
-                                                                         span<const Scalar> map_point_probability) {
+auto StaticProbability<Camera>::fine(const PoseEstimate& pose, span<const std::int32_t> match,
+                                     span<const Scalar> map_point_probability) -> StageResult<Scalar> {
   match_in_boxes(pose.T_cur_prev, match, camera_, options_, state_);
   if (state_.previous.known && !(match.empty() && state_.current.descriptors.empty()))
     constrain_keypoints(pose, map_point_probability, camera_, options_, state_);

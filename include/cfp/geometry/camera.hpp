@@ -83,9 +83,8 @@ inline namespace CFP_ISA {
 /// The pinhole camera of a camera's undistorted image: focal lengths and principal point of its projection at the
 /// optical axis. A pinhole camera gives itself. All zero (every unprojection invalid) for a camera that cannot project
 /// its own axis.
-template <typename Camera>
-[[nodiscard]] PinholeCamera<typename Camera::ScalarType> undistorted_camera(const Camera& camera) noexcept {
-  using Scalar = typename Camera::ScalarType;
+template <typename Camera, typename Scalar = typename Camera::ScalarType>
+[[nodiscard]] PinholeCamera<Scalar> undistorted_camera(const Camera& camera) noexcept {
   Vector2<Scalar> centre;
   Matrix23<Scalar> jacobian;
   if (!camera.project(Vector3<Scalar>(Scalar(0), Scalar(0), Scalar(1)), centre, &jacobian))
@@ -96,11 +95,9 @@ template <typename Camera>
 /// The points in the camera's undistorted image, kept in `storage`, which the returned view refers to; a pinhole
 /// camera's points are their own, and storage is not touched. A pixel without a ray becomes NaN, which no distance
 /// accepts. Allocates only to grow storage.
-template <typename Camera>
-[[nodiscard]] PointSpan<typename Camera::ScalarType, 2> undistorted(
-    const Camera& camera, const PointSpan<typename Camera::ScalarType, 2>& points,
-    std::vector<std::array<typename Camera::ScalarType, 2>>& storage) {
-  using Scalar = typename Camera::ScalarType;
+template <typename Camera, typename Scalar = typename Camera::ScalarType>
+[[nodiscard]] PointSpan<Scalar, 2> undistorted(const Camera& camera, const PointSpan<non_deduced<Scalar>, 2>& points,
+                                               std::vector<std::array<non_deduced<Scalar>, 2>>& storage) {
   if constexpr (detail::is_pinhole<Camera>) {
     return points;
   } else {
@@ -121,11 +118,11 @@ template <typename Camera>
 /// fisheye becomes many: root mean square over both directions, times `relative` where that is not empty. Kept in
 /// `storage`, which the returned view refers to; of a pinhole camera `relative` itself. 1 for a point that the camera
 /// does not see. Allocates only to grow storage.
-template <typename Camera>
-[[nodiscard]] span<const typename Camera::ScalarType> undistorted_sigmas(
-    const Camera& camera, const PointSpan<typename Camera::ScalarType, 2>& undistorted_points,
-    span<const typename Camera::ScalarType> relative, std::vector<typename Camera::ScalarType>& storage) {
-  using Scalar = typename Camera::ScalarType;
+template <typename Camera, typename Scalar = typename Camera::ScalarType>
+[[nodiscard]] span<const Scalar> undistorted_sigmas(const Camera& camera,
+                                                    const PointSpan<non_deduced<Scalar>, 2>& undistorted_points,
+                                                    span<const non_deduced<Scalar>> relative,
+                                                    std::vector<non_deduced<Scalar>>& storage) {
   if constexpr (detail::is_pinhole<Camera>) {
     return relative;
   } else {

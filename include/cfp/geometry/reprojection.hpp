@@ -39,12 +39,10 @@ template <typename Camera, typename Scalar>
 }
 
 /// reprojection_distance of every correspondence, for any camera. Allocates nothing.
-template <typename Camera>
-void reprojection_distances(const PointSpan<typename Camera::ScalarType, 2>& prev,
-                            span<const typename Camera::ScalarType> depth_prev,
-                            const PointSpan<typename Camera::ScalarType, 2>& cur,
-                            const SE3<typename Camera::ScalarType>& T_cur_prev, const Camera& camera,
-                            span<typename Camera::ScalarType> out) noexcept {
+template <typename Camera, typename Scalar = typename Camera::ScalarType>
+void reprojection_distances(const PointSpan<non_deduced<Scalar>, 2>& prev, span<const non_deduced<Scalar>> depth_prev,
+                            const PointSpan<non_deduced<Scalar>, 2>& cur, const SE3<non_deduced<Scalar>>& T_cur_prev,
+                            const Camera& camera, span<non_deduced<Scalar>> out) noexcept {
   CFP_ASSERT(prev.size() == out.size() && depth_prev.size() == out.size() && cur.size() == out.size());
   for (std::size_t i = 0; i < out.size(); ++i)
     out[i] = reprojection_distance(prev[i], depth_prev[i], cur[i], T_cur_prev, camera);
