@@ -15,7 +15,7 @@ struct DistortedPoint {
   Scalar x{}, y{}, xx{}, xy{}, yy{};
 };
 
-/// Camera::project by `distort(camera, x, y, distorted)`, which is false where the camera sees nothing.
+/// Camera::project by `camera.distort(x, y, distorted)`, which is false where the camera sees nothing.
 template <typename Camera, typename Scalar>
 [[nodiscard]] CFP_INLINE bool project_distorted(const Camera& camera, const Vector3<Scalar>& point,
                                                 Vector2<Scalar>& pixel, Matrix23<Scalar>* jacobian) noexcept {
@@ -24,7 +24,7 @@ template <typename Camera, typename Scalar>
   const Scalar x = point.x() * inv_z;
   const Scalar y = point.y() * inv_z;
   DistortedPoint<Scalar> d;
-  if (!distort(camera, x, y, d) || !camera.pinhole().project({d.x, d.y, Scalar(1)}, pixel)) return false;
+  if (!camera.distort(x, y, d) || !camera.pinhole().project({d.x, d.y, Scalar(1)}, pixel)) return false;
   if (jacobian != nullptr) {
     const Scalar fx_z = camera.fx * inv_z;
     const Scalar fy_z = camera.fy * inv_z;

@@ -13,41 +13,6 @@
 
 namespace cfp {
 
-template <typename Scalar>
-struct KannalaBrandtCamera;
-
-namespace detail {
-inline namespace CFP_ISA {
-
-/// Whether a squared radius of the plane z = 1 is so small that sqrt, which has no slope at 0 for a dual number, is to
-/// be avoided.
-template <typename Scalar>
-[[nodiscard]] bool is_on_axis(const Scalar& radius_sq) noexcept {
-  return radius_sq < Scalar(std::numeric_limits<Scalar>::epsilon());
-}
-
-/// Distorts the point (x, y) of the plane z = 1; false beyond the angle to which r rises.
-template <typename Scalar>
-[[nodiscard]] bool distort(const KannalaBrandtCamera<Scalar>& camera, const Scalar& x, const Scalar& y,
-                           DistortedPoint<Scalar>& d) noexcept {
-  using std::atan;
-  using std::sqrt;
-  const Scalar s = x * x + y * y, third = Scalar(1) / Scalar(3);
-  const bool on_axis = is_on_axis(s);
-  const Scalar radius = on_axis ? Scalar(0) : Scalar(sqrt(s)), angle = on_axis ? Scalar(0) : Scalar(atan(radius));
-  if (!camera.rises_to(angle)) return false;
-  // r / |(x, y)|; its slope along x is x times twice_slope, along y y times that.
-  const Scalar ratio =
-      on_axis ? Scalar(Scalar(1) + (camera.k1 - third) * s) : Scalar(angle * camera.stretch(angle) / radius);
-  const Scalar twice_slope =
-      on_axis ? Scalar(Scalar(2) * (camera.k1 - third)) : Scalar((camera.slope(angle) / (Scalar(1) + s) - ratio) / s);
-  d = {x * ratio, y * ratio, ratio + x * x * twice_slope, x * y * twice_slope, ratio + y * y * twice_slope};
-  return true;
-}
-
-}  // namespace CFP_ISA
-}  // namespace detail
-
 /// With the angle t of a ray from the axis, and x, y = X/Z, Y/Z:
 ///   r(t) = t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8)
 ///   u = fx r(t) x / |(x, y)| + cx, v = fy r(t) y / |(x, y)| + cy.
@@ -88,6 +53,28 @@ struct KannalaBrandtCamera {
     return true;
   }
 
+  /// Whether a squared radius of the plane z = 1 is so small that sqrt, which has no slope at 0 for a dual number, is
+  /// to be avoided.
+  [[nodiscard]] CFP_INLINE static bool is_on_axis(const Scalar& radius_sq) noexcept {
+    return radius_sq < Scalar(std::numeric_limits<Scalar>::epsilon());
+  }
+  /// Distorts the point (x, y) of the plane z = 1; false beyond the angle to which r rises.
+  [[nodiscard]] CFP_INLINE bool distort(const Scalar& x, const Scalar& y,
+                                        detail::DistortedPoint<Scalar>& d) const noexcept {
+    using std::atan;
+    using std::sqrt;
+    const Scalar s = x * x + y * y, third = Scalar(1) / Scalar(3);
+    const bool on_axis = is_on_axis(s);
+    const Scalar radius = on_axis ? Scalar(0) : Scalar(sqrt(s)), angle = on_axis ? Scalar(0) : Scalar(atan(radius));
+    if (!rises_to(angle)) return false;
+    // r / |(x, y)|; its slope along x is x times twice_slope, along y y times that.
+    const Scalar ratio = on_axis ? Scalar(Scalar(1) + (k1 - third) * s) : Scalar(angle * stretch(angle) / radius);
+    const Scalar twice_slope =
+        on_axis ? Scalar(Scalar(2) * (k1 - third)) : Scalar((slope(angle) / (Scalar(1) + s) - ratio) / s);
+    d = {x * ratio, y * ratio, ratio + x * x * twice_slope, x * y * twice_slope, ratio + y * y * twice_slope};
+    return true;
+  }
+
   /// Projects a point of the camera frame. Returns whether the projection is valid: a finite z >
   /// Tolerance::min_depth, an angle up to which r rises, a finite pixel; otherwise pixel and jacobian are left as they
   /// were. jacobian: d pixel / d point.
@@ -103,7 +90,7 @@ struct KannalaBrandtCamera {
     using std::tan;
     const Scalar x = (pixel.x() - cx) / fx, y = (pixel.y() - cy) / fy, s = x * x + y * y;
     if (!is_finite(s)) return false;
-    if (detail::is_on_axis(s)) {
+    if (is_on_axis(s)) {
       if (!is_finite(Scalar(k1 + k2 + k3 + k4))) return false;
       const Scalar ratio = Scalar(1) - (k1 - Scalar(1) / Scalar(3)) * s;
       ray = {x * ratio, y * ratio, Scalar(1)};

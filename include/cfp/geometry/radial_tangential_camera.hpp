@@ -10,9 +10,6 @@
 
 namespace cfp {
 
-template <typename Scalar>
-struct RadialTangentialCamera;
-
 namespace detail {
 inline namespace CFP_ISA {
 
@@ -33,24 +30,6 @@ template <typename Scalar>
       b < zero ? Scalar(sqrt(discriminant) - b) : Scalar(-b - sqrt(discriminant));  // the sum without cancellation
   const auto fails_at = [&](const Scalar& s) { return s > zero && s < end && !(value(s) > zero); };
   return !fails_at(q / (Scalar(3) * c)) && !fails_at(a / q);
-}
-
-/// Distorts the point (x, y) of the plane z = 1; false beyond the fold or when not finite.
-template <typename Scalar>
-[[nodiscard]] bool distort(const RadialTangentialCamera<Scalar>& camera, const Scalar& x, const Scalar& y,
-                           DistortedPoint<Scalar>& d) noexcept {
-  const Scalar &k1 = camera.k1, &k2 = camera.k2, &k3 = camera.k3, &p1 = camera.p1, &p2 = camera.p2;
-  const Scalar s = x * x + y * y;
-  const Scalar radial = Scalar(1) + s * (k1 + s * (k2 + s * k3));
-  // The slope of `radial` along x is x times this, along y y times this.
-  const Scalar twice_slope = Scalar(2) * (k1 + s * (Scalar(2) * k2 + s * Scalar(3) * k3));
-  d.x = x * radial + Scalar(2) * p1 * x * y + p2 * (s + Scalar(2) * x * x);
-  d.y = y * radial + p1 * (s + Scalar(2) * y * y) + Scalar(2) * p2 * x * y;
-  d.xx = radial + x * x * twice_slope + Scalar(2) * p1 * y + Scalar(6) * p2 * x;
-  d.xy = x * y * twice_slope + Scalar(2) * p1 * x + Scalar(2) * p2 * y;
-  d.yy = radial + y * y * twice_slope + Scalar(6) * p1 * y + Scalar(2) * p2 * x;
-  return is_finite(d.x) && is_finite(d.y) && d.xx * d.yy - d.xy * d.xy > Scalar(0) &&
-         stays_positive(Scalar(Scalar(3) * k1), Scalar(Scalar(5) * k2), Scalar(Scalar(7) * k3), s);
 }
 
 }  // namespace CFP_ISA
@@ -81,6 +60,22 @@ struct RadialTangentialCamera {
   /// them.
   [[nodiscard]] CFP_INLINE PinholeCamera<Scalar> pinhole() const noexcept { return {fx, fy, cx, cy}; }
 
+  /// Distorts the point (x, y) of the plane z = 1; false beyond the fold or when not finite.
+  [[nodiscard]] CFP_INLINE bool distort(const Scalar& x, const Scalar& y,
+                                        detail::DistortedPoint<Scalar>& d) const noexcept {
+    const Scalar s = x * x + y * y;
+    const Scalar radial = Scalar(1) + s * (k1 + s * (k2 + s * k3));
+    // The slope of `radial` along x is x times this, along y y times this.
+    const Scalar twice_slope = Scalar(2) * (k1 + s * (Scalar(2) * k2 + s * Scalar(3) * k3));
+    d.x = x * radial + Scalar(2) * p1 * x * y + p2 * (s + Scalar(2) * x * x);
+    d.y = y * radial + p1 * (s + Scalar(2) * y * y) + Scalar(2) * p2 * x * y;
+    d.xx = radial + x * x * twice_slope + Scalar(2) * p1 * y + Scalar(6) * p2 * x;
+    d.xy = x * y * twice_slope + Scalar(2) * p1 * x + Scalar(2) * p2 * y;
+    d.yy = radial + y * y * twice_slope + Scalar(6) * p1 * y + Scalar(2) * p2 * x;
+    return is_finite(d.x) && is_finite(d.y) && d.xx * d.yy - d.xy * d.xy > Scalar(0) &&
+           detail::stays_positive(Scalar(Scalar(3) * k1), Scalar(Scalar(5) * k2), Scalar(Scalar(7) * k3), s);
+  }
+
   /// Projects a point of the camera frame. Returns whether the projection is valid: a finite z >
   /// Tolerance::min_depth, before the fold, a finite pixel; otherwise pixel and jacobian are left as they were.
   /// jacobian: d pixel / d point.
@@ -106,7 +101,7 @@ struct RadialTangentialCamera {
     for (int evaluation = 0; evaluation < 40 && !(error_sq <= enough_sq); ++evaluation) {
       detail::DistortedPoint<Scalar> d;
       const Vector2<Scalar> candidate = found + step;
-      const bool valid = detail::distort(*this, candidate.x(), candidate.y(), d);
+      const bool valid = distort(candidate.x(), candidate.y(), d);
       const Vector2<Scalar> error = target - Vector2<Scalar>(d.x, d.y);
       const Scalar candidate_error_sq = error.squaredNorm();
       if (!valid || !(candidate_error_sq < error_sq)) {
