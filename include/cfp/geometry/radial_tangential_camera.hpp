@@ -6,7 +6,6 @@
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/geometry/camera.hpp"
-#include "cfp/geometry/distorted_point_impl.hpp"
 
 namespace cfp {
 
