@@ -52,7 +52,6 @@ struct FundamentalSearch {
   // deviations lose least over three kinds of noise (cfp_fundamental_scale_study).
   static constexpr T score_scale = T(1) / 4, inner_scale = T(1) / 16, final_scale = T(2.25 * 2.25);
 
-  [[nodiscard]] std::size_t size() const noexcept { return pairs.size; }
   [[nodiscard]] span<const double> weights() const noexcept { return {pairs.row(score_weight), pairs.size}; }
   [[nodiscard]] double total_weight() const noexcept { return pairs.total_shared; }
 
@@ -152,7 +151,7 @@ struct FundamentalSearch {
   // Moisan and Stival, "A probabilistic criterion to detect rigid point matches between two images and estimate the
   // fundamental matrix", IJCV 2004.
   [[nodiscard]] T nats() const noexcept {
-    const T n = static_cast<T>(size()), k = near_pairs, reach = T(0.25);
+    const T n = static_cast<T>(pairs.size), k = near_pairs, reach = T(0.25);
     if (!(k > 7)) return -std::numeric_limits<T>::infinity();
     const T subsets = k * std::log(n / k) + (n > k ? (n - k) * std::log(n / (n - k)) : T(0));
     return (k - 7) * std::log(reach / (T(2.5) * std::sqrt(noise_variance))) - subsets - 7 * std::log((k - 3) / T(3.38));
@@ -197,7 +196,7 @@ struct FundamentalSearch {
           weight += select(near, w, zero);
         }
         const T near = reduce_add(weight);
-        near_pairs = near / total_weight() * static_cast<T>(size());
+        near_pairs = near / total_weight() * static_cast<T>(pairs.size);
         if (!(near > 0)) break;
         const T freedom = near_pairs / (std::max)(near_pairs - 7, T(1));  // F follows seven of their distances
         const T next = (std::max)(freedom * reduce_add(sum) / near / T(0.911), floor);

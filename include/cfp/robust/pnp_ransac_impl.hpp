@@ -74,7 +74,6 @@ struct PnpProblem {
   const ObservationArrays& in;
   T limit;  // squared threshold, px^2
 
-  [[nodiscard]] std::size_t size() const noexcept { return in.size; }
   [[nodiscard]] span<const double> weights() const noexcept { return in.weights(); }
   [[nodiscard]] double total_weight() const noexcept { return in.total_weight; }
 

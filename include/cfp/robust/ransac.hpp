@@ -146,7 +146,7 @@ struct RansacSearch {
 
 /// Draws samples until one without mismatches is among them with the confidence asked for. The problem has
 ///   Model, sample_size
-///   size(), weights() (> 0), total_weight()     of the data
+///   weights() (> 0), total_weight()             of the data
 ///   solve(sample, visit)                        calls visit(model) for each model of a sample
 ///   double cost(model, bound)                   may give up with any value above the bound
 ///   void optimize(candidate)                    local optimisation; keeps the better of both
@@ -157,17 +157,18 @@ template <typename Problem>
                                                               Random& random, std::vector<double>& sums) {
   using Model = typename Problem::Model;
   constexpr std::size_t sample_size = Problem::sample_size;
+  const span<const double> weights = problem.weights();
   const bool weighted =
-      options.sampling == Sampling::weighted && problem.total_weight() < 0.9 * static_cast<double>(problem.size());
-  MinimalSampler<sample_size> sampler(problem.size(), weighted ? problem.weights() : span<const double>(), sums);
+      options.sampling == Sampling::weighted && problem.total_weight() < 0.9 * static_cast<double>(weights.size());
+  MinimalSampler<sample_size> sampler(weights.size(), weighted ? weights : span<const double>(), sums);
   RansacSearch<Model> search;
   std::size_t needed = options.max_iterations;
   double best_sample_cost = problem.total_weight();
   const auto count_needed = [&] {
     const auto is_inlier = problem.inlier_test(search.best.model);
     double inliers = 0, all = 0;
-    for (std::size_t i = 0; i < problem.size(); ++i) {
-      const double one = weighted ? problem.weights()[i] : 1.0;
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+      const double one = weighted ? weights[i] : 1.0;
       inliers += is_inlier(i) ? one : 0.0;
       all += one;
     }
