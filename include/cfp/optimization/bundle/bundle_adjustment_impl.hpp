@@ -70,8 +70,8 @@ void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& work
   workspace.state.points.resize(index.points);
   for (BundleLinearization* linear : {&workspace.linear, &workspace.next_linear}) {
     linear->slots.resize(BundleLinearization::slot_doubles * index.slots.size());
-    linear->points.resize(BundleLinearization::point_doubles * index.points);
-    linear->poses.resize(BundleLinearization::pose_doubles * index.free_poses);
+    linear->points.resize(BundleKind<3>::system * index.points);
+    linear->poses.resize(BundleKind<6>::system * index.free_poses);
     linear->costs.resize(poses);
   }
   for (std::size_t k = 0; k < poses; ++k) {

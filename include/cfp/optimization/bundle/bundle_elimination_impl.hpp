@@ -30,37 +30,6 @@ struct BundleSchur {
 
 inline namespace CFP_ISA {
 
-/// Poses have 6 numbers, points 3; E of what is eliminated, 9 - E of what is kept.
-template <int N>
-struct BundleKind {
-  static constexpr std::size_t size = static_cast<std::size_t>(N), block = size * size, system = block + size;
-  using Matrix = Eigen::Matrix<double, N, N>;
-  using Vector = Eigen::Matrix<double, N, 1>;
-
-  static const std::vector<double>& systems(const BundleLinearization& linear) noexcept {
-    return N == 6 ? linear.poses : linear.points;
-  }
-  static Eigen::Map<const Vector> gradient(const BundleLinearization& linear, std::size_t i) noexcept {
-    return Eigen::Map<const Vector>(systems(linear).data() + system * i + block);
-  }
-  static std::size_t slot(const BundleIndex& index, std::size_t s) noexcept {
-    return to_index(N == 6 ? index.slots[s].pose : index.slots[s].point);
-  }
-  /// lambda D
-  static Vector damping(const BundleLinearization& linear, double lambda, std::size_t i) noexcept {
-    const Eigen::Map<const Matrix> H(systems(linear).data() + system * i);
-    Vector D;
-    for (int b = 0; b < N; b += 3)
-      D.template segment<3>(b).setConstant(lambda * (std::max)(H.diagonal().template segment<3>(b).sum() / 3, 1e-30));
-    return D;
-  }
-  static Matrix damped(const BundleLinearization& linear, double lambda, std::size_t i) noexcept {
-    Matrix A = Eigen::Map<const Matrix>(systems(linear).data() + system * i);
-    A.diagonal() += damping(linear, lambda, i);
-    return A;
-  }
-};
-
 /// d = x - c
 [[nodiscard]] inline Vector3<double> offset(const BundleState& state, std::size_t pose, std::size_t point) noexcept {
   return state.points[point] - state.poses[pose].center;

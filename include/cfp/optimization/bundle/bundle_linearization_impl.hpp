@@ -26,13 +26,10 @@ struct BundleState {
 
 /// The normal equations at one state.
 struct BundleLinearization {
-  static constexpr std::size_t slot_doubles = 9;    // N (00 01 02 11 12 22), n
-  static constexpr std::size_t point_doubles = 12;  // H: 3x3; g
-  static constexpr std::size_t pose_doubles = 42;   // H: 6x6; g
+  static constexpr std::size_t slot_doubles = 9;  // N (00 01 02 11 12 22), n
   std::vector<double> slots;
-  std::vector<double> points;
-  std::vector<double> poses;  // free ones only
-  std::vector<double> costs;  // per pose; NaN when an observation is behind its camera
+  std::vector<double> points, poses;  // H, g: BundleKind::system numbers each; free poses only
+  std::vector<double> costs;          // per pose; NaN when an observation is behind its camera
 };
 
 /// Sums over the observations of one pose, one partial sum per lane: H's blocks N (6), hat(d) N (9), hat(d) N hat(d)^T
@@ -40,6 +37,37 @@ struct BundleLinearization {
 using BundlePoseSums = double[27][BundleChunk::lanes];
 
 inline namespace CFP_ISA {
+
+/// Poses have 6 numbers, points 3; E of what is eliminated, 9 - E of what is kept.
+template <int N>
+struct BundleKind {
+  static constexpr std::size_t size = static_cast<std::size_t>(N), block = size * size, system = block + size;
+  using Matrix = Eigen::Matrix<double, N, N>;
+  using Vector = Eigen::Matrix<double, N, 1>;
+
+  static const std::vector<double>& systems(const BundleLinearization& linear) noexcept {
+    return N == 6 ? linear.poses : linear.points;
+  }
+  static Eigen::Map<const Vector> gradient(const BundleLinearization& linear, std::size_t i) noexcept {
+    return Eigen::Map<const Vector>(systems(linear).data() + system * i + block);
+  }
+  static std::size_t slot(const BundleIndex& index, std::size_t s) noexcept {
+    return to_index(N == 6 ? index.slots[s].pose : index.slots[s].point);
+  }
+  /// lambda D
+  static Vector damping(const BundleLinearization& linear, double lambda, std::size_t i) noexcept {
+    const Eigen::Map<const Matrix> H(systems(linear).data() + system * i);
+    Vector D;
+    for (int b = 0; b < N; b += 3)
+      D.template segment<3>(b).setConstant(lambda * (std::max)(H.diagonal().template segment<3>(b).sum() / 3, 1e-30));
+    return D;
+  }
+  static Matrix damped(const BundleLinearization& linear, double lambda, std::size_t i) noexcept {
+    Matrix A = Eigen::Map<const Matrix>(systems(linear).data() + system * i);
+    A.diagonal() += damping(linear, lambda, i);
+    return A;
+  }
+};
 
 /// N, n and the cost of the chunk.
 template <bool Stereo, typename Loss>
@@ -153,7 +181,7 @@ void linearize_pose(const BundleProblem<Camera, Scalar>& problem, const BundleIn
     }
   }
   out.costs[k] = cost[0] + cost[1];
-  if (is_free) store_pose(sums, out.poses.data() + k * BundleLinearization::pose_doubles);
+  if (is_free) store_pose(sums, out.poses.data() + k * BundleKind<6>::system);
 }
 
 /// The points' own blocks, from their slots.
@@ -166,7 +194,7 @@ inline void linearize_points(const BundleIndex& index, BundleLinearization& out)
       for (std::size_t e = 0; e < BundleLinearization::slot_doubles; ++e)
         sum[e] += out.slots[BundleLinearization::slot_doubles * s + e];
     }
-    double* const point = out.points.data() + BundleLinearization::point_doubles * to_index(j);
+    double* const point = out.points.data() + BundleKind<3>::system * to_index(j);
     for (int e = 0; e < 9; ++e) point[e] += sum[symmetric[e / 3][e % 3]];
     for (int e = 0; e < 3; ++e) point[9 + e] += sum[6 + e];
   }
