@@ -32,20 +32,20 @@ inline constexpr double most_motion_distance_sq = 22.5;
 
 inline namespace CFP_ISA {
 
-/// The prior and the pairs on no object as a model of least_squares.hpp. The noise is given; the sums and the distances
-/// of the pairs, no_distance of those that do not count, are those of the last evaluation.
+/// A host's motion and the pairs on no object as a model of least_squares.hpp. The sums and the distances of the pairs,
+/// no_distance of those that do not count, are those of the last evaluation.
 template <typename Scalar>
-struct RefinementModel {
-  const UncertainMotion<double>& prior;
-  const Matrix6<double>& information;  // of the prior; 0: it is exact
+struct MotionRefinement {
   const FlowPairs<Scalar>& flow;
   span<const char> outside;
   const PinholeCamera<Scalar>& camera;
-  const MotionDistanceOptions& options;
+  const CameraMotionOptions& options;
   std::vector<Scalar>& distances;
-  Scalar sigma_px = 1;
-  double apart_sq = 0;                              // from the prior, in squares of its sigmas
-  double pairs = 0, agreeing = 0, coordinates = 0;  // the last two: sums by the weights of the loss
+  UncertainMotion<double> prior;
+  Matrix6<double> information = Matrix6<double>::Zero();  // of the prior; 0: it is exact
+  Scalar sigma_px = 1;                                    // the noise
+  double apart_sq = 0;                                    // from the prior, in squares of its sigmas
+  double pairs = 0, agreeing = 0, coordinates = 0;        // the last two: sums by the weights of the loss
 
   double linearize(const SE3<double>& T_cur_prev, NormalEquations<6>& equations) noexcept {
     const SE3<Scalar> T = T_cur_prev.template cast<Scalar>();
@@ -62,7 +62,7 @@ struct RefinementModel {
       const Scalar sigma = sigma_px * flow.relative_sigma(i);
       MotionResidual<Scalar> pair;
       if (!likely_residual<PinholeCamera<Scalar>, Scalar>(flow.previous[i], flow.depth(i), flow.current[i], T, camera,
-                                                          sigma, options, pair))
+                                                          sigma, options.distance, pair))
         continue;
       const PairTerm term = add_pair(pair, static_cast<double>(sigma), Vector6<double>::Zero(), equations);
       if (!(term.weight > 0)) continue;
@@ -76,66 +76,54 @@ struct RefinementModel {
   [[nodiscard]] SE3<double> moved(const SE3<double>& T, const Vector6<double>& step) const noexcept {
     return se3_exp(step) * T;
   }
-};
 
-/// From the prior, which counts as one more observation; the first round with a loss of `first_scale` times its width.
-/// An exact prior stays as it is.
-template <typename Scalar>
-[[nodiscard]] RefinedMotion<Scalar> refine_from(const UncertainMotion<double>& prior, const FlowPairs<Scalar>& flow,
-                                                span<const char> outside, const PinholeCamera<Scalar>& camera,
-                                                const CameraMotionOptions& options, double first_scale,
-                                                std::vector<Scalar>& distances) {
-  constexpr int rounds = 2;
-  LevenbergMarquardtOptions steps;
-  steps.max_iterations = 4;
-  steps.min_relative_decrease = 1e-3;
-  RefinedMotion<Scalar> motion;
-  const bool exact = prior.covariance.isZero(0);
-  UncertainMotion<double> refined = prior;
-  Matrix6<double> information = Matrix6<double>::Zero(), covariance;
-  if (!exact && !invert_normal_equations<6>(Matrix6<double>(prior.covariance), 1e-14, information)) return motion;
-  distances.resize(outside.size());
-  RefinementModel<Scalar> model{prior, information, flow, outside, camera, options.distance, distances};
-  model.sigma_px = Scalar(options.max_sigma_px);
-  const auto measure_noise = [&] {
-    NormalEquations<6> equations;
-    model.linearize(refined.T_cur_prev, equations);
-    motion.coordinates = model.coordinates > 1.5 * model.agreeing ? 2 : 1;
-    model.sigma_px = motion.sigma_px = flow_sigma(span<Scalar>(distances), motion.coordinates, options);
-    return model.pairs >= static_cast<double>(options.min_pairs) && model.agreeing > 0;
-  };
-  for (int round = 0; round < rounds; ++round) {
-    if (!measure_noise()) return motion;
-    if (exact) continue;
-    if (round == 0) model.sigma_px *= static_cast<Scalar>(first_scale);
-    DenseLeastSquares<6, SE3<double>, RefinementModel<Scalar>> problem(model, refined.T_cur_prev, 1e-14);
-    minimize_least_squares(problem, steps);
-    if (!invert_normal_equations<6>(problem.equations().H, 1e-14, covariance)) return motion;
-    refined.T_cur_prev = problem.state();
-    refined.covariance = covariance;
+  /// From the prior, which counts as one more observation; the first round with a loss of `first_scale` times its
+  /// width. An exact prior stays as it is.
+  [[nodiscard]] RefinedMotion<Scalar> refine(double first_scale) {
+    constexpr int rounds = 2;
+    LevenbergMarquardtOptions steps;
+    steps.max_iterations = 4;
+    steps.min_relative_decrease = 1e-3;
+    RefinedMotion<Scalar> motion;
+    const bool exact = prior.covariance.isZero(0);
+    UncertainMotion<double> refined = prior;
+    Matrix6<double> covariance;
+    information.setZero();
+    if (!exact && !invert_normal_equations<6>(Matrix6<double>(prior.covariance), 1e-14, information)) return motion;
+    distances.resize(outside.size());
+    sigma_px = Scalar(options.max_sigma_px);
+    const auto measure_noise = [&] {
+      NormalEquations<6> equations;
+      linearize(refined.T_cur_prev, equations);
+      motion.coordinates = coordinates > 1.5 * agreeing ? 2 : 1;
+      sigma_px = motion.sigma_px = flow_sigma(span<Scalar>(distances), motion.coordinates, options);
+      return pairs >= static_cast<double>(options.min_pairs) && agreeing > 0;
+    };
+    for (int round = 0; round < rounds; ++round) {
+      if (!measure_noise()) return motion;
+      if (exact) continue;
+      if (round == 0) sigma_px *= static_cast<Scalar>(first_scale);
+      DenseLeastSquares<6, SE3<double>, MotionRefinement> problem(*this, refined.T_cur_prev, 1e-14);
+      minimize_least_squares(problem, steps);
+      if (!invert_normal_equations<6>(problem.equations().H, 1e-14, covariance)) return motion;
+      refined.T_cur_prev = problem.state();
+      refined.covariance = covariance;
+    }
+    motion.known = measure_noise() && agreeing >= options.min_inlier_share * pairs;
+    static_cast<UncertainMotion<Scalar>&>(motion) = refined.template cast<Scalar>();
+    motion.apart_sq = apart_sq;
+    return motion;
   }
-  motion.known = measure_noise() && model.agreeing >= options.min_inlier_share * model.pairs;
-  static_cast<UncertainMotion<Scalar>&>(motion) = refined.template cast<Scalar>();
-  motion.apart_sq = model.apart_sq;
-  return motion;
-}
 
-/// A tight loss keeps to the prior where something that moves would take a wide one along, and loses a prior that errs
-/// much: whichever leaves less noise, where that of the wide one is more than the flow's own may be.
-template <typename Scalar>
-[[nodiscard]] RefinedMotion<Scalar> refine_wide_or_tight(const UncertainMotion<double>& prior,
-                                                         const FlowPairs<Scalar>& flow, span<const char> outside,
-                                                         const PinholeCamera<Scalar>& camera,
-                                                         const CameraMotionOptions& options,
-                                                         std::vector<Scalar>& distances) {
-  const auto refine = [&](double scale) {
-    return refine_from(prior, flow, outside, camera, options, scale, distances);
-  };
-  const RefinedMotion<Scalar> wide = refine(1);
-  if (wide.known && wide.sigma_px <= Scalar(options.search_above_px)) return wide;
-  const RefinedMotion<Scalar> tight = refine(1.0 / 3);
-  return tight.known && !(wide.known && wide.sigma_px <= tight.sigma_px) ? tight : wide;
-}
+  /// A tight loss keeps to the prior where something that moves would take a wide one along, and loses a prior that
+  /// errs much: whichever leaves less noise, where that of the wide one is more than the flow's own may be.
+  [[nodiscard]] RefinedMotion<Scalar> refine_wide_or_tight() {
+    const RefinedMotion<Scalar> wide = refine(1);
+    if (wide.known && wide.sigma_px <= Scalar(options.search_above_px)) return wide;
+    const RefinedMotion<Scalar> tight = refine(1.0 / 3);
+    return tight.known && !(wide.known && wide.sigma_px <= tight.sigma_px) ? tight : wide;
+  }
+};
 
 }  // namespace CFP_ISA
 }  // namespace detail
@@ -156,25 +144,26 @@ inline namespace CFP_ISA {
 /// inverse, or if even the larger C is contradicted. An exact motion (C = 0) stays, and the noise of the pairs is
 /// measured. O(pairs); allocates `distances` alone. Not in the paper (cfp_object_motion_study).
 template <typename Scalar>
-[[nodiscard]] RefinedMotion<Scalar> refine_camera_motion(UncertainMotion<double> prior, const FlowPairs<Scalar>& flow,
-                                                         span<const char> outside, const PinholeCamera<Scalar>& camera,
+[[nodiscard]] RefinedMotion<Scalar> refine_camera_motion(const UncertainMotion<double>& prior,
+                                                         const FlowPairs<Scalar>& flow, span<const char> outside,
+                                                         const PinholeCamera<Scalar>& camera,
                                                          const CameraMotionOptions& options,
                                                          std::vector<Scalar>& distances) {
   CFP_ASSERT(outside.size() == flow.current.size());
-  const auto refine = [&] { return detail::refine_wide_or_tight(prior, flow, outside, camera, options, distances); };
-  RefinedMotion<Scalar> motion = refine();
+  detail::MotionRefinement<Scalar> refinement{flow, outside, camera, options, distances, prior};
+  RefinedMotion<Scalar> motion = refinement.refine_wide_or_tight();
   const auto inside = static_cast<std::size_t>(std::count(outside.begin(), outside.end(), char(0)));
   motion.contradicted =
       motion.known ? motion.apart_sq > detail::most_motion_distance_sq : outside.size() - inside >= options.min_pairs;
   if (!motion.known || !motion.contradicted) return motion;
-  const UncertainMotion<double> exact(prior.T_cur_prev);
-  RefinedMotion<Scalar> as_given = detail::refine_from(exact, flow, outside, camera, options, 1, distances);
+  refinement.prior.covariance.setZero();
+  RefinedMotion<Scalar> as_given = refinement.refine(1);
   if (as_given.known && as_given.sigma_px <= Scalar(1.2) * motion.sigma_px) {
     as_given.covariance = prior.covariance.template cast<Scalar>();
     return as_given;
   }
-  prior.covariance *= motion.apart_sq / 6;
-  motion = refine();
+  refinement.prior.covariance = prior.covariance * (motion.apart_sq / 6);
+  motion = refinement.refine_wide_or_tight();
   motion.contradicted = true;
   motion.known = motion.known && motion.apart_sq <= detail::most_motion_distance_sq;
   return motion;
