@@ -44,152 +44,129 @@ void measure_room(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow,
     flow_distances(model, flow, camera, options, span<Scalar>(room_distances));
 }
 
-/// Whether the flow tells by depth what moves.
+/// The search in one frame, whose flow has the depths that are known of it.
 template <typename Scalar>
-[[nodiscard]] bool is_judged_by_depth(const FlowPairs<Scalar>& flow, const FrameReport& report) noexcept {
-  return report.flow_model == FlowModelKind::motion && !flow.previous_depths.empty();
-}
-
-/// Sets scratch.samples to the scores of the flow pairs on no object and, judged by depth, of those with one; -1 of
-/// all others.
-template <typename Scalar>
-void score_pairs(const FlowPairs<Scalar>& flow, const ObjectProbabilityOptions& scored, FrameState<Scalar>& state) {
-  FrameScratch<Scalar>& scratch = state.scratch;
-  const std::vector<Scalar>& distances =
-      state.report.flow_model == FlowModelKind::motion_up_to_scale ? scratch.room_distances : state.flow_distances;
-  const bool by_depth = is_judged_by_depth(flow, state.report);
-  scratch.samples.assign(flow.current.size(), Scalar(-1));
-  for (std::size_t p = 0; p < flow.current.size(); ++p) {
-    const bool asked = scratch.outside[p] != 0 || (by_depth && is_valid_depth(flow.previous_depths[p]));
-    if (asked && has_distance(distances[p])) scratch.samples[p] = object_score(distances[p], scored);
-  }
-}
-
-/// Whether any of the pairs scored move, but so few of those on no object that it is not the camera, whose motion must
-/// rest on more than a few of them, too.
-template <typename Scalar>
-[[nodiscard]] bool some_move(const FlowPairs<Scalar>& flow, Scalar threshold, const UnreportedOptions& unreported,
-                             const FrameState<Scalar>& state) noexcept {
-  const FrameScratch<Scalar>& scratch = state.scratch;
-  std::size_t moving = 0, moving_outside = 0, all_outside = 0;
-  for (std::size_t p = 0; p < scratch.samples.size(); ++p) {
-    if (scratch.samples[p] < 0) continue;
-    const bool outside = scratch.outside[p] != 0, moves = scratch.samples[p] < threshold;
-    moving += moves ? 1U : 0U;
-    moving_outside += moves && outside ? 1U : 0U;
-    all_outside += outside ? 1U : 0U;
-  }
-  const double most = unreported.max_share * static_cast<double>(all_outside);
-  if (moving < unreported.pairs || static_cast<double>(moving_outside) > most) return false;
-  return !is_judged_by_depth(flow, state.report) ||
-         2 * share_with_depth(flow, span<const char>(scratch.outside)) >= unreported.min_known_depths;
-}
-
-/// Puts the pairs that score_pairs scores into scratch.grid where they move, into scratch.resting where they do not;
-/// false without some_move.
-template <typename Scalar>
-[[nodiscard]] bool gather_pairs_outside(const FlowPairs<Scalar>& flow, const FrameOptions& options,
-                                        FrameState<Scalar>& state) {
+struct UnreportedSearch {
+  FlowPairs<Scalar> flow;
+  const FrameOptions& options;
+  FrameState<Scalar>& state;
   const UnreportedOptions& unreported = options.coarse.unreported;
-  const Scalar threshold = static_cast<Scalar>(options.object_threshold);
   FrameScratch<Scalar>& scratch = state.scratch;
-  score_pairs(flow, scaled_to_flow(options.coarse.object, state.report), state);
-  if (!some_move(flow, threshold, unreported, state)) return false;
-  const Scalar radius_px = static_cast<Scalar>(unreported.radius_px);
-  const auto moves = [&](std::size_t p) { return scratch.samples[p] >= 0 && scratch.samples[p] < threshold; };
-  const auto rests = [&](std::size_t p) { return scratch.samples[p] >= threshold; };
-  fill_grid(flow.current, moves, radius_px, scratch.grid);
-  fill_grid(flow.current, rests, radius_px, scratch.resting);
-  return true;
-}
 
-/// Of the pairs near keypoint i, at its depth where both have one, and on no object where not: the median score of the
-/// nearest `pairs` that move, if these are nearer than as many that rest; -1 if not. Boxes seldom hold all of a person:
-/// what sticks out of one is told by the pairs in it.
-template <typename Scalar>
-[[nodiscard]] Scalar score_moving_near(std::size_t i, const FlowPairs<Scalar>& flow, const FrameOptions& options,
-                                       FrameState<Scalar>& state) {
-  const UnreportedOptions& unreported = options.coarse.unreported;
-  const Scalar radius_px = static_cast<Scalar>(unreported.radius_px);
-  const Scalar x = state.current.keypoints[i][0], y = state.current.keypoints[i][1];
-  const Scalar depth = state.current.depths.empty() ? Scalar(0) : state.current.depths[i];
-  const Scalar reach = static_cast<Scalar>(unreported.depth_share) * depth;
-  const bool by_depth = is_valid_depth(depth) && !flow.previous_depths.empty();
-  const auto visit_here = [&](const PointGrid<Scalar>& grid, Scalar below_sq, const auto& visit) {
-    visit_near(grid, x, y, [&](const auto& pair) {
-      const Scalar apart_sq = (pair.x - x) * (pair.x - x) + (pair.y - y) * (pair.y - y);
-      const bool here = by_depth && is_valid_depth(flow.previous_depths[pair.index])
-                            ? std::abs(flow.previous_depths[pair.index] - depth) <= reach
-                            : state.scratch.outside[pair.index] != 0;
-      return apart_sq < below_sq && here && visit(pair.index, apart_sq);
+  /// Scores the pairs on no object and, where depths tell what moves, those with one, in scratch.samples; -1 of all
+  /// others. Puts those that move into scratch.grid and those that do not into scratch.resting. False unless some move,
+  /// but so few of those on no object that it is not the camera, whose motion must rest on more than a few of them,
+  /// too.
+  [[nodiscard]] bool gather_pairs() {
+    const FlowModelKind kind = state.report.flow_model;
+    const bool by_depth = kind == FlowModelKind::motion && !flow.previous_depths.empty();
+    const std::vector<Scalar>& distances =
+        kind == FlowModelKind::motion_up_to_scale ? scratch.room_distances : state.flow_distances;
+    const ObjectProbabilityOptions scored = scaled_to_flow(options.coarse.object, state.report);
+    const Scalar threshold = static_cast<Scalar>(options.object_threshold);
+    std::vector<Scalar>& scores = scratch.samples;
+    std::size_t moving = 0, moving_outside = 0, all_outside = 0;
+    scores.assign(flow.current.size(), Scalar(-1));
+    for (std::size_t p = 0; p < scores.size(); ++p) {
+      const bool outside = scratch.outside[p] != 0;
+      const bool asked = outside || (by_depth && is_valid_depth(flow.previous_depths[p]));
+      if (!asked || !has_distance(distances[p])) continue;
+      scores[p] = object_score(distances[p], scored);
+      const bool moves = scores[p] < threshold;
+      moving += moves ? 1U : 0U;
+      moving_outside += moves && outside ? 1U : 0U;
+      all_outside += outside ? 1U : 0U;
+    }
+    const double most = unreported.max_share * static_cast<double>(all_outside);
+    if (moving < unreported.pairs || static_cast<double>(moving_outside) > most) return false;
+    if (by_depth && 2 * share_with_depth(flow, span<const char>(scratch.outside)) < unreported.min_known_depths)
+      return false;
+    const Scalar radius_px = static_cast<Scalar>(unreported.radius_px);
+    const auto moves = [&](std::size_t p) { return scores[p] >= 0 && scores[p] < threshold; };
+    const auto rests = [&](std::size_t p) { return scores[p] >= threshold; };
+    fill_grid(flow.current, moves, radius_px, scratch.grid);
+    fill_grid(flow.current, rests, radius_px, scratch.resting);
+    return true;
+  }
+
+  /// Of the pairs near keypoint i, at its depth where both have one, and on no object where not: the median score of
+  /// the nearest `pairs` that move, if these are nearer than as many that rest; -1 if not. Boxes seldom hold all of a
+  /// person: what sticks out of one is told by the pairs in it.
+  [[nodiscard]] Scalar score_moving_near(std::size_t i) {
+    const Scalar x = state.current.keypoints[i][0], y = state.current.keypoints[i][1];
+    const Scalar depth = state.current.depths.empty() ? Scalar(0) : state.current.depths[i];
+    const Scalar reach = static_cast<Scalar>(unreported.depth_share) * depth;
+    const bool by_depth = is_valid_depth(depth) && !flow.previous_depths.empty();
+    const auto visit_here = [&](const PointGrid<Scalar>& grid, Scalar below_sq, const auto& visit) {
+      visit_near(grid, x, y, [&](const auto& pair) {
+        const Scalar apart_sq = (pair.x - x) * (pair.x - x) + (pair.y - y) * (pair.y - y);
+        const bool here = by_depth && is_valid_depth(flow.previous_depths[pair.index])
+                              ? std::abs(flow.previous_depths[pair.index] - depth) <= reach
+                              : scratch.outside[pair.index] != 0;
+        return apart_sq < below_sq && here && visit(pair.index, apart_sq);
+      });
+    };
+    auto& moving = scratch.points;  // squared distance and score
+    moving.clear();
+    visit_here(scratch.grid, scratch.grid.reach * scratch.grid.reach, [&](std::uint32_t pair, Scalar apart_sq) {
+      moving.push_back({apart_sq, scratch.samples[pair]});
+      return false;
     });
-  };
-  FrameScratch<Scalar>& scratch = state.scratch;
-  auto& moving = scratch.points;  // squared distance and score
-  moving.clear();
-  visit_here(scratch.grid, radius_px * radius_px, [&](std::uint32_t pair, Scalar apart_sq) {
-    moving.push_back({apart_sq, scratch.samples[pair]});
-    return false;
-  });
-  if (moving.size() < unreported.pairs) return Scalar(-1);
-  const auto last = moving.begin() + static_cast<std::ptrdiff_t>(unreported.pairs);
-  std::partial_sort(moving.begin(), last, moving.end());
-  std::size_t resting = 0;
-  visit_here(scratch.resting, (*(last - 1))[0], [&](std::uint32_t, Scalar) { return ++resting == unreported.pairs; });
-  if (resting == unreported.pairs) return Scalar(-1);
-  scratch.values.clear();
-  for (auto near = moving.begin(); near != last; ++near) scratch.values.push_back((*near)[1]);
-  return quantile(span<Scalar>(scratch.values), 0.5);
-}
+    if (moving.size() < unreported.pairs) return Scalar(-1);
+    const auto last = moving.begin() + static_cast<std::ptrdiff_t>(unreported.pairs);
+    std::partial_sort(moving.begin(), last, moving.end());
+    std::size_t resting = 0;
+    visit_here(scratch.resting, (*(last - 1))[0], [&](std::uint32_t, Scalar) { return ++resting == unreported.pairs; });
+    if (resting == unreported.pairs) return Scalar(-1);
+    scratch.values.clear();
+    for (auto near = moving.begin(); near != last; ++near) scratch.values.push_back((*near)[1]);
+    return quantile(span<Scalar>(scratch.values), 0.5);
+  }
 
-/// Median depth of the keypoints on no object of which the flow says that they move, or of the others; infinite where
-/// fewer than a quarter of them have one, as beyond the range of a depth camera.
-template <typename Scalar>
-[[nodiscard]] Scalar median_depth_outside(bool moving, FrameState<Scalar>& state) {
-  std::vector<Scalar>& depths = state.scratch.depths;
-  depths.clear();
-  std::size_t all = 0;
-  for (std::size_t i = 0; i < state.size(); ++i) {
-    if (state.label[i] != KeypointLabel::outside || (state.flow_probability[i] >= 0) != moving) continue;
-    ++all;
-    if (i < state.current.depths.size() && is_valid_depth(state.current.depths[i]))
-      depths.push_back(state.current.depths[i]);
+  /// Median depth of the keypoints on no object of which the flow says that they move, or of the others; infinite where
+  /// fewer than a quarter of them have one, as beyond the range of a depth camera.
+  [[nodiscard]] Scalar median_depth_outside(bool moving) {
+    std::vector<Scalar>& depths = scratch.depths;
+    depths.clear();
+    std::size_t all = 0;
+    for (std::size_t i = 0; i < state.size(); ++i) {
+      if (state.label[i] != KeypointLabel::outside || (state.flow_probability[i] >= 0) != moving) continue;
+      ++all;
+      if (i < state.current.depths.size() && is_valid_depth(state.current.depths[i]))
+        depths.push_back(state.current.depths[i]);
+    }
+    return 4 * depths.size() < all ? std::numeric_limits<Scalar>::infinity() : quantile(span<Scalar>(depths), 0.5);
   }
-  return 4 * depths.size() < all ? std::numeric_limits<Scalar>::infinity() : quantile(span<Scalar>(depths), 0.5);
-}
 
-/// Whether what would count as moving may be something that nobody reported: not where it holds too many of the
-/// keypoints, nor where it holds half as many and is what lies farther, as a room behind a board that carries the
-/// motion with it.
-template <typename Scalar>
-[[nodiscard]] bool is_credible(std::size_t moving, std::size_t all, const UnreportedOptions& options,
-                               FrameState<Scalar>& state) {
-  const double most = options.max_share * static_cast<double>(all);
-  if (static_cast<double>(2 * moving) <= most) return true;
-  return static_cast<double>(moving) <= most && median_depth_outside(true, state) <= median_depth_outside(false, state);
-}
+  /// Whether what would count as moving may be something that nobody reported: not where it holds too many of the
+  /// keypoints, nor where it holds half as many and is what lies farther, as a room behind a board that carries the
+  /// motion with it.
+  [[nodiscard]] bool is_credible(std::size_t moving, std::size_t all) {
+    const double most = unreported.max_share * static_cast<double>(all);
+    if (static_cast<double>(2 * moving) <= most) return true;
+    return static_cast<double>(moving) <= most && median_depth_outside(true) <= median_depth_outside(false);
+  }
 
-/// Sets state.flow_probability of the keypoints on no object around which the flow moves: score_moving_near, as of an
-/// object that nobody reported. Of all others it stays as it is.
-template <typename Scalar>
-void score_flow_outside(const FlowPairs<Scalar>& flow, const FrameOptions& options, FrameState<Scalar>& state) {
-  if (!looks_for_unreported(options) || state.flow_distances.empty()) return;
-  if (!gather_pairs_outside(flow, options, state)) return;
-  std::size_t moving = 0, all = 0;
-  for (std::size_t i = 0; i < state.size(); ++i) {
-    if (state.label[i] != KeypointLabel::outside) continue;
-    state.flow_probability[i] = score_moving_near(i, flow, options, state);
-    moving += state.flow_probability[i] >= 0 ? 1U : 0U;
-    ++all;
+  /// Sets state.flow_probability of the keypoints on no object around which the flow moves: score_moving_near, as of an
+  /// object that nobody reported. Of all others it stays as it is.
+  void score_keypoints() {
+    if (!looks_for_unreported(options) || state.flow_distances.empty() || !gather_pairs()) return;
+    std::size_t moving = 0, all = 0;
+    for (std::size_t i = 0; i < state.size(); ++i) {
+      if (state.label[i] != KeypointLabel::outside) continue;
+      state.flow_probability[i] = score_moving_near(i);
+      moving += state.flow_probability[i] >= 0 ? 1U : 0U;
+      ++all;
+    }
+    if (is_credible(moving, all)) {
+      state.report.unreported = moving;
+      return;
+    }
+    for (std::size_t i = 0; i < state.size(); ++i) {
+      if (state.label[i] == KeypointLabel::outside) state.flow_probability[i] = Scalar(-1);
+    }
   }
-  if (is_credible(moving, all, options.coarse.unreported, state)) {
-    state.report.unreported = moving;
-    return;
-  }
-  for (std::size_t i = 0; i < state.size(); ++i) {
-    if (state.label[i] == KeypointLabel::outside) state.flow_probability[i] = Scalar(-1);
-  }
-}
+};
 
 }  // namespace CFP_ISA
 }  // namespace cfp::detail
