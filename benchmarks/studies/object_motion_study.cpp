@@ -258,8 +258,7 @@ void give_motion(Given given, const Scene& scene, cfp::Random& random, cfp::Fram
     std::vector<char> outside;
     for (const auto& p : scene.current) outside.push_back(contains(cfp::widened(scene.box, 0.1), p[0], p[1]) ? 0 : 1);
     cfp::CameraMotionWorkspace<double> workspace;
-    const auto motion = cfp::estimate_camera_motion(frame.flow, outside, cfp::SE3<double>(), camera,
-                                                    cfp::CameraMotionOptions(), workspace);
+    const auto motion = cfp::estimate_camera_motion(frame.flow, outside, camera, cfp::CameraMotionOptions(), workspace);
     if (motion.known) frame.T_cur_prev = {motion.T_cur_prev, 0, 0};
     return;
   }

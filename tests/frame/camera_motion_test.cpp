@@ -58,7 +58,7 @@ TEST_CASE("The camera's motion and the flow's noise are found at rest, in rotati
         const cfp::SE3<double> T = cfp_test::random_motion(t, r, random);
         const Flow f = flow(300, T, noise, i % 2 == 0 ? 0 : 4, random);
         const cfp::CameraMotion<double> found =
-            cfp::estimate_camera_motion<double>(f.pairs(), f.outside, cfp::SE3<double>(), camera, {}, workspace);
+            cfp::estimate_camera_motion<double>(f.pairs(), f.outside, camera, {}, workspace);
         REQUIRE(found.known);
         const cfp::SE3<double> error = T.inverse() * found.T_cur_prev;
         CHECK(error.translation.norm() < 0.02 * noise);
@@ -78,7 +78,7 @@ TEST_CASE("The covariance of the camera's motion is that of its error", "[frame]
     const cfp::SE3<double> T = cfp_test::random_motion(0.03, 0.02, random);
     const Flow f = flow(i % 2 == 0 ? 60 : 300, T, 0.2, 0, random);
     const cfp::CameraMotion<double> found =
-        cfp::estimate_camera_motion<double>(f.pairs(), f.outside, cfp::SE3<double>(), camera, {}, workspace);
+        cfp::estimate_camera_motion<double>(f.pairs(), f.outside, camera, {}, workspace);
     REQUIRE(found.known);
     const cfp::Vector6<double> error = cfp::se3_log(found.T_cur_prev * T.inverse());
     const Eigen::MatrixXd C = found.covariance;
@@ -97,7 +97,7 @@ TEST_CASE("What moves by less than the largest noise does not take the camera wi
     const cfp::SE3<double> T = cfp_test::random_motion(0.03, 0.02, random);
     const Flow f = flow(300, T, 0.05, 4, random, 2.0);  // inliers of a noise of 1 px, far off at one of 0.05 px
     const cfp::CameraMotion<double> found =
-        cfp::estimate_camera_motion<double>(f.pairs(), f.outside, cfp::SE3<double>(), camera, {}, workspace);
+        cfp::estimate_camera_motion<double>(f.pairs(), f.outside, camera, {}, workspace);
     REQUIRE(found.known);
     const cfp::SE3<double> error = T.inverse() * found.T_cur_prev;
     CHECK(error.translation.norm() < 0.0005);
@@ -110,7 +110,7 @@ TEST_CASE("Too few pairs with depth, or pairs that do not agree, give no motion"
   cfp::Random random(2, "no motion");
   cfp::CameraMotionWorkspace<double> workspace;
   const auto estimate = [&](const Flow& f) {
-    return cfp::estimate_camera_motion<double>(f.pairs(), f.outside, cfp::SE3<double>(), camera, {}, workspace).known;
+    return cfp::estimate_camera_motion<double>(f.pairs(), f.outside, camera, {}, workspace).known;
   };
   const std::size_t too_few = cfp::CameraMotionOptions{}.min_pairs - 1;
   Flow few = flow(too_few, cfp::SE3<double>(), 0.1, 0, random);
@@ -136,11 +136,10 @@ TEST_CASE("After warm-up the camera's motion allocates nothing, and equal input 
   const cfp::CameraMotionOptions options;
   const cfp::FlowPairs<double> pairs = f.pairs();
   const cfp::span<const char> outside(f.outside);
-  const auto first = cfp::estimate_camera_motion(pairs, outside, cfp::SE3<double>(), camera, options, workspace);
+  const auto first = cfp::estimate_camera_motion(pairs, outside, camera, options, workspace);
   auto second = first;
-  CHECK(cfp_test::allocations_in([&] {
-          second = cfp::estimate_camera_motion(pairs, outside, cfp::SE3<double>(), camera, options, workspace);
-        }) == 0);
+  CHECK(cfp_test::allocations_in(
+            [&] { second = cfp::estimate_camera_motion(pairs, outside, camera, options, workspace); }) == 0);
   CHECK(first.T_cur_prev.translation == second.T_cur_prev.translation);
   CHECK(first.sigma_px == second.sigma_px);
 }
@@ -232,7 +231,7 @@ TEST_CASE("A third of the pairs that move together neither turn the camera's mot
   cfp::Random random(8, "walker");
   cfp::CameraMotionWorkspace<double> workspace;
   const Flow calm = flow(400, cfp::SE3<double>(), 0.1, 0, random);  // as many pairs, but nothing to search for
-  REQUIRE(cfp::estimate_camera_motion<double>(calm.pairs(), calm.outside, {}, camera, {}, workspace).known);
+  REQUIRE(cfp::estimate_camera_motion<double>(calm.pairs(), calm.outside, camera, {}, workspace).known);
   cfp::CameraMotionOptions without;
   without.search_above_px = 1e9;
   int misled = 0;
@@ -242,17 +241,14 @@ TEST_CASE("A third of the pairs that move together neither turn the camera's mot
       const Flow f = flow(300, T, 0.1, 3, random, moves_px);
       cfp::CameraMotion<double> found;
       const auto find = [&] {
-        found = cfp::estimate_camera_motion<double>(f.pairs(), f.outside, cfp::SE3<double>(), camera, {}, workspace);
+        found = cfp::estimate_camera_motion<double>(f.pairs(), f.outside, camera, {}, workspace);
       };
       CHECK(cfp_test::allocations_in(find) == 0);
       REQUIRE(found.known);
       CHECK((T.inverse() * found.T_cur_prev).translation.norm() < 0.005);
       CHECK(found.sigma_px < 0.25);
       misled +=
-          cfp::estimate_camera_motion<double>(f.pairs(), f.outside, cfp::SE3<double>(), camera, without, workspace)
-                      .sigma_px > 0.25
-              ? 1
-              : 0;
+          cfp::estimate_camera_motion<double>(f.pairs(), f.outside, camera, without, workspace).sigma_px > 0.25 ? 1 : 0;
     }
   }
   CHECK(misled >= 10);
@@ -340,14 +336,14 @@ TEST_CASE("A wrong depth among neighbours that agree bends no motion", "[frame][
       f.outside.push_back(1);
     }
     const cfp::CameraMotion<double> found =
-        cfp::estimate_camera_motion<double>(f.pairs(), f.outside, {}, camera, {}, workspace);
+        cfp::estimate_camera_motion<double>(f.pairs(), f.outside, camera, {}, workspace);
     REQUIRE(found.known);
     cfp::Vector6<double> error;
     const cfp::SE3<double> difference = found.T_cur_prev * T.inverse();
     error << difference.translation, cfp::so3_log(difference.rotation);
     errors_m.push_back(error.head<3>().norm());
     normalized.push_back(error.dot(found.covariance.llt().solve(error)));
-    const auto of_all = cfp::estimate_camera_motion<double>(f.pairs(), f.outside, {}, camera, all, workspace);
+    const auto of_all = cfp::estimate_camera_motion<double>(f.pairs(), f.outside, camera, all, workspace);
     all_errors_m.push_back((of_all.T_cur_prev * T.inverse()).translation.norm());
   }
   std::nth_element(all_errors_m.begin(), all_errors_m.begin() + 30, all_errors_m.end());
@@ -383,7 +379,7 @@ TEST_CASE("A few near depths that are wrong do not tell the translation before a
     }
     const auto nees = [&](const cfp::CameraMotionOptions& options) {
       const cfp::CameraMotion<double> found =
-          cfp::estimate_camera_motion<double>(f.pairs(), f.outside, {}, camera, options, workspace);
+          cfp::estimate_camera_motion<double>(f.pairs(), f.outside, camera, options, workspace);
       REQUIRE(found.known);
       const cfp::Vector6<double> error = cfp::se3_log(found.T_cur_prev * T.inverse());
       return error.dot(found.covariance.llt().solve(error)) / 6;
@@ -402,7 +398,7 @@ TEST_CASE("A room whose neighbours share no depth keeps its pairs", "[frame][cam
   cfp::Random random(32, "no depth is shared");
   cfp::CameraMotionWorkspace<double> workspace;
   const Flow f = flow(300, cfp_test::random_motion(0.03, 0.01, random), 0.2, 0, random);
-  const auto found = cfp::estimate_camera_motion<double>(f.pairs(), f.outside, {}, camera, {}, workspace);
+  const auto found = cfp::estimate_camera_motion<double>(f.pairs(), f.outside, camera, {}, workspace);
   REQUIRE(found.known);
   const auto stays = [](const std::array<double, 3>& point) { return cfp::is_finite(point[0]); };
   CHECK(std::count_if(workspace.points.begin(), workspace.points.end(), stays) == std::ptrdiff_t(f.depths.size()));

@@ -131,7 +131,7 @@ TEST_CASE("What neighbours err by together is measured, and the motion is as unc
       REQUIRE(model.kind == cfp::FlowModelKind::motion);
       measured += model.shared_error_px / seeds;
       const cfp::CameraMotion<double> alone = cfp::estimate_camera_motion<double>(
-          {room.previous, room.current, depths}, room.outside, {}, room.camera, options.motion, workspace.motion);
+          {room.previous, room.current, depths}, room.outside, room.camera, options.motion, workspace.motion);
       const auto squared_error = [&](const cfp::UncertainMotion<double>& found) {
         const cfp::Vector6<double> error = cfp::se3_log(T * found.T_cur_prev.inverse());
         const Eigen::Matrix<double, 6, 6> covariance = found.covariance;

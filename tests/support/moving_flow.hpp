@@ -38,7 +38,7 @@ struct MovingFlow {
                                                    cfp::CameraMotionWorkspace<double>& workspace,
                                                    const cfp::PinholeCamera<double>& camera = flow_camera) const {
     const std::vector<char> outside(depths.size(), 1);
-    return cfp::estimate_camera_motion<double>({previous, current, depths}, outside, {}, camera, options, workspace);
+    return cfp::estimate_camera_motion<double>({previous, current, depths}, outside, camera, options, workspace);
   }
   /// By how many pixels that motion moves what is at rest at 2 m, at most.
   [[nodiscard]] double error_px(const cfp::CameraMotion<double>& found) const {

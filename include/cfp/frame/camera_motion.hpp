@@ -182,14 +182,14 @@ inline namespace CFP_ISA {
 
 /// The motion of the camera from the pairs of the undistorted image that `outside` marks as on no object and whose
 /// depth is known and shared by neighbours. Unknown where too few pairs have such a depth or agree. O(pairs).
-///  1. refine_pose from `start` at the largest noise; then the noise that the pairs show is measured.
+///  1. refine_pose from rest at the largest noise; then the noise that the pairs show is measured.
 ///  2. If that is at most search_above_px, or pnp_ransac finds nothing: refine_pose again, at the noise measured and
 ///     what the errors of the depths add to it under the motion so far.
 ///  3. Else, and where too few agreed to the first, from what pnp_ransac finds by the last round of `pose` alone, at a
 ///     third of its scale, then at its own; the second counts unless the noise grows by more than chance.
 template <typename Scalar>
 [[nodiscard]] CameraMotion<Scalar> estimate_camera_motion(const FlowPairs<Scalar>& flow, span<const char> outside,
-                                                          const SE3<double>& start, const PinholeCamera<Scalar>& camera,
+                                                          const PinholeCamera<Scalar>& camera,
                                                           const CameraMotionOptions& options,
                                                           CameraMotionWorkspace<Scalar>& workspace) {
   CFP_ASSERT(outside.size() == flow.current.size());
@@ -203,7 +203,7 @@ template <typename Scalar>
   workspace.search.sampling.reserve(outside.size());
   workspace.near_m = detail::depth_at_share(workspace.points, options.nearest_share, workspace.distances);
   const detail::PairsWithDepth<Scalar> pairs{flow, camera, options, workspace};
-  SE3<double> T = start;
+  SE3<double> T;
   const CameraMotion<Scalar> first = pairs.refine(Scalar(options.max_sigma_px), options.pose, T);
   const Scalar noise_px = first.known ? first.sigma_px : Scalar(options.max_sigma_px);
   if (!(noise_px > Scalar(options.search_above_px)) || !pairs.search(noise_px, T))

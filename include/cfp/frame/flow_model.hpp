@@ -239,7 +239,7 @@ FlowModel<Scalar> estimate_flow_model(const FlowPairs<Scalar>& flow, span<const 
   CFP_ASSERT(flow.previous.size() == flow.current.size() && outside.size() == flow.current.size());
   CFP_ASSERT(detail::fits(flow.current.size(), flow.previous_depths));
   const auto motion_from = [&](const FlowPairs<Scalar>& pairs) {
-    return estimate_camera_motion(pairs, outside, SE3<double>(), camera, options.motion, workspace.motion);
+    return estimate_camera_motion(pairs, outside, camera, options.motion, workspace.motion);
   };
   CameraMotion<Scalar> motion;
   if (options.use_depth) motion = motion_from(flow);

@@ -81,7 +81,7 @@ template <typename Scalar>
       state.boxes.empty() && !given && share_with_depth(flow, outside) < coarse.unreported.min_known_depths;
   if (!options.use_depth || flow.previous_depths.empty() || few_known) return {};
   CameraMotionWorkspace<Scalar>& workspace = state.scratch.flow.motion;
-  CameraMotion<Scalar> motion = estimate_camera_motion(flow, outside, SE3<double>(), camera, options.motion, workspace);
+  CameraMotion<Scalar> motion = estimate_camera_motion(flow, outside, camera, options.motion, workspace);
   if (!motion.known) return {};
   const bool straightened =
       !given && straighten(camera, options.motion, workspace, state.scratch.straight, flow, motion);
