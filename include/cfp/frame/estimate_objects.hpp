@@ -12,6 +12,7 @@
 #include "cfp/frame/object_members_impl.hpp"
 #include "cfp/frame/unreported_impl.hpp"
 #include "cfp/geometry/camera.hpp"
+#include "cfp/geometry/common_shift.hpp"
 #include "cfp/probability/object.hpp"
 
 namespace cfp {
@@ -39,7 +40,7 @@ void label_margin(const Box<Scalar>& box, const ForegroundResult& separated, con
 template <typename Scalar>
 void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
-  const FlowPairs<Scalar> flow = flow_with_depths(frame, state);
+  const FlowPairs<Scalar> flow{frame.flow.previous, frame.flow.current, state.flow_depths};
   const std::size_t n = flow.current.size();
   scratch.pair_label.assign(state.boxes.size() * n, PairLabel::outside);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
@@ -117,8 +118,12 @@ void score_objects(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow
     object = object_probability(scratch.samples, scored, scratch.values);
     if (object.status != Status::ok) continue;
     --state.report.unknown_objects;
-    if (!(scored.shared_error_px > 0)) continue;
-    const double shift = flow_shift(model, flow, scratch.members, camera, coarse.flow, scored.shared_error_px);
+    // The error of a motion that a host calls exact, which all pairs share, would be taken for theirs.
+    const bool told_by_depth = model.kind == FlowModelKind::motion && !model.motion.covariance.isZero(0);
+    if (!told_by_depth || !(scored.shared_error_px > 0)) continue;
+    const double shift =
+        common_shift(flow, scratch.members, model.motion, camera, noise_of(model, coarse.flow),
+                     coarse.flow.motion.distance, (std::max)(scored.shared_error_px, model.shared_error_px));
     object.static_probability = (std::min)(object.static_probability, shift_probability(shift));
   }
 }

@@ -11,7 +11,6 @@
 #include "cfp/frame/camera_motion.hpp"
 #include "cfp/frame/shared_error_impl.hpp"
 #include "cfp/geometry/camera.hpp"
-#include "cfp/geometry/common_shift.hpp"
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/robust/fundamental_ransac.hpp"
 
@@ -216,17 +215,6 @@ void flow_distances(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flo
     pairs.previous_depths = {};
   }
   motion_distances(pairs, model.motion, camera, detail::noise_of(model, options), distance, out);
-}
-
-/// What the pairs `members` share beyond the camera's motion and its error (common_shift); 0 where depths are not
-/// known, and under a motion that a host calls exact: its error, which all pairs share, would be taken for theirs.
-template <typename Scalar>
-[[nodiscard]] double flow_shift(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow,
-                                span<const std::int32_t> members, const PinholeCamera<Scalar>& camera,
-                                const FlowModelOptions& options, double shared_error_px) noexcept {
-  if (model.kind != FlowModelKind::motion || model.motion.covariance.isZero(0)) return 0;
-  return common_shift(flow, members, model.motion, camera, detail::noise_of(model, options), options.motion.distance,
-                      (std::max)(shared_error_px, model.shared_error_px));
 }
 
 /// What the pairs of the undistorted image are judged by, from those that `outside` marks as on no object: the

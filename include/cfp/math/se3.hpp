@@ -56,7 +56,7 @@ template <typename Scalar>
 [[nodiscard]] Vector6<Scalar> se3_log(const SE3<Scalar>& T) noexcept {
   Vector6<Scalar> xi;
   const Vector3<Scalar> w = so3_log(T.rotation);
-  xi.template head<3>() = so3_left_jacobian_inverse(w) * T.translation;
+  xi.template head<3>() = inverse(so3_left_jacobian(w)) * T.translation;
   xi.template tail<3>() = w;
   return xi;
 }

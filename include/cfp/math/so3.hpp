@@ -102,7 +102,8 @@ template <typename Scalar>
 }
 
 /// Left Jacobian of SO(3): exp(w + d) ~ exp(J_l(w) d) exp(w); also the factor between the translational tangent and the
-/// translation in the SE(3) exponential. I + b hat(w) + c hat(w)^2, c = (t - sin t)/t^3.
+/// translation in the SE(3) exponential. I + b hat(w) + c hat(w)^2, c = (t - sin t)/t^3. It has an inverse for |w| < 2
+/// pi.
 template <typename Scalar>
 [[nodiscard]] Matrix3<Scalar> so3_left_jacobian(const Vector3<Scalar>& w) noexcept {
   using std::sin;
@@ -121,12 +122,6 @@ template <typename Scalar>
     c = Scalar(1) / Scalar(6) - t2 / Scalar(120) * (Scalar(1) - t2 / Scalar(42) * (Scalar(1) - t2 / Scalar(72)));
   }
   return so3_series(w, b, c);
-}
-
-/// The inverse of so3_left_jacobian, for |w| < 2 pi.
-template <typename Scalar>
-[[nodiscard]] Matrix3<Scalar> so3_left_jacobian_inverse(const Vector3<Scalar>& w) noexcept {
-  return inverse(so3_left_jacobian(w));
 }
 
 /// The rotation of R's normalised quaternion: to first order the nearest one to an R that is nearly a rotation. Removes
