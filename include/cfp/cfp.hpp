@@ -33,6 +33,7 @@
 #include "cfp/frame/estimate_objects.hpp"
 #include "cfp/frame/explain.hpp"
 #include "cfp/frame/flow_model.hpp"
+#include "cfp/frame/flow_model_types.hpp"
 #include "cfp/frame/frame.hpp"
 #include "cfp/frame/frame_interval.hpp"
 #include "cfp/frame/frame_options.hpp"

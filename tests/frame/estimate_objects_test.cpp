@@ -534,6 +534,36 @@ TEST_CASE("With one camera nobody who stands moves for what F errs by, beside it
   }
 }
 
+TEST_CASE("As printed, F is exact, and so are keypoints judged", "[frame]") {
+  DynamicScene<double> scene;
+  cfp::Random random(3, "as printed");
+  scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.005, 0.045, 0.02, 0.001, -0.002, 0.001));
+  for (int k = 0; k < 200; ++k)
+    add_pair(scene, {random.uniform(20, 200), random.uniform(20, 460)}, random.uniform(2.5, 5), 0, 0.2, random);
+  for (int k = 0; k < 60; ++k)
+    add_pair(scene, {random.uniform(270, 370), random.uniform(120, 420)}, random.uniform(1.0, 1.1), 0, 0.2, random);
+  scene.boxes = {{250, 100, 390, 440}};
+  FrameRun<double> run(scene);
+  cfp::FrameOptions options;
+  double o[2];
+  std::vector<double> distances[2];
+  for (const bool printed : {false, true}) {
+    options.coarse.object.noise_factor = printed ? 0 : 5.8;
+    options.coarse.object.max_stray_share = 0;
+    const cfp::FrameReport report = run.coarse(options, run.frame(), scene.camera);
+    REQUIRE(report.flow_model == cfp::FlowModelKind::fundamental);
+    o[printed] = run.state.objects[0].static_probability;
+    distances[printed] = run.state.flow_distances;
+    std::vector<double> of_person(distances[printed].begin() + 200, distances[printed].end()), scratch(60);
+    const double exact =
+        cfp::object_probability(of_person, cfp::detail::scaled_to_flow(options.coarse.object, report), scratch)
+            .static_probability;
+    CHECK((o[printed] == exact) == printed);
+    CHECK(o[printed] >= exact);
+  }
+  CHECK(distances[0] == distances[1]);
+}
+
 TEST_CASE("With one camera that turns the rows of a rolling shutter hide nobody and move nobody", "[frame]") {
   const auto called = [](double error_px, double person_motion_m) {
     return called_moving("rows, one camera", false, [&](DynamicScene<double>& scene, cfp::Random& random) {

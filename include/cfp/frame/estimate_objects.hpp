@@ -156,7 +156,8 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   const PinholeCamera<Scalar> pinhole = undistorted_camera(camera);
   detail::label_pairs(frame, options, state);
   const FlowSupport support = detail::mark_outside(n, coarse.flow, scratch);
-  const FlowModel<Scalar> model = detail::flow_model(frame, pinhole, coarse, flow, state);
+  FlowModel<Scalar> model = detail::flow_model(frame, pinhole, coarse, flow, state);
+  if (coarse.object.noise_factor == 0) model = among_neighbours(model);  // as printed: F is exact
   report.flow_model = model.kind;
   report.flow_support = model.support == FlowSupport::outside_pairs ? support : model.support;
   report.flow_status = model.status;

@@ -91,7 +91,7 @@ template <typename Scalar>
   if (given)
     state.report.motion_refused = !join_with_given(*given, flow, outside, camera, options, model, workspace);
   else if (acceleration > 0 && last.time_s > 0 && time_s > 0)  // where the two agree: a camera may be pushed
-    model.motion = joined(predicted_motion(last, time_s, acceleration), model.motion, most_motion_distance_sq);
+    (void)join(predicted_motion(last, time_s, acceleration), model.motion, most_motion_distance_sq, model.motion);
   state.current.motion = {model.motion.template cast<double>(), time_s};
   return model;
 }

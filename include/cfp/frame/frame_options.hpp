@@ -10,7 +10,7 @@
 #include "cfp/core/options.hpp"
 #include "cfp/detection/box_tracker_types.hpp"
 #include "cfp/frame/descriptor_matching.hpp"
-#include "cfp/frame/flow_model.hpp"
+#include "cfp/frame/flow_model_types.hpp"
 #include "cfp/frame/health.hpp"
 #include "cfp/probability/distance_sigmoid.hpp"
 #include "cfp/probability/map_point.hpp"

@@ -11,7 +11,7 @@
 
 #include "cfp/clustering/depth_foreground.hpp"
 #include "cfp/core/status.hpp"
-#include "cfp/frame/flow_model.hpp"
+#include "cfp/frame/flow_model_types.hpp"
 #include "cfp/frame/frame.hpp"
 #include "cfp/frame/health.hpp"
 #include "cfp/probability/object.hpp"

@@ -33,8 +33,8 @@ struct ObjectProbabilityOptions {
   /// with unit noise scores 0.43 at the paper's positions: O is a score on a pixel scale, and sigma sets the scale.
   double sigma_px = 1;
   /// Where the noise of the flow has been measured, sigma_px is this many times its standard deviation, so that a
-  /// static object scores the same at any noise (0.96) and O_Th means the same; 0: sigma_px as it stands, as
-  /// printed. >= 0.
+  /// static object scores the same at any noise (0.96) and O_Th means the same; 0: sigma_px as it stands, and an F of
+  /// the flow is exact, as printed. >= 0.
   double noise_factor = 5.8;
   /// Positions of the ascending order statistics whose mean is O: shares of the number of pairs in (0, 1], ascending.
   /// The paper's are 0.1, 0.2, 0.3; a seventh of wrong depths or mismatches is then taken for motion

@@ -1,0 +1,91 @@
+/// @file flow_model_types.hpp
+/// What goes into flow_model.hpp and comes out.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "cfp/core/options.hpp"
+#include "cfp/frame/camera_motion.hpp"
+#include "cfp/geometry/depth_noise.hpp"
+#include "cfp/geometry/epipolar.hpp"
+#include "cfp/math/uncertain_motion.hpp"
+#include "cfp/robust/fundamental_ransac.hpp"
+
+namespace cfp {
+
+struct FlowModelOptions {
+  /// Pairs outside all boxes and, where depths tell, behind what is in them support the model: what is judged is no
+  /// judge. A fundamental matrix wants at least this many (>= 8).
+  std::size_t min_outside_pairs = 30;
+  /// Pairs so near to a box, as a share of its size, support nothing unless their depth tells that they are behind its
+  /// object: boxes seldom hold all of a person. Where objects are told from their background by depth; >= 0.
+  double margin = 0.1;
+  /// Without parallax (a camera that turns, rests or looks at a plane) or with few pairs there is no fundamental
+  /// matrix; true: the camera's motion is then estimated as if all of the room were at one depth, and objects are
+  /// judged by it and its covariance. false: they are unknown. Not in the paper, whose F is then arbitrary.
+  bool use_motion_up_to_scale = true;
+  /// How much nearer than the room an object is taken to be then: the room's depth over the object's, a ratio without
+  /// unit. The default covers what is up to five times nearer.
+  UnknownDepth nearer_than_room{2.5, 1};
+  /// Where enough pairs have a depth, they are judged by it and the camera's motion. false: as the paper.
+  bool use_depth = true;
+  /// Then the motion of the frame before tells of this one, where the host does not: the standard deviation of each
+  /// coordinate of the camera's acceleration, m/s^2, >= 0; 0: it tells nothing. Not in the paper.
+  double camera_acceleration_m_s2 = 3;
+  CameraMotionOptions motion;
+  FundamentalRansacOptions ransac;
+};
+
+enum class FlowModelKind : std::uint8_t {
+  none,               ///< nothing could be had: every object is unknown
+  motion,             ///< distances under the camera's motion, with what is known of the depths
+  fundamental,        ///< distances from epipolar lines
+  motion_up_to_scale  ///< distances under the camera's motion, all depths unknown: see nearer_than_room
+};
+
+enum class FlowSupport : std::uint8_t {
+  none,             ///< no model was estimated
+  caller,           ///< the caller's motion or fundamental matrix
+  outside_pairs,    ///< the pairs on no object, of which min_outside_pairs or more are outside all boxes
+  background_pairs  ///< the same, but fewer are outside: it rests on what lies behind the objects in the boxes, if any
+};
+
+template <typename Scalar>
+struct FlowModel {
+  FlowModelKind kind = FlowModelKind::none;
+  FlowSupport support = FlowSupport::none;
+  RansacStatus status = RansacStatus::not_enough_data;  ///< of kind none or motion_up_to_scale: why there is no F
+  Matrix3<Scalar> F = Matrix3<Scalar>::Zero();          ///< of kind fundamental, previous to current
+  FundamentalCovariance F_covariance = FundamentalCovariance::Zero();  ///< zero: exact, as the caller's
+  UncertainMotion<Scalar> motion;  ///< of both kinds of motion; up to scale in depths of the room
+  Scalar sigma_px = Scalar(0);     ///< noise of one coordinate, measured on the pairs on no object; 0: not measured
+  int coordinates = 2;             ///< of a pixel that most distances see: 1 across lines
+  double shared_error_px = 0;      ///< what neighbours err by together beside it
+  double shared_factor = 1;        ///< for which the covariance is so many times that of pairs that err alone
+
+  CFP_INLINE FlowModel() noexcept {}  // NOLINT(modernize-use-equals-default): inline
+};
+
+/// Scratch memory, reused: after a call with depths and one without, calls of at most the same sizes allocate nothing.
+template <typename Scalar>
+struct FlowModelWorkspace {
+  std::vector<Scalar> weights, distances;
+  CameraMotionWorkspace<Scalar> motion;
+  FundamentalRansacWorkspace ransac;
+};
+
+inline namespace CFP_ISA {
+
+[[nodiscard]] inline OptionPath invalid_field(const FlowModelOptions& o) noexcept {
+  if (o.min_outside_pairs < 8) return "min_outside_pairs";
+  if (!detail::non_negative(o.margin)) return "margin";
+  if (!detail::non_negative(o.camera_acceleration_m_s2)) return "camera_acceleration_m_s2";
+  if (const OptionPath field = nested("nearer_than_room", invalid_field(o.nearer_than_room))) return field;
+  if (const OptionPath field = nested("motion", invalid_field(o.motion))) return field;
+  return nested("ransac", invalid_field(o.ransac));
+}
+
+}  // namespace CFP_ISA
+}  // namespace cfp
