@@ -40,65 +40,60 @@ cfp::Vector6<double> vector6(Random& random) {
 
 }  // namespace
 
-CFP_PROPERTIES(
-    "Properties of rotations and motions", "[math]",
-    {"exp(-w) is the inverse of exp(w)", 200,
-     [](Random& random) {
-       const Vector3<double> w = cfp_testing::vector_in_cube(random, 4), back = -w;
-       return (cfp::so3_exp(w) * cfp::so3_exp(back) - Matrix3<double>::Identity()).norm() < 1e-14;
-     }},
-    {"log is odd in its rotation and exp gives the rotation back", 200,
-     [](Random& random) {
-       const Matrix3<double> R = cfp_testing::pose(random, 1, 3.1).rotation, S = R.transpose();
-       const Vector3<double> w = cfp::so3_log(R), minus = cfp::so3_log(S);
-       return (w + minus).norm() < 1e-12 && (cfp::so3_exp(w) - R).norm() < 1e-13;
-     }},
-    {"the angle is the same from both sides and in every frame", 200,
-     [](Random& random) {
-       const Matrix3<double> R = cfp_testing::pose(random, 1, 3).rotation, Q = cfp_testing::pose(random, 1, 3).rotation;
-       const Matrix3<double> turned = Q * R * Q.transpose();
-       return std::abs(cfp::so3_log(R).norm() - cfp::so3_log(turned).norm()) < 1e-12;
-     }},
-    {"the left Jacobian and its inverse cancel", 200,
-     [](Random& random) {
-       const Vector3<double> w = cfp_testing::vector_in_cube(random, random.index(2) == 0 ? 1.7 : 1e-3);
-       const Matrix3<double> J = cfp::so3_left_jacobian(w);
-       return (J * cfp::inverse(J) - Matrix3<double>::Identity()).norm() < 1e-12;
-     }},
-    {"the left Jacobian is the derivative of exp", 200,
-     [](Random& random) {
-       const Vector3<double> w = cfp_testing::vector_in_cube(random, 1.5),
-                             d = cfp_testing::vector_in_cube(random, 1e-6);
-       const Matrix3<double> step = cfp::so3_exp(Vector3<double>(w + d)) * cfp::so3_exp(w).transpose();
-       return (cfp::so3_log(step) - cfp::so3_left_jacobian(w) * d).norm() < 1e-11;
-     }},
-    {"a quaternion and its negative are the same rotation, of any length", 200,
-     [](Random& random) {
-       const Matrix3<double> R = cfp_testing::pose(random, 1, 3.14).rotation;
-       const cfp::Vector4<double> q = cfp::quaternion(R), other = -random.uniform(0.1, 10) * q;
-       return (cfp::so3_from_quaternion(other) - R).norm() < 1e-14 && q[3] >= 0 && std::abs(q.norm() - 1) < 1e-14;
-     }},
-    {"normalising a rotation twice changes nothing more", 200,
-     [](Random& random) {
-       Matrix3<double> R = cfp_testing::pose(random, 1, 3).rotation;
-       R += 0.01 * matrix(random);
-       const Matrix3<double> once = cfp::normalized_rotation(R), twice = cfp::normalized_rotation(once);
-       return (once - twice).norm() < 1e-14 && std::abs(cfp::determinant(once) - 1) < 1e-13;
-     }},
-    {"motions are a group: associative, with inverses, moving points one after the other", 200,
-     [](Random& random) {
-       const auto any = [&] { return cfp_testing::pose(random, 3, 3); };
-       const SE3<double> A = any(), B = any(), C = any();
-       const Vector3<double> x = cfp_testing::vector_in_cube(random, 5), left = ((A * B) * C) * x,
-                             right = A * Vector3<double>(B * Vector3<double>(C * x));
-       return (left - right).norm() < 1e-12 && (A.inverse() * Vector3<double>(A * x) - x).norm() < 1e-12;
-     }},
-    {"float follows double", 200, [](Random& random) {
-       const SE3<double> T = cfp_testing::pose(random, 2, 3);
-       const cfp::Vector6<double> exact = cfp::se3_log(T);
-       const SE3<float> single = T.cast<float>();
-       return (cfp::se3_log(single).cast<double>() - exact).norm() < 2e-5;
-     }})
+CFP_PROPERTIES("Properties of rotations and motions", "[math]",
+               {"exp(-w) is the inverse of exp(w)", 200,
+                [](Random& random) {
+                  const Vector3<double> w = cfp_testing::vector_in_cube(random, 4), back = -w;
+                  return (cfp::so3_exp(w) * cfp::so3_exp(back) - Matrix3<double>::Identity()).norm() < 1e-14;
+                }},
+               {"log is odd in its rotation and exp gives the rotation back", 200,
+                [](Random& random) {
+                  const Matrix3<double> R = cfp_testing::pose(random, 1, 3.1).rotation, S = R.transpose();
+                  const Vector3<double> w = cfp::so3_log(R), minus = cfp::so3_log(S);
+                  return (w + minus).norm() < 1e-12 && (cfp::so3_exp(w) - R).norm() < 1e-13;
+                }},
+               {"the angle is the same from both sides and in every frame", 200,
+                [](Random& random) {
+                  const Matrix3<double> R = cfp_testing::pose(random, 1, 3).rotation,
+                                        Q = cfp_testing::pose(random, 1, 3).rotation;
+                  const Matrix3<double> turned = Q * R * Q.transpose();
+                  return std::abs(cfp::so3_log(R).norm() - cfp::so3_log(turned).norm()) < 1e-12;
+                }},
+               {"the left Jacobian is the derivative of exp", 200,
+                [](Random& random) {
+                  const Vector3<double> w = cfp_testing::vector_in_cube(random, 1.5),
+                                        d = cfp_testing::vector_in_cube(random, 1e-6);
+                  const Matrix3<double> step = cfp::so3_exp(Vector3<double>(w + d)) * cfp::so3_exp(w).transpose();
+                  return (cfp::so3_log(step) - cfp::so3_left_jacobian(w) * d).norm() < 1e-11;
+                }},
+               {"a quaternion and its negative are the same rotation, of any length", 200,
+                [](Random& random) {
+                  const Matrix3<double> R = cfp_testing::pose(random, 1, 3.14).rotation;
+                  const cfp::Vector4<double> q = cfp::quaternion(R), other = -random.uniform(0.1, 10) * q;
+                  return (cfp::so3_from_quaternion(other) - R).norm() < 1e-14 && q[3] >= 0 &&
+                         std::abs(q.norm() - 1) < 1e-14;
+                }},
+               {"normalising a rotation twice changes nothing more", 200,
+                [](Random& random) {
+                  Matrix3<double> R = cfp_testing::pose(random, 1, 3).rotation;
+                  R += 0.01 * matrix(random);
+                  const Matrix3<double> once = cfp::normalized_rotation(R), twice = cfp::normalized_rotation(once);
+                  return (once - twice).norm() < 1e-14 && std::abs(cfp::determinant(once) - 1) < 1e-13;
+                }},
+               {"motions are a group: associative, with inverses, moving points one after the other", 200,
+                [](Random& random) {
+                  const auto any = [&] { return cfp_testing::pose(random, 3, 3); };
+                  const SE3<double> A = any(), B = any(), C = any();
+                  const Vector3<double> x = cfp_testing::vector_in_cube(random, 5), left = ((A * B) * C) * x,
+                                        right = A * Vector3<double>(B * Vector3<double>(C * x));
+                  return (left - right).norm() < 1e-12 && (A.inverse() * Vector3<double>(A * x) - x).norm() < 1e-12;
+                }},
+               {"float follows double", 200, [](Random& random) {
+                  const SE3<double> T = cfp_testing::pose(random, 2, 3);
+                  const cfp::Vector6<double> exact = cfp::se3_log(T);
+                  const SE3<float> single = T.cast<float>();
+                  return (cfp::se3_log(single).cast<double>() - exact).norm() < 2e-5;
+                }})
 
 CFP_PROPERTIES("Properties of 3x3 matrices", "[math]",
                {"the singular values do not follow rotations and make the matrix again", 200,
