@@ -527,8 +527,8 @@ TEST_CASE("With one camera nobody who stands moves for what F errs by, beside it
   };
   for (const bool all_around : {false, true}) {
     CAPTURE(all_around);
-    CHECK(called(all_around, 0, 0) <= 8);
-    CHECK(called(all_around, 0.6, 0) <= (all_around ? 4 : 18));
+    CHECK(called(all_around, 0, 0) <= (all_around ? 8 : 16));  // 18 and 77 if F were exact
+    CHECK(called(all_around, 0.6, 0) <= (all_around ? 8 : 25));
     CHECK(called(all_around, 0, 0.02) >= 95);
     CHECK(called(all_around, 0.6, 0.02) >= 95);
   }
