@@ -55,7 +55,7 @@ struct Frame {
   /// stands near. Not set: the motion of the frame before is carried on, see
   /// FlowModelOptions::camera_acceleration_m_s2.
   std::optional<UncertainMotion<double>> T_cur_prev;
-  std::optional<Matrix3<Scalar>> fundamental;  ///< F of the undistorted flow pairs, if the host has one
+  std::optional<Matrix3<Scalar>> fundamental;  ///< F of the undistorted flow pairs, if the host has an exact one
   /// Homography from the previous image, moves the predicted boxes (rotation_homography). Not set: what the flow
   /// outside of the boxes tells (image_motion.hpp); the identity: they move as they did.
   std::optional<Matrix3<Scalar>> image_motion;
