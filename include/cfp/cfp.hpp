@@ -26,6 +26,7 @@
 #include "cfp/evaluation/trajectory_error.hpp"
 #include "cfp/frame/begin_frame.hpp"
 #include "cfp/frame/camera_motion.hpp"
+#include "cfp/frame/camera_motion_types.hpp"
 #include "cfp/frame/constrain_keypoints.hpp"
 #include "cfp/frame/descriptor_matching.hpp"
 #include "cfp/frame/detector_health.hpp"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "cfp/core/options.hpp"
-#include "cfp/frame/camera_motion.hpp"
+#include "cfp/frame/camera_motion_types.hpp"
 #include "cfp/geometry/depth_noise.hpp"
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/math/uncertain_motion.hpp"

@@ -7,8 +7,6 @@
 #include <vector>
 
 #include "cfp/core/types.hpp"
-#include "cfp/geometry/epipolar.hpp"
-#include "cfp/geometry/point_pairs.hpp"
 #include "cfp/math/matrix3.hpp"
 #include "cfp/math/normal_equations.hpp"
 #include "cfp/math/so3.hpp"
@@ -185,28 +183,6 @@ struct SampsonModel {
     return F;
   }
 };
-
-// The covariance of F in pixels, of unit norm: F, of scaled pixels, was fitted to pairs of this variance under a loss
-// of this many variances. Zero where they do not tell it.
-[[nodiscard]] inline FundamentalCovariance fundamental_covariance(const PairArrays& pairs, const Matrix3<double>& F,
-                                                                  double variance, double loss) noexcept {
-  const FactoredF<double> factored(F);
-  NormalEquations<7> sums;
-  Eigen::Matrix<double, 7, 7> inverse;
-  SampsonModel<double>{exact_columns(pairs), loss * variance}.linearize(factored, sums);
-  sums.H *= loss;
-  if (!invert_normal_equations<7>(sums.H, 1e-14, inverse)) return FundamentalCovariance::Zero();
-  const Matrix3<double> previous = scaling_matrix(pairs.scaling.previous),
-                        current = scaling_matrix(pairs.scaling.current).transpose();
-  const double norm = (current * factored.matrix() * previous).norm();
-  Eigen::Matrix<double, 9, 7> B = factored.tangents();
-  for (int k = 0; k < 7; ++k) {
-    const Matrix3<double> tangent = B.col(k).reshaped<Eigen::RowMajor>(3, 3), pixels = current * tangent * previous;
-    B.col(k) = pixels.reshaped<Eigen::RowMajor>() / norm;
-  }
-  const Eigen::Matrix<double, 9, 7> BC = B.lazyProduct(inverse);
-  return BC.lazyProduct(B.transpose());
-}
 
 // Refines F (scaled pixels) until a step promises or brings less than `tolerance` of the cost, or for `max_steps`.
 // Returns the cost of F, which never rises.
