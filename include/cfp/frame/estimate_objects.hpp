@@ -40,7 +40,7 @@ void label_margin(const Box<Scalar>& box, const ForegroundResult& separated, con
 template <typename Scalar>
 void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
-  const FlowPairs<Scalar> flow{frame.flow.previous, frame.flow.current, state.flow_depths};
+  const FlowPairs<Scalar> flow = flow_with_depths(frame, state);
   const std::size_t n = flow.current.size();
   scratch.pair_label.assign(state.boxes.size() * n, PairLabel::outside);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
@@ -104,6 +104,9 @@ void score_objects(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow
   const std::size_t n = flow.current.size();
   const ObjectProbabilityOptions scored =
       beyond_strays(scaled_to_flow(coarse.object, state.report), coarse.flow.min_outside_pairs, scratch);
+  // The error of a motion that a host calls exact, which all pairs share, would be taken for theirs.
+  const bool asks_what_they_share =
+      model.kind == FlowModelKind::motion && !model.motion.covariance.isZero(0) && scored.shared_error_px > 0;
   scratch.values.resize(n);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     // What lies behind an object says nothing of it, and a pair on its silhouette may have either depth.
@@ -118,9 +121,7 @@ void score_objects(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow
     object = object_probability(scratch.samples, scored, scratch.values);
     if (object.status != Status::ok) continue;
     --state.report.unknown_objects;
-    // The error of a motion that a host calls exact, which all pairs share, would be taken for theirs.
-    const bool told_by_depth = model.kind == FlowModelKind::motion && !model.motion.covariance.isZero(0);
-    if (!told_by_depth || !(scored.shared_error_px > 0)) continue;
+    if (!asks_what_they_share) continue;
     const double shift =
         common_shift(flow, scratch.members, model.motion, camera, noise_of(model, coarse.flow),
                      coarse.flow.motion.distance, (std::max)(scored.shared_error_px, model.shared_error_px));
@@ -169,7 +170,7 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   scratch.object_distances.resize(n);
   flow_distances(model, flow, pinhole, coarse.flow, span<Scalar>(scratch.object_distances));
   state.flow_distances = scratch.object_distances;
-  if (model.kind != FlowModelKind::motion)
+  if (neighbours_share_its_error(model))
     flow_distances(among_neighbours(model), flow, pinhole, coarse.flow, span<Scalar>(state.flow_distances));
   if (model.kind == FlowModelKind::motion_up_to_scale && looks_for_unreported(options))
     detail::measure_room(model, flow, pinhole, coarse, scratch.room_distances);

@@ -115,14 +115,38 @@ FlowModel<Scalar> estimate_fundamental(const FlowPairs<Scalar>& flow, span<const
   return model;
 }
 
+/// F or, without one, the motion up to scale of the pairs as if all were at the depth of the room. Before that is a
+/// model, `straighten(pairs, motion)` may take out of both what is no motion; it returns how many parameters were
+/// fitted.
+template <typename Scalar, typename Straighten>
+FlowModel<Scalar> estimate_without_depths(const FlowPairs<Scalar>& flow, span<const char> outside,
+                                          const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
+                                          FlowModelWorkspace<Scalar>& workspace, Straighten&& straighten) {
+  const FlowModel<Scalar> model = estimate_fundamental(flow, outside, camera, options, workspace);
+  if (model.kind != FlowModelKind::none || !options.use_motion_up_to_scale) return model;
+  workspace.distances.assign(outside.size(), Scalar(1));
+  FlowPairs<Scalar> pairs{flow.previous, flow.current, workspace.distances, flow.relative_sigmas};
+  CameraMotion<Scalar> motion = estimate_camera_motion(pairs, outside, camera, options.motion, workspace.motion);
+  if (!motion.known) return model;
+  const int parameters = straighten(pairs, motion);
+  return model_up_to_scale<Scalar>(motion, {pairs, camera, options.motion, workspace.motion}, model.status, parameters);
+}
+
 }  // namespace CFP_ISA
 }  // namespace detail
 
 inline namespace CFP_ISA {
 
-/// The model as how neighbours differ is judged by it. Without depths what F errs by, and what pairs err by together
-/// under a motion up to scale, displaces neighbours alike: whether an object rests depends on it, but not how a
-/// keypoint differs from the wall beside it.
+/// Whether the model errs by what displaces neighbours alike: without depths F does, and a motion up to scale by what
+/// pairs err by together. Whether an object rests depends on it, but not how a keypoint differs from the wall beside
+/// it.
+template <typename Scalar>
+[[nodiscard]] bool neighbours_share_its_error(const FlowModel<Scalar>& model) noexcept {
+  if (model.kind == FlowModelKind::fundamental) return !model.F_covariance.isZero(0);
+  return model.kind == FlowModelKind::motion_up_to_scale && model.shared_factor != 1;
+}
+
+/// The model without that error: as how neighbours differ is judged by it.
 template <typename Scalar>
 [[nodiscard]] FlowModel<Scalar> among_neighbours(FlowModel<Scalar> model) noexcept {
   model.F_covariance.setZero();
@@ -157,23 +181,10 @@ FlowModel<Scalar> estimate_flow_model(const FlowPairs<Scalar>& flow, span<const 
                                       FlowModelWorkspace<Scalar>& workspace) {
   CFP_ASSERT(flow.previous.size() == flow.current.size() && outside.size() == flow.current.size());
   CFP_ASSERT(detail::fits(flow.current.size(), flow.previous_depths));
-  const auto motion_from = [&](const FlowPairs<Scalar>& pairs) {
-    return estimate_camera_motion(pairs, outside, camera, options.motion, workspace.motion);
-  };
   CameraMotion<Scalar> motion;
-  if (options.use_depth) motion = motion_from(flow);
+  if (options.use_depth) motion = estimate_camera_motion(flow, outside, camera, options.motion, workspace.motion);
   if (motion.known) return detail::model_of(motion, {flow, camera, options.motion, workspace.motion}, 6);
-  FlowModel<Scalar> model = detail::estimate_fundamental(flow, outside, camera, options, workspace);
-  if (model.kind != FlowModelKind::none || !options.use_motion_up_to_scale) return model;
-  const RansacStatus status = model.status;
-  workspace.distances.assign(outside.size(), Scalar(1));
-  const FlowPairs<Scalar> at_one_depth{flow.previous, flow.current, workspace.distances, flow.relative_sigmas};
-  motion = motion_from(at_one_depth);
-  if (motion.known)
-    return detail::model_up_to_scale<Scalar>(motion, {at_one_depth, camera, options.motion, workspace.motion}, status,
-                                             6);
-  model.status = status;
-  return model;
+  return detail::estimate_without_depths(flow, outside, camera, options, workspace, [](auto&, auto&) { return 6; });
 }
 
 }  // namespace CFP_ISA

@@ -102,19 +102,13 @@ template <typename Scalar>
 [[nodiscard]] FlowModel<Scalar> model_without_depths(const PinholeCamera<Scalar>& camera,
                                                      const FlowModelOptions& options, FlowPairs<Scalar>& flow,
                                                      FrameState<Scalar>& state) {
-  const span<const char> outside(state.scratch.outside);
   FlowModelWorkspace<Scalar>& workspace = state.scratch.flow;
-  FlowPairs<Scalar> pairs{flow.previous, flow.current, {}, flow.relative_sigmas};
-  const FlowModel<Scalar> model = estimate_flow_model(pairs, outside, camera, options, workspace);
-  if (model.kind != FlowModelKind::motion_up_to_scale) return model;
-  CameraMotion<Scalar> motion;
-  motion.T_cur_prev = model.motion.T_cur_prev;
-  motion.sigma_px = model.sigma_px;
-  workspace.distances.assign(outside.size(), Scalar(1));
-  pairs.previous_depths = workspace.distances;
-  if (!straighten(camera, options.motion, workspace.motion, state.scratch.straight, pairs, motion)) return model;
-  flow.current = pairs.current;
-  return model_up_to_scale<Scalar>(motion, {pairs, camera, options.motion, workspace.motion}, model.status, 8);
+  const auto take_out = [&](FlowPairs<Scalar>& pairs, CameraMotion<Scalar>& motion) {
+    const bool taken = straighten(camera, options.motion, workspace.motion, state.scratch.straight, pairs, motion);
+    flow.current = pairs.current;
+    return taken ? 8 : 6;
+  };
+  return estimate_without_depths(flow, span<const char>(state.scratch.outside), camera, options, workspace, take_out);
 }
 
 /// The host's motion as a model: refined by the pairs and with their noise where enough agree to it; false if not.

@@ -151,6 +151,12 @@ template <typename Scalar>
   return state.previous.known ? state.current.timestamp_s - state.previous.timestamp_s : 0;
 }
 
+/// The flow of a frame with the depths that are known of it; after find_flow_depths.
+template <typename Scalar>
+[[nodiscard]] FlowPairs<Scalar> flow_with_depths(const Frame<Scalar>& frame, const FrameState<Scalar>& state) noexcept {
+  return {frame.flow.previous, frame.flow.current, state.flow_depths};
+}
+
 /// M of keypoint i; -1, as of one without a map point, for a host that keeps none.
 template <typename Scalar>
 [[nodiscard]] Scalar map_point_at(span<const Scalar> map_point_probability, std::size_t i) noexcept {

@@ -133,8 +133,7 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
   }
   report.stray_labels = detail::stray_labels(frame, state);
   detail::score_flow_at_keypoints(frame, options, state);
-  const FlowPairs<Scalar> flow{frame.flow.previous, frame.flow.current, state.flow_depths};
-  detail::UnreportedSearch<Scalar>{flow, options, state}.score_keypoints();
+  detail::UnreportedSearch<Scalar>{detail::flow_with_depths(frame, state), options, state}.score_keypoints();
   // In the order of KeypointLabel.
   std::size_t* const counts[] = {&report.outside, &report.foreground, &report.background, &report.invalid};
   for (std::size_t* const count : counts) *count = 0;
