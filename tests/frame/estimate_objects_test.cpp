@@ -446,6 +446,32 @@ int called_moving(const char* name, bool with_depths, const Fill& fill, const cf
   return moving;
 }
 
+// What an image errs by at (x, y), px: the rows of a rolling shutter by a turn that ends, ...
+auto rows(double error_px, cfp::Random& random) {
+  const cfp::Vector2<double> error(error_px * random.normal(), error_px * random.normal());
+  return [error](double, double y) { return cfp::Vector2<double>(error * (y / 240 - 1)); };
+}
+
+// ... or all of it, in waves.
+auto waves(double error_px, cfp::Random& random) {
+  const double phase = random.uniform(0, 6.28), length_px = random.uniform(90, 160);
+  return [=](double x, double y) {
+    return cfp::Vector2<double>(error_px * std::sin(x / length_px + phase),
+                                error_px * std::sin(y / length_px + 2 * phase));
+  };
+}
+
+// Adds a pair that such an image displaces.
+template <typename Error>
+auto add_to(DynamicScene<double>& scene, cfp::Random& random, const Error& error) {
+  return [&scene, &random, error](double x, double y, double z, double shift) {
+    add_pair(scene, {x, y}, z, shift, 0.2, random);
+    const cfp::Vector2<double> by = error(x, y);
+    scene.keypoints.back()[0] += by.x();
+    scene.keypoints.back()[1] += by.y();
+  };
+}
+
 }  // namespace
 
 TEST_CASE("Who moves by no more than the flow's noise moves by what the pairs share", "[frame]") {
@@ -473,12 +499,7 @@ TEST_CASE("What the rows of a rolling shutter err by hides nobody and moves nobo
   const auto called = [](double error_px, double person_motion_m) {
     return called_moving("rows", true, [&](DynamicScene<double>& scene, cfp::Random& random) {
       scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.005, 0.002, 0.004, 0.001, -0.002, 0.001));
-      const cfp::Vector2<double> error(error_px * random.normal(), error_px * random.normal());  // of a turn that ends
-      const auto add = [&](double x, double y, double z, double shift) {
-        add_pair(scene, {x, y}, z, shift, 0.2, random);
-        scene.keypoints.back()[0] += error.x() * (y / 240 - 1);
-        scene.keypoints.back()[1] += error.y() * (y / 240 - 1);
-      };
+      const auto add = add_to(scene, random, rows(error_px, random));
       for (int k = 0; k < 300; ++k) add(random.uniform(20, 620), random.uniform(20, 460), random.uniform(2.5, 5), 0);
       for (int k = 0; k < 60; ++k)
         add(random.uniform(270, 370), random.uniform(120, 420), random.uniform(1.95, 2.05), person_motion_m);
@@ -493,12 +514,7 @@ TEST_CASE("Where the image errs by more than its noise nobody who stands moves f
   const auto called = [](double error_px, double person_motion_m) {
     return called_moving("waves", true, [&](DynamicScene<double>& scene, cfp::Random& random) {
       scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.005, 0.002, 0.004, 0.001, -0.002, 0.001));
-      const double phase = random.uniform(0, 6.28), length_px = random.uniform(90, 160);
-      const auto add = [&](double x, double y, double z, double shift) {
-        add_pair(scene, {x, y}, z, shift, 0.2, random);
-        scene.keypoints.back()[0] += error_px * std::sin(x / length_px + phase);
-        scene.keypoints.back()[1] += error_px * std::sin(y / length_px + 2 * phase);
-      };
+      const auto add = add_to(scene, random, waves(error_px, random));
       for (int k = 0; k < 300; ++k) add(random.uniform(20, 620), random.uniform(20, 460), random.uniform(2.5, 5), 0);
       for (int k = 0; k < 60; ++k)
         add(random.uniform(270, 370), random.uniform(120, 420), random.uniform(1.95, 2.05), person_motion_m);
@@ -513,12 +529,7 @@ TEST_CASE("With one camera nobody who stands moves for what F errs by, beside it
   const auto called = [](bool all_around, double error_px, double person_motion_m) {
     return called_moving("one camera", false, [&](DynamicScene<double>& scene, cfp::Random& random) {
       scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.005, 0.045, 0.02, 0.001, -0.002, 0.001));
-      const double phase = random.uniform(0, 6.28), length_px = random.uniform(90, 160);
-      const auto add = [&](double x, double y, double z, double shift) {
-        add_pair(scene, {x, y}, z, shift, 0.2, random);
-        scene.keypoints.back()[0] += error_px * std::sin(x / length_px + phase);
-        scene.keypoints.back()[1] += error_px * std::sin(y / length_px + 2 * phase);
-      };
+      const auto add = add_to(scene, random, waves(error_px, random));
       for (int k = 0; k < 200; ++k)
         add(random.uniform(20, all_around ? 620 : 200), random.uniform(20, 460), random.uniform(2.5, 5), 0);
       for (int k = 0; k < 60; ++k)
@@ -568,12 +579,7 @@ TEST_CASE("With one camera that turns the rows of a rolling shutter hide nobody 
   const auto called = [](double error_px, double person_motion_m) {
     return called_moving("rows, one camera", false, [&](DynamicScene<double>& scene, cfp::Random& random) {
       scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.0002, 0.0018, 0.0008, 0.001, -0.002, 0.001));
-      const cfp::Vector2<double> error(error_px * random.normal(), error_px * random.normal());
-      const auto add = [&](double x, double y, double z, double shift) {
-        add_pair(scene, {x, y}, z, shift, 0.2, random);
-        scene.keypoints.back()[0] += error.x() * (y / 240 - 1);
-        scene.keypoints.back()[1] += error.y() * (y / 240 - 1);
-      };
+      const auto add = add_to(scene, random, rows(error_px, random));
       for (int k = 0; k < 200; ++k) add(random.uniform(20, 620), random.uniform(20, 460), random.uniform(2.5, 5), 0);
       for (int k = 0; k < 60; ++k)
         add(random.uniform(270, 370), random.uniform(120, 420), random.uniform(2.0, 2.1), person_motion_m);
