@@ -90,6 +90,7 @@ static void instantiate_geometry() noexcept {
   use(static_cast<cfp::FundamentalResult<Scalar> (*)(
           const cfp::PointPairs<Scalar>&, const cfp::PinholeCamera<Scalar>&, const cfp::FundamentalRansacOptions&,
           cfp::FundamentalRansacWorkspace&, cfp::span<char>)>(&cfp::fundamental_ransac<Scalar>));
+  use(&cfp::fundamental_covariance<Scalar>);
   use(&cfp::reprojection_distances<cfp::PinholeCamera<Scalar>>);
 }
 

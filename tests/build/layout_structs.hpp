@@ -71,7 +71,7 @@
   CFP_LAYOUT(cfp::FundamentalRansacOptions, seed)                        \
   CFP_LAYOUT_OPAQUE(cfp::FundamentalResult<float>)                       \
   CFP_LAYOUT_OPAQUE(cfp::FundamentalResult<double>)                      \
-  CFP_LAYOUT(cfp::FundamentalRansacWorkspace, scratch)                   \
+  CFP_LAYOUT(cfp::FundamentalRansacWorkspace, noise_variance)            \
   CFP_LAYOUT(cfp::KannalaBrandtCamera<float>, k4)                        \
   CFP_LAYOUT(cfp::KannalaBrandtCamera<double>, k4)                       \
   CFP_LAYOUT(cfp::RadialTangentialCamera<float>, k3)                     \

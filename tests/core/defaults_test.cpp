@@ -190,7 +190,8 @@ TEST_CASE("A report that nothing was counted for counts nothing", "[core]") {
   CHECK((!motion.known && motion.sigma_px == 1));
   const cfp::FundamentalResult<double> F;
   CHECK((F.status == cfp::RansacStatus::not_enough_data && F.used == 0 && F.inliers == 0 && F.iterations == 0));
-  CHECK((F.inlier_share == 0 && F.F.isZero(0) && F.covariance.isZero(0) && F.homography.isZero(0)));
+  CHECK((F.inlier_share == 0 && F.F.isZero(0) &&
+         fundamental_covariance(F, cfp::FundamentalRansacWorkspace()).isZero(0) && F.homography.isZero(0)));
   const cfp::P3PSolutions<double> p3p;
   CHECK((p3p.count == 0 && p3p.status == cfp::Status::degenerate));
 }

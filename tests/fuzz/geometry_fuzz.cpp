@@ -156,7 +156,8 @@ void two_views(FuzzInput& in) {
   const cfp::PinholeCamera<float> camera{525, 525, 320, 240};
   const auto result = cfp::fundamental_ransac(pairs, camera, options, workspace, inliers);
   CFP_PROMISE(result.found() ? is_fundamental(result.F) : result.F.isZero(0));
-  CFP_PROMISE(result.found() ? result.covariance.allFinite() : result.covariance.isZero(0));
+  const cfp::FundamentalCovariance covariance = cfp::fundamental_covariance(result, workspace);
+  CFP_PROMISE(result.found() ? covariance.allFinite() : covariance.isZero(0));
   CFP_PROMISE(result.homography.allFinite() && count(inliers) == result.inliers);
   const auto again = cfp::fundamental_ransac(pairs, camera, options, workspace, inliers);
   CFP_PROMISE(again.F == result.F && again.homography == result.homography && again.status == result.status);

@@ -145,14 +145,14 @@ TEMPLATE_TEST_CASE("F is as uncertain as it says, at its own pairs and where it 
     const FundamentalResult<TestType> result =
         fundamental_ransac(PointPairs<TestType>{scene.prev, scene.cur, weights}, FundamentalRansacOptions{}, workspace);
     REQUIRE(result.found());
+    const cfp::FundamentalCovariance covariance = fundamental_covariance(result, workspace);
     for (std::size_t i = 0; i < scene.prev.size(); ++i) {
       const cfp::Vector3<double> p(static_cast<double>(scene.exact_prev[i][0]),
                                    static_cast<double>(scene.exact_prev[i][1]), 1),
           q(static_cast<double>(scene.exact_cur[i][0]), static_cast<double>(scene.exact_cur[i][1]), 1);
       Eigen::Matrix<double, 9, 1> a;
       a << q[0] * p, q[1] * p, p;
-      const double error = q.dot(result.F.template cast<double>() * p),
-                   ratio = error * error / a.dot(result.covariance * a);
+      const double error = q.dot(result.F.template cast<double>() * p), ratio = error * error / a.dot(covariance * a);
       (weights[i] > 0 ? inside : beside) += ratio;
       ++(weights[i] > 0 ? n_inside : n_beside);
     }
@@ -167,7 +167,7 @@ TEST_CASE("Without F there is no covariance of it", "[robust]") {
   FundamentalRansacWorkspace workspace;
   const auto result = fundamental_ransac(PointPairs{scene.prev, scene.cur}, FundamentalRansacOptions{}, workspace);
   REQUIRE_FALSE(result.found());
-  CHECK(result.covariance.isZero(0));
+  CHECK(fundamental_covariance(result, workspace).isZero(0));
 }
 
 TEST_CASE("Few pairs and many mismatches: F is found as far as samples go", "[robust]") {

@@ -110,7 +110,7 @@ FlowModel<Scalar> estimate_fundamental(const FlowPairs<Scalar>& flow, span<const
   if (!estimate.found()) return model;
   model = fundamental_model(estimate.F, estimate.status, FlowSupport::outside_pairs, flow, outside, options,
                             workspace.distances);
-  model.F_covariance = estimate.covariance;
+  model.F_covariance = fundamental_covariance(estimate, workspace.ransac);
   if (model.sigma_px > Scalar(0)) count_shared_error(shared_error(flow, outside, model.F, model.sigma_px), model);
   return model;
 }

@@ -13,12 +13,13 @@ inline namespace CFP_ISA {
 
 // The covariance of F in pixels, of unit norm: F, of scaled pixels, was fitted to pairs of this variance under a loss
 // of this many variances. Zero where they do not tell it.
-[[nodiscard]] inline FundamentalCovariance fundamental_covariance(const PairArrays& pairs, const Matrix3<double>& F,
-                                                                  double variance, double loss) noexcept {
-  const FactoredF<double> factored(F);
+template <typename T>
+[[nodiscard]] FundamentalCovariance covariance_in_pixels(const PairArrays& pairs, const Matrix3<T>& F, T variance,
+                                                         T loss) noexcept {
+  const FactoredF<T> factored(F);
   NormalEquations<7> sums;
   Eigen::Matrix<double, 7, 7> inverse;
-  SampsonModel<double>{exact_columns(pairs), loss * variance}.linearize(factored, sums);
+  SampsonModel<T>{exact_columns(pairs), loss * variance}.linearize(factored, sums);
   sums.H *= loss;
   if (!invert_normal_equations<7>(sums.H, 1e-14, inverse)) return FundamentalCovariance::Zero();
   const Matrix3<double> previous = scaling_matrix(pairs.scaling.previous),
