@@ -59,6 +59,13 @@ CFP_PROPERTIES("Properties of rotations and motions", "[math]",
                   const Matrix3<double> turned = Q * R * Q.transpose();
                   return std::abs(cfp::so3_log(R).norm() - cfp::so3_log(turned).norm()) < 1e-12;
                 }},
+               {"the left Jacobian and its inverse cancel", 200,
+                [](Random& random) {
+                  const Vector3<double> w = cfp_testing::vector_in_cube(random, random.index(2) == 0 ? 1.7 : 1e-3);
+                  return (cfp::so3_left_jacobian(w) * cfp::inverse(cfp::so3_left_jacobian(w)) -
+                          Matrix3<double>::Identity())
+                             .norm() < 1e-12;
+                }},
                {"the left Jacobian is the derivative of exp", 200,
                 [](Random& random) {
                   const Vector3<double> w = cfp_testing::vector_in_cube(random, 1.5),
