@@ -131,7 +131,8 @@ void minimal(FuzzInput& in) {
   cfp::KannalaBrandtCamera<Scalar> fisheye{camera.fx, camera.fy, camera.cx, camera.cy, camera.k1, camera.k2};
   fisheye.k3 = FuzzInput::to<Scalar>(in.number(-0.5, 0.5));
   if (fisheye.unproject(pixel, ray)) CFP_PROMISE(ray.allFinite() && ray.z() == Scalar(1));
-  if (fisheye.project(problem.world[0], again)) CFP_PROMISE(again.allFinite());
+  cfp::Matrix23<Scalar> jacobian;
+  if (fisheye.project(problem.world[0], again, &jacobian)) CFP_PROMISE(again.allFinite() && jacobian.allFinite());
 }
 
 void two_views(FuzzInput& in) {

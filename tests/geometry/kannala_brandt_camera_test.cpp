@@ -94,6 +94,12 @@ TEMPLATE_TEST_CASE("No coefficient, pixel or point breaks a fisheye", "[geometry
       CHECK_THAT((back - pixel).norm(), WithinAbs(0, std::is_same_v<T, float> ? 0.5 : 1e-6));
   }
   CHECK(seen > 500);
+  // So far beside the axis that x^2 + y^2 overflows: the pixel would be a number, its derivative none.
+  Vector2<T> untouched(-7, -7);
+  cfp::Matrix23<T> jacobian = cfp::Matrix23<T>::Constant(-7);
+  const T far = (std::numeric_limits<T>::max)() / 4;
+  CHECK_FALSE(KannalaBrandtCamera<T>{T(200), T(220), T(320), T(240)}.project({far, 0, 2}, untouched, &jacobian));
+  CHECK((untouched == Vector2<T>(-7, -7) && jacobian == cfp::Matrix23<T>::Constant(-7)));
   const T inf = std::numeric_limits<T>::infinity(), nan = std::numeric_limits<T>::quiet_NaN();
   for (T KannalaBrandtCamera<T>::*field :
        {&KannalaBrandtCamera<T>::k1, &KannalaBrandtCamera<T>::k2, &KannalaBrandtCamera<T>::k3,

@@ -57,7 +57,8 @@ struct KannalaBrandtCamera {
   [[nodiscard]] CFP_INLINE static bool is_on_axis(const Scalar& radius_sq) noexcept {
     return radius_sq < Scalar(std::numeric_limits<Scalar>::epsilon());
   }
-  /// Distorts the point (x, y) of the plane z = 1; false beyond the angle to which r rises.
+  /// Distorts the point (x, y) of the plane z = 1; false beyond the angle to which r rises, or where x^2 + y^2 is not
+  /// finite.
   [[nodiscard]] CFP_INLINE bool distort(const Scalar& x, const Scalar& y,
                                         detail::DistortedPoint<Scalar>& d) const noexcept {
     using std::atan;
@@ -65,7 +66,7 @@ struct KannalaBrandtCamera {
     const Scalar s = x * x + y * y, third = Scalar(1) / Scalar(3);
     const bool on_axis = is_on_axis(s);
     const Scalar radius = on_axis ? Scalar(0) : Scalar(sqrt(s)), angle = on_axis ? Scalar(0) : Scalar(atan(radius));
-    if (!rises_to(angle)) return false;
+    if (!is_finite(s) || !rises_to(angle)) return false;
     // r / |(x, y)|; its slope along x is x times twice_slope, along y y times that.
     const Scalar ratio = on_axis ? Scalar(Scalar(1) + (k1 - third) * s) : Scalar(angle * stretch(angle) / radius);
     const Scalar twice_slope =
