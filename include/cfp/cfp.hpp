@@ -48,6 +48,7 @@
 #include "cfp/frame/static_probability.hpp"
 #include "cfp/frame/track_boxes.hpp"
 #include "cfp/frame/weigh_keypoints.hpp"
+#include "cfp/geometry/any_camera.hpp"
 #include "cfp/geometry/box.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/common_shift.hpp"

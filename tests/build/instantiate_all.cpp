@@ -58,6 +58,8 @@ template struct cfp::PinholeCamera<float>;
 template struct cfp::PinholeCamera<double>;
 template struct cfp::FundamentalResult<float>;
 template struct cfp::FundamentalResult<double>;
+template struct cfp::AnyCamera<float>;
+template struct cfp::AnyCamera<double>;
 template struct cfp::KannalaBrandtCamera<float>;
 template struct cfp::KannalaBrandtCamera<double>;
 template struct cfp::RadialTangentialCamera<float>;

@@ -72,6 +72,8 @@
   CFP_LAYOUT_OPAQUE(cfp::FundamentalResult<float>)                       \
   CFP_LAYOUT_OPAQUE(cfp::FundamentalResult<double>)                      \
   CFP_LAYOUT(cfp::FundamentalRansacWorkspace, noise_variance)            \
+  CFP_LAYOUT(cfp::AnyCamera<float>, model)                               \
+  CFP_LAYOUT(cfp::AnyCamera<double>, model)                              \
   CFP_LAYOUT(cfp::KannalaBrandtCamera<float>, k4)                        \
   CFP_LAYOUT(cfp::KannalaBrandtCamera<double>, k4)                       \
   CFP_LAYOUT(cfp::RadialTangentialCamera<float>, k3)                     \

@@ -71,10 +71,15 @@ struct PinholeCamera {
   }
 };
 
+template <typename Scalar>
+struct AnyCamera;  // any_camera.hpp
+
 namespace detail {
 
 template <typename Camera>
 inline constexpr bool is_pinhole = std::is_same_v<Camera, PinholeCamera<typename Camera::ScalarType>>;
+template <typename Camera>
+inline constexpr bool is_any = std::is_same_v<Camera, AnyCamera<typename Camera::ScalarType>>;
 
 inline namespace CFP_ISA {
 
@@ -128,6 +133,8 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
                                                std::vector<std::array<non_deduced<Scalar>, 2>>& storage) {
   if constexpr (detail::is_pinhole<Camera>) {
     return points;
+  } else if constexpr (detail::is_any<Camera>) {
+    return camera.visit([&](const auto& held) { return undistorted(held, points, storage); });
   } else {
     const PinholeCamera<Scalar> pinhole = undistorted_camera(camera);
     storage.resize(points.size());
@@ -153,6 +160,9 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
                                                     std::vector<non_deduced<Scalar>>& storage) {
   if constexpr (detail::is_pinhole<Camera>) {
     return relative;
+  } else if constexpr (detail::is_any<Camera>) {
+    return camera.visit(
+        [&](const auto& held) { return undistorted_sigmas(held, undistorted_points, relative, storage); });
   } else {
     using std::sqrt;
     const PinholeCamera<Scalar> pinhole = undistorted_camera(camera);
