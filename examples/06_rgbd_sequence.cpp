@@ -152,6 +152,7 @@ void run(const std::filesystem::path& folder, const std::filesystem::path& out, 
   const auto images = cfp_examples::read_tum_list(folder / "rgb.txt"),
              depth_images = cfp_examples::read_tum_list(folder / "depth.txt");
   const auto tum = cfp_examples::read_tum_camera(folder / "camera.txt");
+  if (tum.distorted()) throw std::runtime_error((folder / "camera.txt").string() + ": undistorted images are expected");
   std::ifstream stream(folder / "detections.txt");
   const auto detected = cfp_examples::read_detections(stream, (folder / "detections.txt").string());
   if (!detected.error.empty()) throw std::runtime_error(detected.error);

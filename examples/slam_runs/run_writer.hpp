@@ -109,7 +109,7 @@ class RunWriter final : public Observer {
 
   void decided(const cfp::StaticProbability<Camera>& probability, const Frame& frame, const Map& map) override {
     if (!decisions_.is_open()) return;
-    const auto camera = probability.camera().pinhole().cast<double>();
+    const auto camera = cfp::undistorted_camera(probability.camera()).template cast<double>();
     for (std::size_t i = 0; i < frame.size(); ++i) {
       const bool mapped = map.is_alive(frame.map_point[i]);
       const cv::KeyPoint& seen = frame.keypoints[i];

@@ -16,7 +16,6 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "cfp/geometry/box.hpp"
-#include "cfp/geometry/radial_tangential_camera.hpp"
 #include "tum.hpp"
 
 namespace cfp_examples {
@@ -68,9 +67,6 @@ class Sequence {
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
   [[nodiscard]] std::string name() const { return folder_name(folder_); }
   [[nodiscard]] const TumCamera& calibration() const { return camera_; }
-  [[nodiscard]] cfp::RadialTangentialCamera<double> camera() const {
-    return {camera_.fx, camera_.fy, camera_.cx, camera_.cy, camera_.k1, camera_.k2, camera_.p1, camera_.p2, camera_.k3};
-  }
   // Camera to world, for cfp's evaluation; empty: none known.
   [[nodiscard]] const std::vector<cfp::StampedPose<double>>& truth() const { return truth_; }
   [[nodiscard]] const std::string& truth_file() const { return truth_file_; }
@@ -226,12 +222,10 @@ struct FrameSource {
   // The recording must stay.
   FrameSource(const Sequence& sequence)  // NOLINT: a recording is a source
       : calibration(sequence.calibration()),
-        camera(sequence.camera()),
         size(sequence.size()),
         load([&sequence](std::size_t k) { return sequence.load(k); }) {}
 
   TumCamera calibration;
-  cfp::RadialTangentialCamera<double> camera;
   std::size_t size = 0;
   std::function<SequenceFrame(std::size_t)> load;
 };

@@ -16,6 +16,7 @@
 #include <Eigen/Geometry>
 
 #include "cfp/evaluation/trajectory.hpp"
+#include "cfp/geometry/any_camera.hpp"
 #include "numbers.hpp"
 
 namespace cfp_examples {
@@ -112,18 +113,26 @@ inline std::vector<TumImage> read_tum_list(const std::filesystem::path& file) {
   return images;
 }
 
-/// The camera of a recording, distortion as in OpenCV (k3 last); all zero: undistorted images.
+/// The camera of a recording, distortion as in OpenCV (k3 last); all zero: undistorted images. Or a fisheye, k1 to k4
+/// as in OpenCV's model of it.
 struct TumCamera {
   double fx = 0, fy = 0, cx = 0, cy = 0;
   int width = 0, height = 0;
   double depth_units_per_metre = 5000;
-  double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
+  double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0, k4 = 0;
+  bool fisheye = false;
 
-  [[nodiscard]] bool distorted() const { return k1 != 0 || k2 != 0 || p1 != 0 || p2 != 0 || k3 != 0; }
+  [[nodiscard]] bool distorted() const { return fisheye || k1 != 0 || k2 != 0 || p1 != 0 || p2 != 0 || k3 != 0; }
+  [[nodiscard]] cfp::AnyCamera<double> camera() const {
+    if (fisheye) return {cfp::KannalaBrandtCamera<double>{fx, fy, cx, cy, k1, k2, k3, k4}};
+    if (!distorted()) return {cfp::PinholeCamera<double>{fx, fy, cx, cy}};
+    return {cfp::RadialTangentialCamera<double>{fx, fy, cx, cy, k1, k2, p1, p2, k3}};
+  }
 };
 
-/// camera.txt: one line `fx fy cx cy width height depth_units_per_metre [k1 k2 p1 p2 k3]`. The distortion may stand in
-/// a comment instead, after the words `k1 k2 p1 p2 k3 =`, where programs that read seven numbers do not see it.
+/// camera.txt: one line `fx fy cx cy width height depth_units_per_metre [k1 k2 p1 p2 k3]` or, of a fisheye, `...
+/// fisheye k1 k2 k3 k4`. The distortion may stand in a comment instead, after the words `k1 k2 p1 p2 k3 =`, where
+/// programs that read seven numbers do not see it.
 inline TumCamera read_tum_camera(const std::filesystem::path& file) {
   TumCamera camera;
   int cameras = 0;
@@ -137,9 +146,13 @@ inline TumCamera read_tum_camera(const std::filesystem::path& file) {
   };
   for_each_line(file, [&](int line, const std::vector<std::string>& words) {
     if (words.size() != 7 && words.size() != 12)
-      bad_line(file, line, "expected 'fx fy cx cy width height depth_units_per_metre [k1 k2 p1 p2 k3]'");
+      bad_line(file, line,
+               "expected 'fx fy cx cy width height depth_units_per_metre [k1 k2 p1 p2 k3 | fisheye k1 k2 k3 k4]'");
     if (++cameras > 1) bad_line(file, line, "a second camera");
-    std::vector<double> v = parse(line, words);
+    std::vector<std::string> numbers = words;
+    const bool fisheye = words.size() == 12 && words[7] == "fisheye";
+    if (fisheye) numbers.erase(numbers.begin() + 7);
+    std::vector<double> v = parse(line, numbers);
     for (const std::size_t i : {0U, 1U, 4U, 5U, 6U}) {
       if (!(v[i] > 0)) bad_line(file, line, "'" + words[i] + "' out of range");
     }
@@ -147,8 +160,12 @@ inline TumCamera read_tum_camera(const std::filesystem::path& file) {
       if (!(v[i] == std::floor(v[i]))) bad_line(file, line, "'" + words[i] + "' is no number of pixels");
     }
     v.resize(12, 0);
-    camera = {v[0], v[1], v[2],  v[3], static_cast<int>(v[4]), static_cast<int>(v[5]), v[6], v[7],
-              v[8], v[9], v[10], v[11]};
+    camera = {v[0], v[1], v[2], v[3], static_cast<int>(v[4]), static_cast<int>(v[5]), v[6], v[7], v[8]};
+    camera.fisheye = fisheye;
+    if (fisheye)
+      camera.k3 = v[9], camera.k4 = v[10];
+    else
+      camera.p1 = v[9], camera.p2 = v[10], camera.k3 = v[11];
   });
   if (cameras == 0) throw std::runtime_error(file.string() + ": no camera in it");
   std::ifstream stream(file);

@@ -76,19 +76,20 @@ int main(int argc, char* argv[]) {
   auto* bent = app.add_option("--lens", lens, "an image that nobody undistorted: radial coefficient")
                    ->check(CLI::Range(-0.2, 0.2))
                    ->capture_default_str();
+  auto* fisheye = app.add_flag("--fisheye", "a lens of 122 degrees, told in camera.txt")->excludes(bent);
   app.add_option("--focal-error", focal_error_percent, "of camera.txt, per cent")
       ->check(CLI::Range(-20, 20))
       ->capture_default_str();
   app.add_option("--threads", threads, "rendering threads")->check(CLI::Range(1, 256))->capture_default_str();
   app.add_option("--background", background, "a recording in TUM format with poses; the people are put into it")
       ->check(CLI::ExistingDirectory)
-      ->excludes(close_up, furniture, readout, late, bent);
+      ->excludes(close_up, furniture, readout, late, bent, fisheye);
   app.add_option("--camera-height", camera_height, "of the first background camera above the floor, m")
       ->capture_default_str();
   CLI11_PARSE(app, argc, argv);
 
   cv::setNumThreads(1);  // the frames are what runs in parallel
-  options.camera = SequenceOptions::default_camera(width);
+  options.camera = *fisheye ? SequenceOptions::fisheye_camera(width) : SequenceOptions::default_camera(width);
   options.camera.lens = lens;
   options.readout_s = readout_ms / 1000;
   options.depth_late_s = depth_late_ms / 1000;

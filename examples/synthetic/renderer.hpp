@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
+#include <optional>
+#include <stdexcept>
 #include <vector>
 
 #include <opencv2/core.hpp>
 
 #include "cfp/geometry/box.hpp"
-#include "cfp/geometry/camera.hpp"
+#include "cfp/geometry/kannala_brandt_camera.hpp"
 #include "cfp/math/se3.hpp"
 
 #include "scene.hpp"
@@ -20,19 +22,33 @@ namespace synthetic {
 
 enum Label : unsigned char { label_static = 0, label_moving = 1, label_person_still = 2 };
 
+/// A pinhole camera or, with a focal length, a fisheye, which then has all of its own.
 struct ImageCamera : cfp::PinholeCamera<double> {
   int width = 640, height = 480;
   double lens = 0;  ///< the ray of a pixel is (1 + lens r^2) times as far from the axis as the pinhole's, r at depth 1
+  std::optional<cfp::KannalaBrandtCamera<double>> fisheye;
 
   [[nodiscard]] Vector3d ray(double x, double y) const {
     const Eigen::Vector2d plain((x - cx) / fx, (y - cy) / fy);
     const Eigen::Vector2d bent = (1 + lens * plain.squaredNorm()) * plain;
-    return {bent.x(), bent.y(), 1};
+    Vector3d found(bent.x(), bent.y(), 1);
+    if (fisheye && !fisheye->unproject({x, y}, found)) throw std::logic_error("a pixel of the fisheye has no ray");
+    return found;
   }
   /// No pixel's ray is farther from the pinhole's, px.
   [[nodiscard]] double most_bent_px() const {
     const double r = std::hypot(std::max(cx, width - cx) / fx, std::max(cy, height - cy) / fy);
     return std::abs(lens) * r * r * r * std::max(fx, fy);
+  }
+  /// A rectangle that holds the image of a sphere.
+  [[nodiscard]] cfp::Box<double> image_of(const Vector3d& centre, double radius) const {
+    const double distance = centre.norm(), across = std::hypot(centre.x(), centre.y());
+    if (!(distance > 1.01 * radius)) return {0, 0, width * 1.0, height * 1.0};
+    // The angle from the axis is the radius in the image but for a tenth; around the axis up to 1.5 times as much.
+    const double angle = std::atan2(across, centre.z()), scale = across > 0 ? angle / across : 0;
+    const double x = fx * scale * centre.x() + cx, y = fy * scale * centre.y() + cy;
+    const double reach = std::max(fx, fy) * (0.1 * angle + 1.7 * std::asin(radius / distance));
+    return {x - reach, y - reach, x + reach, y + reach};
   }
 };
 
@@ -128,10 +144,12 @@ class Renderer {
   void bound(const Surface& s, const cfp::SE3<double>& T_cam_world, Prepared& p) const {
     const Matrix3d world_from_local = s.shape == Shape::box ? Matrix3d(s.A.transpose()) : Matrix3d(s.A.inverse());
     const Vector3d half = s.shape == Shape::box ? s.half : Vector3d(s.half.x(), s.half.x(), s.half.z() + s.half.x());
-    double nearest = infinity, x1 = infinity, y1 = infinity, x2 = -infinity, y2 = -infinity;
+    const Vector3d middle = T_cam_world * s.centre;
+    double radius = 0, nearest = infinity, x1 = infinity, y1 = infinity, x2 = -infinity, y2 = -infinity;
     for (int corner = 0; corner < 8; ++corner) {
       const Vector3d sign(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
       const Vector3d q = T_cam_world * Vector3d(s.centre + world_from_local * sign.cwiseProduct(half));
+      radius = std::max(radius, (q - middle).norm());
       nearest = std::min(nearest, q.z());
       const double z = std::max(q.z(), 1e-3);
       x1 = std::min(x1, camera_.fx * q.x() / z + camera_.cx);
@@ -140,6 +158,11 @@ class Renderer {
       y2 = std::max(y2, camera_.fy * q.y() / z + camera_.cy);
     }
     p.nearest = nearest;
+    if (camera_.fisheye) {
+      const cfp::Box<double> image = camera_.image_of(middle, radius);
+      p = {p.A_cam, p.origin, nearest, image.x1, image.y1, image.x2, image.y2};
+      return;
+    }
     const double margin = 1 + camera_.most_bent_px();
     if (nearest > 0.01) p = {p.A_cam, p.origin, nearest, x1 - margin, y1 - margin, x2 + margin, y2 + margin};
   }

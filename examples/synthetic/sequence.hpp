@@ -55,6 +55,13 @@ struct SequenceOptions {
     c.height = width * 3 / 4;
     return c;
   }
+  /// The lens of TUM-VI's cameras with 122 degrees from left to right.
+  static ImageCamera fisheye_camera(int width) {
+    ImageCamera c = default_camera(width);
+    c.fx = c.fy = 300 * width / 640.0;
+    c.fisheye = {c.fx, c.fy, c.cx, c.cy, 0.0034824, 0.00071503, -0.0020532, 0.00020294};
+    return c;
+  }
 };
 
 /// A real recording with poses that stands behind the people instead of the room.

@@ -72,11 +72,14 @@ inline void write_sequence(const Sequence& sequence, const std::filesystem::path
       truth(folder / "groundtruth.txt"), boxes(folder / "boxes.txt"), detections(folder / "detections.txt"),
       camera(folder / "camera.txt");
   const ImageCamera& c = options.camera;
-  camera << "# fx fy cx cy width height depth_units_per_metre; images are undistorted\n";
+  camera << "# fx fy cx cy width height depth_units_per_metre"
+         << (c.fisheye ? " fisheye k1 k2 k3 k4" : "; images are undistorted") << '\n';
   const double told = 1 + options.focal_error;
   for (const double value : {told * c.fx, told * c.fy, c.cx, c.cy, double(c.width), double(c.height)})
     camera << cfp_examples::general(value, 6) << ' ';
-  camera << cfp_examples::general(options.sensor.depth_units_per_metre, 6) << '\n';
+  camera << cfp_examples::general(options.sensor.depth_units_per_metre, 6);
+  if (c.fisheye) camera << " fisheye" << columns({c.fisheye->k1, c.fisheye->k2, c.fisheye->k3, c.fisheye->k4}, 8);
+  camera << '\n';
   rgb << "# color images: timestamp filename\n";
   depth << "# depth maps, 16-bit, 0 = none: timestamp filename\n";
   labels << "# labels, 8-bit, 0 = static, 1 = moving, 2 = part of a person but still: timestamp filename\n";

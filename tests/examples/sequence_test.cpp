@@ -60,7 +60,7 @@ TEST_CASE("A sound recording reads frame by frame, the same ahead or not", "[seq
   const Sequence sequence(folder.path);
   CHECK(
       (sequence.size() == 6 && sequence.notes().empty() && sequence.truth().empty() && sequence.true_boxes(0).empty()));
-  CHECK((sequence.camera().fx == 50 && sequence.camera().k1 == 0));
+  CHECK((sequence.calibration().fx == 50 && sequence.calibration().k1 == 0));
   PrefetchingReader reader(sequence);
   for (const std::size_t i : {0U, 1U, 2U, 4U, 3U, 4U, 5U, 5U, 0U}) {
     const SequenceFrame frame = reader.load(i), again = sequence.load(i);
@@ -198,6 +198,9 @@ TEST_CASE("What cannot be parsed refuses the recording with file and line", "[se
   refused("camera.txt", "50 50 16 12 32.5 24 5000\n", "camera.txt:1: ");
   refused("camera.txt", "50 nan 16 12 32 24 5000\n", "camera.txt:1: ");
   refused("camera.txt", "50 50 16 12 32 24 5000 0 0 0 0\n", "camera.txt:1: ");
+  refused("camera.txt", "50 50 16 12 32 24 5000 fisheye 0 0 0\n", "camera.txt:1: ");
+  refused("camera.txt", "50 50 16 12 32 24 5000 fisheye 0 0 0 x\n", "camera.txt:1: ");
+  refused("camera.txt", "50 50 16 12 32 24 5000 fish 0 0 0 0\n", "camera.txt:1: ");
   refused("camera.txt", "# k1 k2 p1 p2 k3 = 1 2 3\n50 50 16 12 32 24 5000\n", "camera.txt:1: ");
   refused("groundtruth.txt", "0 0 0 0 0 0 0\n", "groundtruth.txt:1: ");
   refused("boxes.txt", "0 1 2 3 4 5 1\n", "boxes.txt:1: ");
@@ -225,6 +228,15 @@ TEST_CASE("A camera is told from camera.txt with its distortion, or from the fol
   CHECK(cfp_examples::published_tum_camera("tum_fr2_desk").fx == 520.9);
   CHECK(cfp_examples::published_tum_camera("/data/rgbd_dataset_freiburg3_walking_xyz").fx == 535.4);
   CHECK(!cfp_examples::published_tum_camera("fr3").distorted());
+
+  const auto model = [&](const std::string& text) {
+    return cfp_examples::read_tum_camera(folder.write("camera.txt", text)).camera().model;
+  };
+  CHECK(std::holds_alternative<cfp::PinholeCamera<double>>(model(line)));
+  CHECK(std::get<cfp::RadialTangentialCamera<double>>(model(line + " 0 0 0 0 0.5")).k3 == 0.5);
+  const auto fisheye = std::get<cfp::KannalaBrandtCamera<double>>(model(line + " fisheye 0.1 0.2 0.3 0.4"));
+  CHECK((fisheye.fx == 517.3 && fisheye.cy == 255.3 && fisheye.k1 == 0.1 && fisheye.k2 == 0.2 && fisheye.k3 == 0.3 &&
+         fisheye.k4 == 0.4));
 }
 
 TEST_CASE("Labels, true boxes and truth come with the frames they belong to", "[sequence]") {
@@ -251,7 +263,8 @@ TEST_CASE("Real recordings open whole", "[sequence]") {
   CFP_REQUIRE_DATA(desk, "tum_fr1_desk_9");
   const Sequence a(walking), b(desk);
   CHECK((a.size() == 30 && a.notes().empty() && a.truth().size() == 29 && !a.calibration().distorted()));
-  CHECK((b.size() == 9 && b.notes().size() == 1 && b.camera().k3 == 1.1633 && b.truth_file() == "groundtruth.txt"));
+  CHECK(
+      (b.size() == 9 && b.notes().size() == 1 && b.calibration().k3 == 1.1633 && b.truth_file() == "groundtruth.txt"));
   for (const Sequence* sequence : {&a, &b}) {
     for (std::size_t i = 0; i < sequence->size(); i += 4) CHECK(sequence->load(i).usable);
   }

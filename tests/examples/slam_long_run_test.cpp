@@ -152,8 +152,7 @@ class Room {
   }
   static FrameSource source() {
     FrameSource source;
-    source.calibration.width = width, source.calibration.height = height;
-    source.camera = {525, 525, (width - 1) / 2.0, (height - 1) / 2.0};
+    source.calibration = {525, 525, (width - 1) / 2.0, (height - 1) / 2.0, width, height};
     return source;
   }
   [[nodiscard]] const cfp::SE3<double>& T_cam_room() const { return T_cam_room_; }
@@ -428,10 +427,7 @@ TEST_CASE("A long run over a wall with everything that goes wrong: each frame is
   constexpr std::size_t frames = 1000;
   Wall wall(3);
   FrameSource source;
-  source.calibration.fx = source.calibration.fy = 150;
-  source.calibration.cx = (Wall::width - 1) / 2.0, source.calibration.cy = (Wall::height - 1) / 2.0;
-  source.calibration.width = Wall::width, source.calibration.height = Wall::height;
-  source.camera = {150, 150, source.calibration.cx, source.calibration.cy};
+  source.calibration = {150, 150, (Wall::width - 1) / 2.0, (Wall::height - 1) / 2.0, Wall::width, Wall::height};
   source.size = frames;
   source.load = [&](std::size_t) { return wall.next(); };
   Options options;
@@ -462,7 +458,7 @@ TEST_CASE("A day in a room where all goes wrong: each frame is answered, and wha
   const View view = view_of(source, options);
   Room room(1, view);
   Judge judge(room);
-  Tracking tracking(source.camera.cast<float>(), view, options, judge);
+  Tracking tracking(source.calibration.camera().cast<float>(), view, options, judge);
   std::vector<double> times_ms;
   for (std::size_t k = 1; k <= frames; ++k) {
     FrontEndResult seen = room.next();
@@ -497,7 +493,7 @@ TEST_CASE("A clock that is set back while the camera is lost puts no new map off
   const Options options = fitted({}, source, Passers());
   const View view = view_of(source, options);
   Watcher watcher;
-  Tracking tracking(source.camera.cast<float>(), view, options, watcher);
+  Tracking tracking(source.calibration.camera().cast<float>(), view, options, watcher);
   Room room(1, view), other_room(2, view);
   FrameRecord record;
   for (int k = 0; k < 160; ++k) {

@@ -9,13 +9,12 @@
 
 #include "../../support/keypoint_grid.hpp"
 #include "../../support/orb_features.hpp"
-#include "cfp/geometry/camera.hpp"
-#include "cfp/geometry/radial_tangential_camera.hpp"
+#include "cfp/geometry/any_camera.hpp"
 #include "cfp/math/se3.hpp"
 
 namespace cfp_slam {
 
-using Camera = cfp::RadialTangentialCamera<float>;  // of the images
+using Camera = cfp::AnyCamera<float>;  // of the images
 using Descriptor = cfp_examples::OrbDescriptor;
 using cfp_examples::KeypointGrid;
 inline constexpr int no_point = -1;

@@ -88,7 +88,9 @@ class FrontEnd {
     const auto pixels = cfp::undistorted(camera_, cfp::view(frame.keypoints), frame.pixels);
     frame.depths_m.resize(frame.size());
     cfp::sample_depth(depth, cfp::view(frame.keypoints), metres_per_unit_, frame.depths_m);
+    frame.pixels.resize(frame.size());  // of a pinhole camera they are the keypoints
     for (std::size_t i = 0; i < frame.size(); ++i) {
+      frame.pixels[i] = {pixels(i, 0), pixels(i, 1)};
       if (!cfp::is_finite(pixels(i, 0))) frame.depths_m[i] = -1;  // no ray, no point
     }
     frame.static_probability.assign(frame.size(), 1.0F);

@@ -23,7 +23,7 @@ Options fitted(Options options, const FrameSource& source, const cfp_examples::D
 }
 
 View view_of(const FrameSource& source, const Options& options) {
-  const cfp::PinholeCamera<float> camera = source.camera.cast<float>().pinhole();
+  const cfp::PinholeCamera<float> camera = cfp::undistorted_camera(source.calibration.camera().cast<float>());
   return {camera,
           camera.cast<double>(),
           source.calibration.width,
@@ -37,7 +37,7 @@ View view_of(const FrameSource& source, const Options& options) {
 RunResult run_slam(const FrameSource& source, cfp_examples::Detector& detector, const Options& chosen,
                    Observer& observer) {
   const Options options = fitted(chosen, source, detector);
-  const Camera camera = source.camera.cast<float>();
+  const Camera camera = source.calibration.camera().cast<float>();
   FrontEnd front_end(camera, source.calibration.depth_units_per_metre, options, observer);
   Tracking tracking(camera, view_of(source, options), options, observer);
   const auto load = [&](std::size_t k) {
