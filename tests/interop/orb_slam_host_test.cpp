@@ -56,7 +56,8 @@ TEST_CASE("The adapter of ORB-SLAM2: two frames, weights of a wall and of people
         F = make_frame(1 + 1.0 / 30, scene.keypoints, scene.depths, scene.T_cur_prev * T_last);
   std::optional<std::vector<cfp::Detection<float>>> detections(std::in_place);
   for (const auto& box : scene.boxes) detections->push_back({box, 7, 1});
-  cfp_integration::StaticWeights<Host> weights({535.4F, 539.2F, 320.1F, 247.6F},
+  const cv::Mat K = (cv::Mat_<float>(3, 3) << 535.4F, 0, 320.1F, 0, 539.2F, 247.6F, 0, 0, 1);
+  cfp_integration::StaticWeights<Host> weights(Host::CameraOf(K, {}).value(),
                                                cfp_integration::StaticWeightsOptions(7, 640, 480));
   weights.NewFrame(last, detections, {});
   weights.NewFrame(F, detections, {scene.previous_keypoints, scene.keypoints});
@@ -117,6 +118,26 @@ TEST_CASE("ORB-SLAM3's poses, and a pose that is not there", "[interop]") {
   };
   CHECK(cfp_integration::OrbSlam3<Frame3>::Pose(Frame3{}).translation.z() == 3);
   CHECK(Host::Pose(Frame{}).translation.norm() == 0);
+}
+
+TEST_CASE("ORB-SLAM3's cameras: its fisheye is ours, two of them are refused", "[interop]") {
+  struct Model {
+    static constexpr unsigned CAM_FISHEYE = 1;
+    unsigned type = 1;
+    unsigned GetType() const { return type; }
+    float getParameter(int i) const { return 10.0F * float(i + 1); }
+  };
+  using Host3 = cfp_integration::OrbSlam3<Frame>;
+  const cv::Mat K = cv::Mat::eye(3, 3, CV_32F), none;
+  Model fisheye, pinhole{0};
+  const auto camera = std::get<cfp::KannalaBrandtCamera<float>>(
+      Host3::CameraOf(&fisheye, static_cast<const Model*>(nullptr), K, none).value().model);
+  CHECK((camera.fx == 10 && camera.fy == 20 && camera.cx == 30 && camera.cy == 40));
+  CHECK((camera.k1 == 50 && camera.k2 == 60 && camera.k3 == 70 && camera.k4 == 80));
+  const auto flat = Host3::CameraOf(&pinhole, static_cast<const Model*>(nullptr), K, none);
+  CHECK(std::holds_alternative<cfp::RadialTangentialCamera<float>>(flat.value().model));
+  CHECK_FALSE(Host3::CameraOf(&fisheye, &fisheye, K, none));
+  CHECK_FALSE(Host::CameraOf(none, none));
 }
 
 TEST_CASE("Flow of the frame before, with its depths", "[interop]") {

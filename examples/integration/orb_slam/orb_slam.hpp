@@ -2,18 +2,20 @@
 // theirs is needed here: `StaticWeights<OrbSlam2<ORB_SLAM2::Frame>>`.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include <opencv2/core.hpp>
 
 #include "../../support/room_mask.hpp"
 #include "cfp/frame/frame_state.hpp"
+#include "cfp/geometry/any_camera.hpp"
 #include "cfp/interop/opencv.hpp"
 #include "cfp/interop/opencv_flow.hpp"
 #include "static_weights.hpp"
 
 // Compiled in engines.cc alone: Tracking.cc includes this header, and is compiled often.
-extern template class cfp::StaticProbability<cfp::RadialTangentialCamera<float>>;
+extern template class cfp::StaticProbability<cfp::AnyCamera<float>>;
 
 namespace cfp_integration {
 
@@ -22,7 +24,13 @@ namespace cfp_integration {
 template <typename FrameType>
 struct OrbSlam2 {
   using Frame = FrameType;
-  using Camera = cfp::RadialTangentialCamera<float>;
+  using Camera = cfp::AnyCamera<float>;
+  // Of Tracking's members; none: it is not supported.
+  static std::optional<Camera> CameraOf(const cv::Mat& K, const cv::Mat& distortion) {
+    cfp::RadialTangentialCamera<float> camera;
+    if (cfp::to_camera(K, distortion, camera) != cfp::Status::ok) return std::nullopt;
+    return Camera{camera};
+  }
   static cfp::PointSpan<float, 2> Keys(const Frame& F) { return cfp::view(F.mvKeys); }
   static cfp::DescriptorSpan Descriptors(const Frame& F) { return cfp::descriptor_view(F.mDescriptors); }
   static cfp::SE3<double> Pose(const Frame& F) {
@@ -31,9 +39,18 @@ struct OrbSlam2 {
   }
 };
 
-// ORB-SLAM3 1.0 has Sophus poses. Pinhole cameras only: not the pair of fisheye cameras (Nleft != -1).
+// ORB-SLAM3 1.0 has Sophus poses and cameras of two models. Not the pair of fisheye cameras (Nleft != -1).
 template <typename FrameType>
 struct OrbSlam3 : OrbSlam2<FrameType> {
+  using Camera = typename OrbSlam2<FrameType>::Camera;
+  template <typename Model>
+  static std::optional<Camera> CameraOf(Model* model, const Model* second, const cv::Mat& K,
+                                        const cv::Mat& distortion) {
+    if (second != nullptr) return std::nullopt;
+    if (model->GetType() != model->CAM_FISHEYE) return OrbSlam2<FrameType>::CameraOf(K, distortion);
+    const auto p = [&](int i) { return model->getParameter(i); };
+    return Camera{cfp::KannalaBrandtCamera<float>{p(0), p(1), p(2), p(3), p(4), p(5), p(6), p(7)}};
+  }
   static cfp::SE3<double> Pose(const FrameType& F) {
     const auto T_cam_world = F.GetPose();
     return {T_cam_world.rotationMatrix().template cast<double>(), T_cam_world.translation().template cast<double>()};

@@ -41,10 +41,10 @@ std::string settings_of(const cfp_examples::TumCamera& c, const std::string& fil
   std::ofstream out(file);
   out << std::showpoint  // ORB-SLAM3 takes 0 for no real number
       << "%YAML:1.0\n"
-      << "Camera.type: PinHole\nCamera.fx: " << c.fx << "\nCamera.fy: " << c.fy << "\nCamera.cx: " << c.cx
-      << "\nCamera.cy: " << c.cy << "\nCamera.k1: " << c.k1 << "\nCamera.k2: " << c.k2 << "\nCamera.p1: " << c.p1
-      << "\nCamera.p2: " << c.p2 << "\nCamera.k3: " << c.k3
-      << "\nCamera.fps: 30.0\nCamera.bf: 40.0\nCamera.RGB: 0\nThDepth: 40.0\n"
+      << "Camera.type: " << (c.fisheye ? "KannalaBrandt8" : "PinHole") << "\nCamera.fx: " << c.fx
+      << "\nCamera.fy: " << c.fy << "\nCamera.cx: " << c.cx << "\nCamera.cy: " << c.cy << "\nCamera.k1: " << c.k1
+      << "\nCamera.k2: " << c.k2 << "\nCamera.p1: " << c.p1 << "\nCamera.p2: " << c.p2 << "\nCamera.k3: " << c.k3
+      << "\nCamera.k4: " << c.k4 << "\nCamera.fps: 30.0\nCamera.bf: 40.0\nCamera.RGB: 0\nThDepth: 40.0\n"
       << "DepthMapFactor: " << c.depth_units_per_metre << "\nORBextractor.nFeatures: 1000\n"
       << "ORBextractor.scaleFactor: 1.2\nORBextractor.nLevels: 8\nORBextractor.iniThFAST: 20\n"
       << "ORBextractor.minThFAST: 7\n";
@@ -57,6 +57,7 @@ void run(const char* vocabulary, const char* folder, const std::string& trajecto
   const cfp_examples::Sequence recording(folder);
   cfp_examples::FileDetector detector(std::string(folder) + "/detections.txt", {});
   const auto& camera = recording.calibration();
+  if (camera.fisheye && !mono) throw std::runtime_error("they take no depths with a fisheye: run it with mono");
   host::System slam(vocabulary, settings_of(camera, trajectory + ".yaml"),
                     mono ? host::System::MONOCULAR : host::System::RGBD, false);
   const bool plain = variant == cfp::Variant::plain;

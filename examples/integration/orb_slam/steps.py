@@ -43,14 +43,13 @@ def without_dynamic_points(step, function, times):
             r"if(!pMP->isBad() && pMP->mStaticProbability>0\1", times)
 
 
-def adapter(host, supported):
-    """Step 2 in Tracking.h: what the host is called, and which cameras are supported."""
+def adapter(host, camera):
+    """Step 2 in Tracking.h: what the host is called, and what of Tracking tells its camera."""
     return (2, "include/Tracking.h", "", r"(\nclass Tracking\s*\n\{\s*\n\s*public:)",
             r"\ntypedef cfp_integration::StaticWeights<cfp_integration::" + host + r"<Frame> > StaticWeights;\n\1"
             r"\n    // cfp\n    void UseStaticWeights(const cfp::FrameOptions &options)\n    {\n"
-            r"        cfp::RadialTangentialCamera<float> camera;\n"
-            r"        if(" + supported + r"cfp::to_camera(mK,mDistCoef,camera)==cfp::Status::ok)\n"
-            r"            mpStaticWeights.reset(new StaticWeights(camera,options));\n        else\n"
+            r"        const auto camera = cfp_integration::" + host + r"<Frame>::CameraOf(" + camera + r");\n"
+            r"        if(camera)\n            mpStaticWeights.reset(new StaticWeights(*camera,options));\n        else\n"
             r'            std::cerr << "cfp: this camera is not supported, static weights are off" << std::endl;' r"\n    }\n"
             r"    std::optional<std::vector<cfp::Detection<float> > > mDetections;  // of the next image\n"
             r"    std::unique_ptr<StaticWeights> mpStaticWeights;\n    cfp_integration::FrameFlow mFlow;\n"
@@ -75,7 +74,7 @@ ORB_SLAM2 = [
      "#include <opencv2/imgcodecs/legacy/constants_c.h>\n#endif", 1),
     (0, "include/LoopClosing.h", "", r"std::pair<(?:const KeyFrame\*|KeyFrame\* ?const), ?g2o::Sim3>",
      "std::pair<KeyFrame* const, g2o::Sim3>", 1),
-    adapter("OrbSlam2", ""),
+    adapter("OrbSlam2", "mK,mDistCoef"),
     (4, "src/Tracking.cc", "Tracking::StereoInitialization()", r"(new MapPoint\(x3D,pKFini,mpMap\);)",
      r"\1\n                pNewMP->mStaticProbability = InitialM(mCurrentFrame,i);", 1),
     (5, "src/Tracking.cc", "", r"Optimizer::PoseOptimization\(&mCurrentFrame\)", "PoseOptimization()", 6),
@@ -91,7 +90,7 @@ INERTIAL = [f"Optimizer::PoseInertialOptimizationLast{last}(" for last in ("KeyF
 INERTIAL_BA = "Optimizer::LocalInertialBA(KeyFrame *pKF"
 
 ORB_SLAM3 = [
-    adapter("OrbSlam3", "mpCamera->GetType()==GeometricCamera::CAM_PINHOLE && !mpCamera2 &&\n           "),
+    adapter("OrbSlam3", "mpCamera,mpCamera2,mK,mDistCoef"),
     *[(2, "src/Tracking.cc", function, *reset(r"(mvIniMatches\.clear\(\);)"))
       for function in ("Tracking::ResetActiveMap(", "Tracking::CreateMapInAtlas()")],
     (4, "src/Tracking.cc", "Tracking::StereoInitialization()", r"(\n[ \t]*)(MapPoint\* pNewMP = new MapPoint[^\n]*)",
