@@ -22,25 +22,26 @@ namespace synthetic {
 
 enum Label : unsigned char { label_static = 0, label_moving = 1, label_person_still = 2 };
 
-/// A pinhole camera or, with a focal length, a fisheye, which then has all of its own.
+/// A pinhole camera, or the fisheye where there is one.
 struct ImageCamera : cfp::PinholeCamera<double> {
   int width = 640, height = 480;
   double lens = 0;  ///< the ray of a pixel is (1 + lens r^2) times as far from the axis as the pinhole's, r at depth 1
   std::optional<cfp::KannalaBrandtCamera<double>> fisheye;
 
   [[nodiscard]] Vector3d ray(double x, double y) const {
+    Vector3d found(0, 0, 1);
+    if (fisheye && fisheye->unproject({x, y}, found)) return found;
+    if (fisheye) throw std::logic_error("a pixel of the fisheye has no ray");
     const Eigen::Vector2d plain((x - cx) / fx, (y - cy) / fy);
     const Eigen::Vector2d bent = (1 + lens * plain.squaredNorm()) * plain;
-    Vector3d found(bent.x(), bent.y(), 1);
-    if (fisheye && !fisheye->unproject({x, y}, found)) throw std::logic_error("a pixel of the fisheye has no ray");
-    return found;
+    return {bent.x(), bent.y(), 1};
   }
   /// No pixel's ray is farther from the pinhole's, px.
   [[nodiscard]] double most_bent_px() const {
     const double r = std::hypot(std::max(cx, width - cx) / fx, std::max(cy, height - cy) / fy);
     return std::abs(lens) * r * r * r * std::max(fx, fy);
   }
-  /// A rectangle that holds the image of a sphere.
+  /// A rectangle that holds the fisheye's image of a sphere.
   [[nodiscard]] cfp::Box<double> image_of(const Vector3d& centre, double radius) const {
     const double distance = centre.norm(), across = std::hypot(centre.x(), centre.y());
     if (!(distance > 1.01 * radius)) return {0, 0, width * 1.0, height * 1.0};

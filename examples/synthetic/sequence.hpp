@@ -256,6 +256,7 @@ inline Recording read_recording(const std::filesystem::path& folder, double came
   recording.camera.fy = camera.fy;
   recording.camera.cx = camera.cx;
   recording.camera.cy = camera.cy;
+  if (camera.fisheye) recording.camera.fisheye = std::get<cfp::KannalaBrandtCamera<double>>(camera.camera().model);
   recording.camera.width = camera.width;
   recording.camera.height = camera.height;
   recording.depth_units_per_metre = camera.depth_units_per_metre;

@@ -79,9 +79,10 @@ TEST_CASE("A frame depends on the seed and its number alone", "[synthetic]") {
 }
 
 TEST_CASE("True depth lies on the nearest surface of the scene", "[synthetic]") {
-  for (const int kind : {0, 1, 2, 3, 4, 5}) {
+  for (const int kind : {0, 1, 2, 3, 4, 5, 6, 7}) {
     auto options = of_kind(kind % 4, Motion::halfsphere);
-    options.camera.lens = kind < 4 ? 0 : kind == 4 ? 0.08 : -0.08;
+    options.camera.lens = kind == 4 ? 0.08 : kind == 5 ? -0.08 : 0;
+    if (kind > 5) options.camera = SequenceOptions::fisheye_camera(160);
     const Sequence sequence(options);
     const int frame = 75;
     const auto out = rendered(sequence, frame);
@@ -454,6 +455,22 @@ TEST_CASE("A written folder is the same from one thread and from three, and read
     CHECK((truth[i].T_world_cam.translation - sequence.T_world_cam(k).translation).norm() < 1e-8);
     CHECK(same(cv::imread((folder.path / "one" / images[i].file).string(), cv::IMREAD_UNCHANGED),
                rendered(sequence, k).color));
+  }
+}
+
+TEST_CASE("A fisheye is told in camera.txt: its pixels are those of the rays that were rendered", "[synthetic]") {
+  auto options = small(Scenario::walking, Motion::xyz);
+  options.frames = 1;
+  options.camera = SequenceOptions::fisheye_camera(160);
+  const cfp_test::TemporaryFolder folder;
+  write_sequence(Sequence(options), folder.path, 1, [](int) {});
+  const cfp::AnyCamera<double> camera = cfp_examples::read_tum_camera(folder.path / "camera.txt").camera();
+  for (const double x : {0.0, 40.0, 159.0}) {
+    for (const double y : {0.0, 70.0, 119.0}) {
+      cfp::Vector2<double> pixel(-7, -7);
+      REQUIRE(camera.project(options.camera.ray(x, y), pixel));
+      CHECK((pixel - cfp::Vector2<double>(x, y)).norm() < 0.01);
+    }
   }
 }
 
