@@ -198,6 +198,21 @@ TEMPLATE_TEST_CASE("A camera from OpenCV's matrices projects as they say", "[int
   CHECK(refused(K, cv::Mat::ones(1, 5, CV_64F) * std::numeric_limits<double>::quiet_NaN()));
 }
 
+TEMPLATE_TEST_CASE("A fisheye from OpenCV's matrices has four coefficients", "[interop]", float, double) {
+  const cv::Mat K = (cv::Mat_<double>(3, 3) << 300, 0, 320, 0, 290, 250, 0, 0, 1);
+  const cv::Mat coefficients = (cv::Mat_<double>(1, 4) << 0.1, -0.2, 0.3, -0.4);
+  cfp::KannalaBrandtCamera<TestType> camera;
+  REQUIRE(cfp::to_camera(K, coefficients, camera) == cfp::Status::ok);
+  CHECK((camera.fx == 300 && camera.fy == 290 && camera.cx == 320 && camera.cy == 250));
+  CHECK((camera.k1 == TestType(0.1) && camera.k2 == TestType(-0.2) && camera.k3 == TestType(0.3) &&
+         camera.k4 == TestType(-0.4)));
+  CHECK(cfp::to_camera(K, cv::Mat::zeros(5, 1, CV_64F), camera) == cfp::Status::invalid_input);
+  CHECK(cfp::to_camera(cv::Mat(K.t()), coefficients, camera) == cfp::Status::invalid_input);
+  CHECK(camera.k4 == TestType(-0.4));
+  REQUIRE(cfp::to_camera(K, {}, camera) == cfp::Status::ok);
+  CHECK((camera.k1 == 0 && camera.k4 == 0));
+}
+
 TEST_CASE("A matrix of no camera is refused: transposed, scaled, or not finite where no camera parameter stands",
           "[interop]") {
   const cv::Mat K = (cv::Mat_<double>(3, 3) << 535.4, 0, 320.1, 0, 539.2, 247.6, 0, 0, 1);

@@ -3,6 +3,7 @@
 /// none of its libraries, as opencv.hpp, which includes it.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -11,6 +12,7 @@
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/status.hpp"
+#include "cfp/geometry/kannala_brandt_camera.hpp"
 #include "cfp/geometry/radial_tangential_camera.hpp"
 #include "cfp/math/se3.hpp"
 
@@ -61,6 +63,32 @@ template <typename T>
     if (before > 0 && after > 0 && std::abs(metres / before + metres / after - 2) > 0.05F) return true;
   }
   return false;
+}
+
+// fx, fy, cx, cy and four or `most` coefficients, or none; false for what is no camera.
+template <typename Scalar>
+[[nodiscard]] bool read_camera(const cv::Mat& camera_matrix, const cv::Mat& distortion, int most,
+                               Scalar (&values)[9]) noexcept {
+  if (!is_real_matrix(camera_matrix) || camera_matrix.rows != 3 || camera_matrix.cols != 3) return false;
+  const PinholeCamera<double> pinhole{element(camera_matrix, 0, 0), element(camera_matrix, 1, 1),
+                                      element(camera_matrix, 0, 2), element(camera_matrix, 1, 2)};
+  const Matrix3<double> K = pinhole.matrix();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      if (element(camera_matrix, row, column) != K(row, column)) return false;
+    }
+  }
+  const PinholeCamera<Scalar> read = pinhole.template cast<Scalar>();
+  values[0] = read.fx, values[1] = read.fy, values[2] = read.cx, values[3] = read.cy;
+  if (distortion.data != nullptr) {  // empty() is a call of the library
+    const int count = distortion.rows * distortion.cols;
+    if (!is_real_matrix(distortion) || (distortion.rows != 1 && distortion.cols != 1)) return false;
+    if (count != 4 && count != most) return false;
+    for (int i = 0; i < count; ++i)
+      values[4 + i] =
+          static_cast<Scalar>(element(distortion, distortion.rows == 1 ? 0 : i, distortion.rows == 1 ? i : 0));
+  }
+  return read.fx > 0 && read.fy > 0 && std::all_of(values, values + 9, [](Scalar value) { return is_finite(value); });
 }
 
 }  // namespace CFP_ISA
@@ -120,32 +148,18 @@ template <typename Scalar>
 template <typename Scalar>
 [[nodiscard]] Status to_camera(const cv::Mat& camera_matrix, const cv::Mat& distortion,
                                RadialTangentialCamera<Scalar>& camera) noexcept {
-  if (!detail::is_real_matrix(camera_matrix) || camera_matrix.rows != 3 || camera_matrix.cols != 3)
-    return Status::invalid_input;
-  double values[9] = {detail::element(camera_matrix, 0, 0), detail::element(camera_matrix, 1, 1),
-                      detail::element(camera_matrix, 0, 2), detail::element(camera_matrix, 1, 2)};
-  if (distortion.data != nullptr) {  // empty() is a call of the library
-    const int count = distortion.rows * distortion.cols;
-    if (!detail::is_real_matrix(distortion) || (distortion.rows != 1 && distortion.cols != 1))
-      return Status::invalid_input;
-    if (count != 4 && count != 5) return Status::invalid_input;
-    for (int i = 0; i < count; ++i)
-      values[4 + i] = detail::element(distortion, distortion.rows == 1 ? 0 : i, distortion.rows == 1 ? i : 0);
-  }
-  for (const double value : values) {
-    if (!is_finite(static_cast<Scalar>(value))) return Status::invalid_input;
-  }
-  const PinholeCamera<double> pinhole{values[0], values[1], values[2], values[3]};
-  const Matrix3<double> K = pinhole.matrix();
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      if (detail::element(camera_matrix, row, column) != K(row, column)) return Status::invalid_input;
-    }
-  }
-  if (!(static_cast<Scalar>(pinhole.fx) > 0 && static_cast<Scalar>(pinhole.fy) > 0)) return Status::invalid_input;
-  const RadialTangentialCamera<double> read{values[0], values[1], values[2], values[3], values[4],
-                                            values[5], values[6], values[7], values[8]};
-  camera = read.template cast<Scalar>();
+  Scalar v[9] = {};
+  if (!detail::read_camera(camera_matrix, distortion, 5, v)) return Status::invalid_input;
+  camera = {v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8]};
+  return Status::ok;
+}
+/// The same of OpenCV's fisheye model, whose coefficients are k1, k2, k3, k4.
+template <typename Scalar>
+[[nodiscard]] Status to_camera(const cv::Mat& camera_matrix, const cv::Mat& distortion,
+                               KannalaBrandtCamera<Scalar>& camera) noexcept {
+  Scalar v[9] = {};
+  if (!detail::read_camera(camera_matrix, distortion, 4, v)) return Status::invalid_input;
+  camera = {v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7]};
   return Status::ok;
 }
 
