@@ -16,7 +16,7 @@ PRECOMPILED = ["support/catch.hpp", *(f"<{h}>" for h in "Eigen/Core algorithm ar
 
 ENGINES = {  # what the tests of a room instantiate alike, compiled once, and the flag that leaves it to that
     "frame": (TESTS / "support/engines.cpp", ["-DCFP_TEST_ENGINES_LINKED"]),
-    "interop": (ROOT / "examples/integration/orb_slam/engines.cc", []),
+    "interop": (ROOT / "examples/integration/engines.cc", []),
 }
 
 

@@ -14,7 +14,7 @@
 #include "cfp/interop/opencv_flow.hpp"
 #include "static_weights.hpp"
 
-// Compiled in engines.cc alone: Tracking.cc includes this header, and is compiled often.
+// Compiled in ../engines.cc alone: Tracking.cc includes this header, and is compiled often.
 extern template class cfp::StaticProbability<cfp::AnyCamera<float>>;
 
 namespace cfp_integration {

@@ -120,7 +120,7 @@ BOTH = [
      "set(CMAKE_CXX_STANDARD 17)\nadd_definitions(-DCOMPILEDWITHC11)\n", 1),
     (0, "CMakeLists.txt", "", r"(\ninclude_directories\(\n)",
      lambda found: f"{found[1]}{HERE.parents[2]}/include\n{HERE.parents[1]}\n{HERE}\n", 1),
-    (0, "CMakeLists.txt", "", r"(src/System\.cc\n)", lambda found: f"{found[1]}{HERE}/engines.cc\n", 1),
+    (0, "CMakeLists.txt", "", r"(src/System\.cc\n)", lambda found: f"{found[1]}{HERE.parent}/engines.cc\n", 1),
     (0, "include/LoopClosing.h", "", r"(?:bool|int) mnFullBAIdx;", "int mnFullBAIdx;", 1),
     # 1: what a frame, a keyframe and a map point hold, and their copies
     (1, "include/Frame.h", "", r"(std::vector<bool> mvbOutlier;)",

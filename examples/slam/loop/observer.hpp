@@ -5,7 +5,7 @@
 #include "map.hpp"
 #include "record.hpp"
 
-// Compiled in integration/orb_slam/engines.cc alone.
+// Compiled in integration/engines.cc alone.
 extern template class cfp::StaticProbability<cfp_slam::Camera>;
 
 namespace cfp_slam {
