@@ -209,7 +209,7 @@ template struct cfp::FlowModel<float>;
 template struct cfp::FlowModel<double>;
 template class cfp::StaticProbability<cfp::PinholeCamera<float>>;
 template class cfp::StaticProbability<cfp::PinholeCamera<double>>;
-template class cfp::StaticProbability<cfp::RadialTangentialCamera<float>>;
+template class cfp::StaticProbability<cfp::AnyCamera<float>>;
 template class cfp::StaticProbability<cfp::RadialTangentialCamera<double>>;
 template <typename Scalar>
 static void instantiate_frame() noexcept {

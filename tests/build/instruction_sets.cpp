@@ -141,7 +141,9 @@ void bundles(const std::vector<cfp_test::BaScene>& scenes, Results& results) {
 
 /// Errors of the refined path, and a lens that bends.
 void judgement(const std::vector<cfp_test::BaScene>& scenes, Results& results) {
-  const cfp::RadialTangentialCamera<double> lens{535.4, 539.2, 320.1, 247.6, 0.23, -0.78, -0.003, 0.001, 0.9};
+  const cfp::AnyCamera<double> lens{
+      cfp::RadialTangentialCamera<double>{535.4, 539.2, 320.1, 247.6, 0.23, -0.78, -0.003, 0.001, 0.9}};
+  std::vector<std::array<double, 2>> storage;
   for (const cfp_test::BaScene& scene : scenes) {
     std::vector<cfp::StampedPose<double>> truth, estimate;
     for (std::size_t i = 0; i < scene.poses.size(); ++i) {
@@ -149,6 +151,9 @@ void judgement(const std::vector<cfp_test::BaScene>& scenes, Results& results) {
       estimate.push_back({static_cast<double>(i), scene.poses[i].inverse()});
     }
     results.add("trajectory error", cfp::absolute_trajectory_error(truth, estimate).translation_m.rmse, 1e-9);
+    (void)cfp::undistorted(lens, scene.pixels, storage);
+    for (const auto& [x, y] : storage)
+      results.add("pixel without distortion", cfp::is_finite(x + y) ? x + y : -1, 1e-6);
     for (const auto& measured : scene.pixels) {
       cfp::Vector3<double> ray = cfp::Vector3<double>::Zero();
       results.add("ray of a pixel", lens.unproject(measured, ray) ? ray.x() : -1, 1e-9);
