@@ -36,6 +36,7 @@ void for_each_option(Options& o, const Visit& visit) {
   visit("probability.coarse.flow_radius_px", p.coarse.flow_radius_px);
   visit("probability.coarse.flow_depth_radius_px", p.coarse.flow_depth_radius_px);
   visit("probability.coarse.unreported.radius_px", p.coarse.unreported.radius_px);
+  visit("probability.coarse.unreported.max_parallax", p.coarse.unreported.max_parallax);
   visit("probability.coarse.flow.camera_acceleration_m_s2", p.coarse.flow.camera_acceleration_m_s2);
   visit("probability.coarse.flow.motion.min_sigma_px", p.coarse.flow.motion.min_sigma_px);
   visit("probability.coarse.flow.motion.max_sigma_px", p.coarse.flow.motion.max_sigma_px);
