@@ -61,9 +61,10 @@ void run(const char* vocabulary, const char* folder, const std::string& trajecto
   host::System slam(vocabulary, settings_of(camera, trajectory + ".yaml"),
                     mono ? host::System::MONOCULAR : host::System::RGBD, false);
   const bool plain = variant == cfp::Variant::plain;
-  if (!plain)
-    slam.UseStaticWeights(cfp::variant_options(
-        variant, cfp_integration::StaticWeightsOptions(detector.class_of("person"), camera.width, camera.height)));
+  cfp::FrameOptions options = cfp::variant_options(
+      variant, cfp_integration::StaticWeightsOptions(detector.class_of("person"), camera.width, camera.height));
+  if (mono) options.fine.min_translation_m = 0;  // the map's unit is no metre
+  if (!plain) slam.UseStaticWeights(options);
 
   std::vector<double> milliseconds;
   const double times = speed();
