@@ -27,6 +27,14 @@ struct Frame {
   std::vector<float> mvStaticProbability, mvWeight;
 };
 
+// ORB-SLAM3's GeometricCamera.
+struct Model {
+  static constexpr unsigned CAM_FISHEYE = 1;
+  unsigned type = 1;
+  unsigned GetType() const { return type; }
+  float getParameter(int i) const { return 10.0F * float(i + 1); }
+};
+
 using Host = cfp_integration::OrbSlam2<Frame>;
 
 cv::Mat pose_matrix(const cfp::SE3<double>& T) {
@@ -121,12 +129,6 @@ TEST_CASE("ORB-SLAM3's poses, and a pose that is not there", "[interop]") {
 }
 
 TEST_CASE("ORB-SLAM3's cameras: its fisheye is ours, two of them are refused", "[interop]") {
-  struct Model {
-    static constexpr unsigned CAM_FISHEYE = 1;
-    unsigned type = 1;
-    unsigned GetType() const { return type; }
-    float getParameter(int i) const { return 10.0F * float(i + 1); }
-  };
   using Host3 = cfp_integration::OrbSlam3<Frame>;
   const cv::Mat K = cv::Mat::eye(3, 3, CV_32F), none;
   Model fisheye, pinhole{0};
