@@ -142,8 +142,8 @@ void epipolar_distances(const Matrix3<Scalar>& F, const FundamentalCovariance& c
     const Vector2<Scalar> previous = pairs.previous[i], current = pairs.current[i];
     const Vector3<double> p(static_cast<double>(previous[0]), static_cast<double>(previous[1]), 1),
         q(static_cast<double>(current[0]), static_cast<double>(current[1]), 1);
-    Eigen::Matrix<double, 9, 1> a;
-    a << q[0] * p, q[1] * p, p;
+    const Matrix3<double> transposed = p * q.transpose();
+    const Eigen::Map<const Eigen::Matrix<double, 9, 1>> a(transposed.data());
     const double sigma = static_cast<double>(sigma_px * pairs.relative_sigma(i)),
                  normal_sq = static_cast<double>(epipolar_line(F, previous).template head<2>().squaredNorm()),
                  variance = a.dot(covariance.lazyProduct(a)) / (sigma * sigma * normal_sq);
