@@ -72,6 +72,28 @@ TEST_CASE("Where the polynomial of a fisheye has fallen, it is trusted no more",
   }
 }
 
+TEST_CASE("Whatever a fisheye projects has its ray, whose radius lies beyond where r ceases to rise or not",
+          "[geometry]") {
+  cfp::Random random(4, "folding fisheyes");
+  int projected = 0, begun_beyond = 0;
+  for (int trial = 0; trial < 20000; ++trial) {
+    KannalaBrandtCamera<double> camera{500, 500, 320, 240};
+    camera.k1 = random.uniform(-0.3, 0.3), camera.k2 = random.uniform(-0.1, 0.1);
+    camera.k3 = random.uniform(-0.05, 0.05), camera.k4 = random.uniform(-0.03, 0.03);
+    const double angle = random.uniform(0.1, 1.5), turn = random.uniform(0, 6.28);
+    const Vector3<double> seen(std::tan(angle) * std::cos(turn), std::tan(angle) * std::sin(turn), 1);
+    Vector2<double> pixel(0, 0);
+    Vector3<double> ray(0, 0, 0);
+    // Near the fold a pixel tells little of its ray.
+    if (!camera.project(seen, pixel) || camera.slope(angle) < 0.1) continue;
+    ++projected;
+    begun_beyond += camera.slope(std::hypot(pixel.x() - 320, pixel.y() - 240) / 500) < 0 ? 1 : 0;
+    REQUIRE(camera.unproject(pixel, ray));
+    CHECK((ray - seen).norm() <= 1e-6 * seen.norm());
+  }
+  CHECK((projected > 5000 && begun_beyond > 50));
+}
+
 TEMPLATE_TEST_CASE("No coefficient, pixel or point breaks a fisheye", "[geometry]", float, double) {
   using T = TestType;
   cfp::Random random(4, "fisheye");

@@ -83,8 +83,9 @@ struct KannalaBrandtCamera {
     return detail::project_distorted(*this, point, pixel, jacobian);
   }
 
-  /// The ray through a pixel, scaled to z = 1, by Newton's method on the angle. False, and ray untouched, when no ray
-  /// before 90 degrees and up to which r rises gives the pixel, or anything is not finite.
+  /// The ray through a pixel, scaled to z = 1, by Newton's method on the angle, by bisection where that fails. False,
+  /// and ray untouched, when no ray before 90 degrees and up to which r rises gives the pixel, or anything is not
+  /// finite.
   [[nodiscard]] CFP_INLINE bool unproject(const Vector2<Scalar>& pixel, Vector3<Scalar>& ray) const noexcept {
     using std::sqrt;
     using std::tan;
@@ -98,15 +99,24 @@ struct KannalaBrandtCamera {
     }
     const Scalar radius = sqrt(s), last = Scalar(0.4999) * Scalar(pi<double>);
     const Scalar most = Scalar(8) * Scalar(std::numeric_limits<Scalar>::epsilon()) * (Scalar(1) + radius);
-    Scalar angle = radius < last ? radius : last;
     const auto found = [&](const Scalar& error) { return error <= most && -error <= most; };
+    const auto solves = [&](const Scalar& at) { return found(at * stretch(at) - radius) && rises_to(at); };
+    Scalar angle = radius < last ? radius : last;
     for (int step = 0; step < 20; ++step) {
       const Scalar error = angle * stretch(angle) - radius;
       if (found(error)) break;
       const Scalar next = angle - error / slope(angle);
       angle = !(next > Scalar(0)) ? Scalar(0.5) * angle : next < last ? next : last;
     }
-    if (!found(angle * stretch(angle) - radius) || !rises_to(angle)) return false;
+    if (!solves(angle)) {  // no ray, or it began, or went, beyond where r ceases to rise
+      if (last * stretch(last) < radius && rises_to(last)) return false;
+      Scalar low = Scalar(0), high = last;
+      for (int halving = 0; halving < 60; ++halving) {
+        angle = Scalar(0.5) * (low + high);
+        (angle * stretch(angle) < radius && rises_to(angle) ? low : high) = angle;
+      }
+      if (!solves(angle)) return false;
+    }
     const Scalar ratio = tan(angle) / radius;
     ray = {x * ratio, y * ratio, Scalar(1)};
     return true;
