@@ -281,8 +281,10 @@ TEST_CASE("The flow at a keypoint's place is the score of the next pair in its b
       for (std::size_t p = 0; run.state.box[i] != cfp::no_box && p < pairs; ++p) {
         const double x = frame.flow.current(p, 0), y = frame.flow.current(p, 1);
         const double apart = std::hypot(x - run.scene.keypoints[i][0], y - run.scene.keypoints[i][1]);
+        const double depth = run.scene.depths[i], its = run.scene.previous_depths[p];
         if (!cfp::contains(run.state.boxes[std::size_t(run.state.box[i])].box, x, y) || !(apart < nearest) ||
-            run.state.flow_distances[p] < 0)
+            run.state.flow_distances[p] < 0 ||
+            (cfp::is_valid_depth(depth) && cfp::is_valid_depth(its) && std::abs(its - depth) > 0.1 * depth))
           continue;
         nearest = apart, expected = cfp::object_score(run.state.flow_distances[p], scored);
       }
@@ -291,6 +293,39 @@ TEST_CASE("The flow at a keypoint's place is the score of the next pair in its b
     }
     CHECK((found > 50 && none > 50));
   }
+}
+
+TEST_CASE("The wall beside a walker's silhouette does not move with him", "[frame]") {
+  DynamicSceneOptions walking = quiet();
+  walking.people = 1;
+  walking.person_motion_m = 0.06;
+  FrameRun<double> run(make_dynamic_scene<double>(walking, 3));
+  cfp::Frame<double> frame = run.frame();
+  frame.flow.previous_depths = run.scene.previous_depths;
+  const cfp::Box<double> box = run.scene.boxes[0];
+  // Of every keypoint on him one of the wall, three pixels beside, that the flow has not.
+  std::vector<std::array<double, 2>> keypoints = run.scene.keypoints;
+  std::vector<double> depths = run.scene.depths;
+  for (std::size_t i = 0; i < run.scene.keypoints.size(); ++i) {
+    const auto& [x, y] = run.scene.keypoints[i];
+    if (!cfp::contains(box, x + 3, y) || run.scene.is_person[i] == 0) continue;
+    keypoints.push_back({x + 3, y});
+    depths.push_back(2 * run.scene.depths[i]);
+  }
+  const std::size_t own = run.scene.keypoints.size();
+  REQUIRE(keypoints.size() > own + 20);
+  frame.keypoints = keypoints;
+  frame.depths = depths;
+  run.coarse({}, frame, run.scene.camera);
+  REQUIRE(run.state.report.flow_model == cfp::FlowModelKind::motion);
+  int moving = 0, accused = 0;
+  for (std::size_t i = 0; i < keypoints.size(); ++i) {
+    const bool moves = run.state.flow_probability[i] >= 0 && run.state.flow_probability[i] < 0.5;
+    if (i >= own) accused += moves ? 1 : 0;
+    if (i < own) moving += moves ? 1 : 0;
+  }
+  CHECK(moving > 20);
+  CHECK(accused == 0);
 }
 
 TEST_CASE("What moves and nobody reported loses its weight by the flow around it, and makes no map points", "[frame]") {

@@ -56,8 +56,8 @@ struct CoarseOptions {
   bool use_object_probability = true;  ///< false: O of every object is unknown (the paper's CFP-SLAM-)
   bool use_depth_foreground = true;    ///< false: all keypoints in a box are its foreground (W/O-DBS)
   bool soft_background = true;         ///< false: background keypoints keep K = 1, as do all outside (W/O-KSP)
-  /// WeightRule::posterior: a keypoint in a box is judged by the flow pair nearest to it, if one lies within; by
-  /// its object else. >= 0; 0: always by its object.
+  /// WeightRule::posterior: a keypoint in a box is judged by the flow pair nearest to it, if one lies within and is at
+  /// its depth where both have one (unreported.depth_share); by its object else. >= 0; 0: always by its object.
   double flow_radius_px = 10;
   /// Flow that comes without depths, and without an F of the host, takes them from the frame before: each pair that of
   /// the nearest keypoint which has one, within this. >= 0; 0: it has none (cfp_object_flow_study).

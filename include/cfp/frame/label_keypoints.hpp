@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
@@ -17,13 +18,14 @@ namespace cfp {
 namespace detail {
 inline namespace CFP_ISA {
 
-/// Sets state.flow_probability: the score of the flow pair next to the keypoint, among the pairs in its box; after
-/// estimate_objects.
+/// Sets state.flow_probability: the score of the flow pair next to the keypoint, among the pairs in its box and, where
+/// both have one, at its depth: what stands beside somebody's silhouette is no part of him. After estimate_objects.
 template <typename Scalar>
 void score_flow_at_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   const Scalar radius_px = static_cast<Scalar>(options.coarse.flow_radius_px);
   if (radius_px <= 0 || state.report.flow_model == FlowModelKind::none || state.boxes.empty()) return;
   const ObjectProbabilityOptions scored = scaled_to_flow(options.coarse.object, state.report);
+  const Scalar depth_share = static_cast<Scalar>(options.coarse.unreported.depth_share);
   PointGrid<Scalar>& grid = state.scratch.grid;
   const auto is_known = [&](std::size_t p) { return has_distance(state.flow_distances[p]); };
   fill_grid(frame.flow.current, is_known, radius_px, grid);
@@ -31,8 +33,12 @@ void score_flow_at_keypoints(const Frame<Scalar>& frame, const FrameOptions& opt
     if (state.box[i] == no_box) continue;
     const Box<Scalar>& box = state.boxes[static_cast<std::size_t>(state.box[i])].box;
     const auto& [x, y] = state.current.keypoints[i];
-    const std::size_t pair =
-        nearest(grid, x, y, state.flow_distances.size(), [&](const auto& p) { return contains(box, p.x, p.y); });
+    const Scalar depth = state.current.depths.empty() ? Scalar(0) : state.current.depths[i];
+    const std::size_t pair = nearest(grid, x, y, state.flow_distances.size(), [&](const auto& p) {
+      const Scalar its = state.flow_depths.empty() ? Scalar(0) : state.flow_depths[p.index];
+      const bool apart = is_valid_depth(depth) && is_valid_depth(its) && std::abs(its - depth) > depth_share * depth;
+      return contains(box, p.x, p.y) && !apart;
+    });
     if (pair < state.flow_distances.size())
       state.flow_probability[i] = object_score(state.flow_distances[pair], scored);
   }
