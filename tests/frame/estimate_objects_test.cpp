@@ -1,5 +1,6 @@
 #include "cfp/frame/estimate_objects.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -397,6 +398,42 @@ TEST_CASE("Where people fill the view, what lies behind them tells the camera's 
       CHECK((run.state.objects[0].static_probability > 0.5) == (person_motion_m == 0));
     }
   }
+}
+
+TEST_CASE("Who is nearer than what his box is taken to hold does not support the camera's motion", "[frame]") {
+  int farther = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    CAPTURE(seed);
+    cfp::Random random(seed, "nearer");
+    DynamicScene<double> scene;
+    scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.002, 0.001, 0.001, 0.001, -0.002, 0.001));
+    const auto add = [&](double x, double y, double z, double shift) {
+      add_pair(scene, {x, y}, z, shift, 0.1, random);
+    };
+    constexpr std::size_t on_person = 20;
+    for (std::size_t k = 0; k < on_person; ++k)
+      add(random.uniform(150, 450), random.uniform(120, 460), random.uniform(0.8, 0.9), 0.03);
+    for (int k = 0; k < 130; ++k) add(random.uniform(110, 490), random.uniform(60, 470), random.uniform(4, 5), 0);
+    for (int k = 0; k < 60; ++k) add(random.uniform(500, 640), random.uniform(0, 480), random.uniform(2, 5), 0);
+    scene.previous_depths = scene.depths;
+    FrameRun<double> run(scene);
+    cfp::Frame<double> frame = run.frame();
+    frame.flow.previous_depths = scene.depths;
+    cfp::begin_frame(run.previous_frame(), run.state);
+    run.state.current.object_depths.push_back({0, 4.7});  // his box once fell on the wall
+    cfp::begin_frame(frame, run.state);
+    cfp::TrackedBox<double> box;
+    box.box = {100, 50, 500, 480};
+    box.detection = 0;
+    box.associated = true;
+    run.state.boxes.push_back(box);
+    cfp::estimate_objects(frame, scene.camera, {}, run.state);
+    const std::vector<char>& support = run.state.scratch.outside;
+    for (std::size_t i = 0; i < on_person; ++i) CHECK(support[i] == 0);
+    const auto& labels = run.state.scratch.pair_label;
+    farther += std::count(labels.begin() + on_person, labels.end(), cfp::detail::PairLabel::foreground) > 50 ? 1 : 0;
+  }
+  CHECK(farther > 0);  // else nothing was asked
 }
 
 TEST_CASE("What a box leaves out of its person does not outvote what lies behind the person in the box", "[frame]") {

@@ -34,9 +34,10 @@ void label_margin(const Box<Scalar>& box, const ForegroundResult& separated, con
 }
 
 /// Sets scratch.pair_label: per box and flow pair, how the pair stands to the object of that box. Where the object is
-/// told from its background by depth, so are the pairs, and those just outside of the box may be undecided. Where it
-/// has a mask, so are those that are farther than it, as masks spill over the silhouette, where depth and flow are of
-/// two surfaces, and those in its box beside the mask but for what is behind the object, as masks leave some of it out.
+/// told from its background by depth, so are the pairs; those before it, and those just outside of the box, may be
+/// somebody else, too, and are undecided. Where it has a mask, so are those that are farther than it, as masks spill
+/// over the silhouette, where depth and flow are of two surfaces, and those in its box beside the mask but for what is
+/// behind the object, as masks leave some of it out.
 template <typename Scalar>
 void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
@@ -51,9 +52,14 @@ void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameS
     const span<const Scalar> depths = is_told_by_depth(box, options) ? flow.previous_depths : span<const Scalar>();
     const auto [by_mask, separated] = find_members(box, flow.current, depths, detection_at, options, state);
     const PairLabel farther = by_mask ? PairLabel::undecided : PairLabel::background;
-    for (std::size_t m = 0; m < scratch.members.size(); ++m)
-      scratch.pair_label[b * n + static_cast<std::size_t>(scratch.members[m])] =
-          scratch.mask[m] != 0 ? PairLabel::foreground : farther;
+    for (std::size_t m = 0; m < scratch.members.size(); ++m) {
+      const auto i = static_cast<std::size_t>(scratch.members[m]);
+      const bool nearer = separated.status == ForegroundStatus::ok && is_valid_depth(depths[i]) &&
+                          depths[i] < static_cast<Scalar>(separated.near_m);
+      scratch.pair_label[b * n + i] = scratch.mask[m] != 0 ? PairLabel::foreground
+                                      : nearer             ? PairLabel::undecided
+                                                           : farther;
+    }
     if (!depths.empty() || by_mask)
       label_margin(box.box, separated, flow, depths.empty() ? 0 : options.coarse.flow.margin,
                    {scratch.pair_label.data() + b * n, n});

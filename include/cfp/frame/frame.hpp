@@ -20,7 +20,7 @@ namespace cfp {
 enum class KeypointLabel : std::uint8_t {
   outside,     ///< on no object that was reported: K = 1, never changed
   foreground,  ///< on the object of its box
-  background,  ///< inside its box, behind the object
+  background,  ///< inside its box, behind the object or before it
   invalid      ///< its pixel is not finite: K = 0, and no evidence for or against a map point
 };
 

@@ -96,7 +96,7 @@ enum class PairLabel : std::uint8_t {
   outside,     // not in its box
   foreground,  // on the object
   background,  // behind it
-  undecided    // where box, mask or depth end: it may be on the object
+  undecided    // before it, or where box, mask or depth end: it may be on it, or on somebody else
 };
 
 }  // namespace detail
