@@ -580,6 +580,54 @@ TEST_CASE("Pairs of a walker and mismatches within the threshold do not bend an 
   CHECK(bent <= 6);
 }
 
+TEST_CASE("Beside a walker and two fifths of mismatches an F that others fit exactly is found", "[robust]") {
+  // 8 of the 60 were an F between both motions: no sample of its inliers left the walker out, or he was taken for
+  // noise.
+  FundamentalRansacWorkspace workspace;
+  cfp::Random random(53, "walker and mismatches");
+  int bent = 0, found = 0;
+  for (int trial = 0; trial < 60; ++trial) {
+    TwoViewOptions options = noisy(300, 0.4);
+    options.noise_px = 0, options.translation_m = 0.3;
+    auto scene = make_two_view_scene<double>(random, options);
+    put_walker(60, 2, {4, 4}, random, scene);
+    const auto result = fundamental_ransac(PointPairs{scene.prev, scene.cur}, FundamentalRansacOptions{}, workspace);
+    if (!result.found()) continue;
+    ++found;
+    bent += cfp_test::median_sampson_of_truth<double>(scene, result.F) > 0.05 ? 1 : 0;
+  }
+  CHECK(found >= 57);
+  CHECK(bent <= 2);
+}
+
+TEST_CASE("Two walls seen along them have their F in a wide image and in a high one", "[robust]") {
+  // The window of what is broad once took a whole wall of the wide one, and that of a person all of the high one.
+  FundamentalRansacWorkspace workspace;
+  cfp::Random random(63, "corridor");
+  const cfp::PinholeCamera<double> camera{718, 718, 620, 620};
+  for (const bool wide : {true, false}) {
+    int found = 0;
+    for (int trial = 0; trial < 20; ++trial) {
+      const cfp::SE3<double> T_cur_prev{cfp::so3_exp<double>(0.005 * cfp_test::random_direction(random)), {0, 0, -1}};
+      std::vector<std::array<double, 2>> previous, current;
+      while (previous.size() < 300) {
+        const double along = random.uniform(0, 1240), across = random.uniform(430, 810);
+        cfp::Vector3<double> ray;
+        cfp::Vector2<double> now(0, 0),
+            before = wide ? cfp::Vector2<double>(along, across) : cfp::Vector2<double>(across, along);
+        REQUIRE(camera.unproject(before, ray));
+        const double depth_m = std::min(8 / std::abs(wide ? ray.x() : ray.y()), 80.0);
+        if (!camera.project(T_cur_prev * cfp::Vector3<double>(depth_m * ray), now)) continue;
+        previous.push_back({before.x() + 0.2 * random.normal(), before.y() + 0.2 * random.normal()});
+        current.push_back({now.x() + 0.2 * random.normal(), now.y() + 0.2 * random.normal()});
+      }
+      found += fundamental_ransac(PointPairs{previous, current}, FundamentalRansacOptions{}, workspace).found();
+    }
+    CAPTURE(wide);
+    CHECK(found >= 19);
+  }
+}
+
 TEST_CASE("A person who moves before a camera at rest or turning gives no F", "[robust]") {
   FundamentalRansacWorkspace workspace;
   cfp::Random random(47, "walker");

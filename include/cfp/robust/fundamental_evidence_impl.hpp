@@ -27,7 +27,7 @@ inline namespace CFP_ISA {
 // parallax mostly near it: each range of d has a share of its own. T is double.
 template <typename T>
 struct FundamentalEvidence {
-  static constexpr std::size_t cells = 16;              // over the extent of the previous image, either way
+  static constexpr std::size_t cells = 16;              // of the previous image, either way: PairArrays::cell
   static constexpr std::size_t ranges = 6, shares = 5;  // of d, doubling
   static constexpr T share[shares] = {T(0), T(0.1), T(0.3), T(0.6), T(0.9)};
 
@@ -47,8 +47,8 @@ struct FundamentalEvidence {
     T evidence;
     std::size_t column, row, width, height;
 
-    [[nodiscard]] bool contains(T u, T v) const noexcept {
-      return cell_of(u) - column < width && cell_of(v) - row < height;
+    [[nodiscard]] bool contains(std::size_t c, std::size_t r) const noexcept {
+      return c - column < width && r - row < height;
     }
   };
 
@@ -71,8 +71,10 @@ struct FundamentalEvidence {
     [[nodiscard]] T value() const noexcept { return log + std::log(rest); }
   };
 
-  [[nodiscard]] static std::size_t cell_of(T x) noexcept {
-    return static_cast<std::size_t>(std::clamp(T(0.2) * x + T(0.5), T(0), T(0.999)) * cells);
+  // Column or row of a place along an axis; the outermost ones hold all beyond.
+  [[nodiscard]] static std::size_t cell_of(T along, T pitch) noexcept {
+    constexpr T middle = cells / 2;
+    return pitch > 0 ? static_cast<std::size_t>(std::clamp(along / pitch + middle, T(0), 2 * middle - T(0.01))) : 0;
   }
   [[nodiscard]] std::size_t range_of(std::size_t k) const noexcept { return static_cast<std::size_t>(range[k]); }
 
@@ -128,9 +130,10 @@ struct FundamentalEvidence {
   // The windows without which the pairs say least, each pair with the share of its range.
   void find_windows(const T (&share_of_range)[ranges], Verdict& out) const noexcept {
     LogProduct products[cells][cells];
-    const auto cell = [&](T along) { return cell_of(pairs.extent * along); };
-    for (std::size_t k = 0; k < count; ++k)
-      products[cell(y[k])][cell(x[k])].multiply(1 + share_of_range[range_of(k)] * gain[k]);
+    for (std::size_t k = 0; k < count; ++k) {
+      LogProduct& cell = products[cell_of(y[k], pairs.cell[1])][cell_of(x[k], pairs.cell[0])];
+      cell.multiply(1 + share_of_range[range_of(k)] * gain[k]);
+    }
     T sums[cells + 1][cells + 1] = {};  // of all cells above and to the left
     for (std::size_t r = 0; r < cells; ++r) {
       for (std::size_t c = 0; c < cells; ++c)

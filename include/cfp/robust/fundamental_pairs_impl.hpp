@@ -27,8 +27,11 @@ struct PairArrays : RansacColumns<pair_rows> {
   static constexpr std::size_t enough = 256;  // pairs, to refine a candidate
 
   PairScaling scaling;
-  double factor = 0;           // 0: the points of an image coincide, nothing else is set
-  double extent = 1;           // >= 1: the previous image's own scale over the common one, which far mismatches stretch
+  double factor = 0;  // 0: the points of an image coincide, nothing else is set
+  // Pitch of the cells by which places in the previous image are told apart, along either axis: a person may be five of
+  // them wide and any number high, and what is broad ten by six. Of the spread of the points, so that in an image of
+  // 640 x 480 px full of them cells are squares of some 48 px.
+  double cell[2] = {1, 1};
   double grid_sq = 0;          // squared pitch of the grid that all coordinates lie on, scaled; 0 without one
   double total_shared = 0;     // sum of the weights in the score
   std::vector<float> thinned;  // see thinned_columns
@@ -137,12 +140,17 @@ void load_pairs(const PointPairs<Scalar>& input, double cell_px, PairArrays& pai
   if (!pairs.scaling.valid()) return;
   pairs.size = 0;
   pairs.factor = std::sqrt(pairs.scaling.previous.factor * pairs.scaling.current.factor);
-  pairs.extent = (std::max)(pairs.scaling.previous.factor / pairs.factor, 1.0);
   pairs.scaling.previous.factor = pairs.scaling.current.factor = pairs.factor;
   for_each_pair(input, [&](std::size_t i, const Vector2<double>& previous, const Vector2<double>& current, double w) {
     const Vector3<double> p = scaled(pairs.scaling.previous, previous), q = scaled(pairs.scaling.current, current);
     pairs.push(i, {p.x(), p.y(), q.x(), q.y(), w, w, w});
   });
+  const double cells_of_spread[2] = {0.298, 0.396};
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    double spread = 0;
+    for (std::size_t i = 0; i < pairs.size; ++i) spread += std::abs(pairs.row(prev_x + axis)[i]);
+    pairs.cell[axis] = cells_of_spread[axis] * spread / static_cast<double>(pairs.size);
+  }
   const double grid = grid_px(input) * pairs.factor;
   pairs.grid_sq = grid * grid;
   finish(pairs);

@@ -142,7 +142,8 @@ inline namespace CFP_ISA {
 ///  - also without any part of the image that somebody near may fill,
 ///  - and without any two lines of points (`degenerate`).
 /// Pairs that begin or end in one place (a cell of two thresholds) count as one there. Where most pairs are mismatches
-/// a moving region may still be taken for parallax.
+/// a moving region may still be taken for parallax; so may noise that is larger in one direction of the image, of all
+/// pairs alike (docs/limits.md). Lens distortion is to be taken out of the pixels before.
 ///
 /// The result is refined under a Geman-McClure loss of 2.25 standard deviations of the noise that the pairs themselves
 /// show, from several starts, as a short baseline gives the cost several minima. Cost per sample about 1 us plus 0.3 us
@@ -155,7 +156,8 @@ template <typename Scalar>
                                                            span<char> inlier_mask = {}) {
   return detail::fundamental_ransac<Scalar>(pairs, nullptr, options, workspace, inlier_mask);
 }
-/// The camera's intrinsics tell a rotation from a plane where there is no F; nothing else depends on them.
+/// The camera's intrinsics tell a rotation from a plane; what a rotation explains, too, is no F (seldom asked
+/// otherwise).
 template <typename Scalar>
 [[nodiscard]] FundamentalResult<Scalar> fundamental_ransac(const PointPairs<Scalar>& pairs,
                                                            const PinholeCamera<Scalar>& camera,

@@ -105,24 +105,38 @@ struct FundamentalSearch {
     }
   }
 
+  // Draws a sample of the listed inliers beside the neighbours, over a person's width, of one of them.
+  [[nodiscard]] Sample draw_beside_one() noexcept {
+    const auto index_below = [this](std::ptrdiff_t n) {
+      return static_cast<std::ptrdiff_t>(random.index(static_cast<std::uint32_t>(n)));
+    };
+    const auto first = list.begin();
+    const T middle = pairs.row(prev_x)[*(first + index_below(list.end() - first))];
+    const auto beside = [&](std::uint32_t i) {
+      return std::abs(pairs.row(prev_x)[i] - middle) > T(2.5) * pairs.cell[0];
+    };
+    const std::ptrdiff_t outside = std::partition(first, list.end(), beside) - first,
+                         n = outside < 8 ? list.end() - first : outside;
+    Sample sample;
+    for (std::ptrdiff_t j = 0; j < 7; ++j) {
+      std::iter_swap(first + j, first + j + index_below(n - j));
+      sample[static_cast<std::size_t>(j)] = first[j];
+    }
+    return sample;
+  }
+
   // A short baseline gives the cost several minima, often within a hundredth of each other, and chance decides into
   // which of them the first good sample leads; or it leads to an F between two motions, within the threshold of both.
-  // Samples of F's own inliers are mostly good: the best of them are refined, too, each under its own noise, and the
-  // one that chance explains least wins. What it brings: cfp_fundamental_scale_study. F is the one whose noise was
-  // measured last.
+  // Samples of F's own inliers, mostly without who moves among them, are often good: the best of them are refined, too,
+  // each under its own noise, and the one that chance explains least wins. What it brings: cfp_fundamental_scale_study
+  // and, of who moves, cfp_fundamental_degeneracy_study. F is the one whose noise was measured last.
   void explore(FactoredF<T>& F) noexcept {
     constexpr int samples = 20, starts = 2;
     Candidate best[starts];
     collect_inliers();
-    const std::uint32_t n = static_cast<std::uint32_t>(list.size());
-    if (n < 8) return;
+    if (list.size() < 8) return;
     for (int k = 0; k < samples; ++k) {
-      Sample sample;
-      for (std::uint32_t j = 0; j < 7; ++j) {
-        std::swap(list[j], list[j + random.index(n - j)]);
-        sample[j] = list[j];
-      }
-      solve(sample, [&](const Model& candidate) {
+      solve(draw_beside_one(), [&](const Model& candidate) {
         const double c = sampson_cost(thinned_columns(pairs), candidate, inner_scale * limit, best[starts - 1].cost);
         if (!(c < best[starts - 1].cost)) return;
         best[starts - 1] = {candidate, c};
@@ -175,36 +189,47 @@ struct FundamentalSearch {
     sampson_distances_sq(exact_columns(pairs), F, distances_sq);
     measure_noise();
   }
-  // Of distances_sq: a truncated variance iterated to its fixed point; 0.911 is the variance that a normal distribution
-  // keeps within 2.5 sigma. Where it comes near to what the cut leaves of any distribution the noise exceeds the
-  // threshold, and a wider cut tells by how much. Floor: 0.01 px. The refinement needs it for its loss, and whether a
-  // homography suffices must not be judged by a threshold above the parallax of a video.
+  // Of distances_sq: see settle_noise. Where it comes near to what the cut leaves of any distribution the noise exceeds
+  // the threshold, and a wider cut tells by how much. Somebody who moves along the lines by less than the threshold
+  // seems to be noise: the lesser noise of the other pairs counts where chance explains these less. The refinement
+  // needs it for its loss, and whether a homography suffices must not be judged by a threshold above the parallax of a
+  // video.
   void measure_noise() noexcept {
+    T cut = limit;
+    for (int width = 0; width < 3; ++width, cut *= 4) {
+      settle_noise(cut / T(3.84), cut);
+      if (noise_variance < T(0.22) * cut) break;
+    }
+    if (cut > limit) return;
+    const T variance = noise_variance, near = near_pairs, explained = nats();
+    settle_noise(variance / 16, cut);
+    if (!(nats() > explained)) noise_variance = variance, near_pairs = near;
+  }
+
+  // A truncated variance of distances_sq, iterated from `start` to its fixed point; 0.911 is the variance that a normal
+  // distribution keeps within 2.5 sigma. At least 0.01 px.
+  void settle_noise(T start, T cut) noexcept {
     using P = simd::Packet<T>;
     const P zero(T(0));
     const T floor = T(1e-4) * pairs.factor * pairs.factor;
-    T cut = limit;
-    for (int width = 0; width < 3; ++width, cut *= 4) {
-      noise_variance = cut / T(3.84);
-      for (int step = 0; step < 10; ++step) {
-        const P farthest((std::min)(cut, T(6.25) * noise_variance));
-        P sum = zero, weight = zero;
-        for (std::size_t i = 0; i < pairs.size; i += P::lanes) {
-          const P d2 = P::load(distances_sq.data() + i), w = P::load(pairs.row(score_weight) + i);
-          const auto near = d2 <= farthest;
-          sum += select(near, w * d2, zero);
-          weight += select(near, w, zero);
-        }
-        const T near = reduce_add(weight);
-        near_pairs = near / total_weight() * static_cast<T>(pairs.size);
-        if (!(near > 0)) break;
-        const T freedom = near_pairs / (std::max)(near_pairs - 7, T(1));  // F follows seven of their distances
-        const T next = (std::max)(freedom * reduce_add(sum) / near / T(0.911), floor);
-        const bool settled = std::abs(next - noise_variance) < T(5e-3) * next;
-        noise_variance = next;
-        if (settled) break;
+    noise_variance = start;
+    for (int step = 0; step < 10; ++step) {
+      const P farthest((std::min)(cut, T(6.25) * noise_variance));
+      P sum = zero, weight = zero;
+      for (std::size_t i = 0; i < pairs.size; i += P::lanes) {
+        const P d2 = P::load(distances_sq.data() + i), w = P::load(pairs.row(score_weight) + i);
+        const auto near = d2 <= farthest;
+        sum += select(near, w * d2, zero);
+        weight += select(near, w, zero);
       }
-      if (noise_variance < T(0.22) * cut) break;
+      const T near = reduce_add(weight);
+      near_pairs = near / total_weight() * static_cast<T>(pairs.size);
+      if (!(near > 0)) return;
+      const T freedom = near_pairs / (std::max)(near_pairs - 7, T(1));  // F follows seven of their distances
+      const T next = (std::max)(freedom * reduce_add(sum) / near / T(0.911), floor);
+      const bool settled = std::abs(next - noise_variance) < T(5e-3) * next;
+      noise_variance = next;
+      if (settled) return;
     }
   }
 };
