@@ -156,8 +156,7 @@ template <typename Scalar>
                                                            span<char> inlier_mask = {}) {
   return detail::fundamental_ransac<Scalar>(pairs, nullptr, options, workspace, inlier_mask);
 }
-/// The camera's intrinsics tell a rotation from a plane; what a rotation explains, too, is no F (seldom asked
-/// otherwise).
+/// The camera's intrinsics tell a rotation from a plane, and refuse the few F that a rotation explains as well.
 template <typename Scalar>
 [[nodiscard]] FundamentalResult<Scalar> fundamental_ransac(const PointPairs<Scalar>& pairs,
                                                            const PinholeCamera<Scalar>& camera,

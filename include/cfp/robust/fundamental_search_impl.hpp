@@ -190,7 +190,7 @@ struct FundamentalSearch {
     measure_noise();
   }
   // Of distances_sq: see settle_noise. Where it comes near to what the cut leaves of any distribution the noise exceeds
-  // the threshold, and a wider cut tells by how much. Somebody who moves along the lines by less than the threshold
+  // the threshold, and a wider cut tells by how much. Somebody who leaves the lines by less than the threshold
   // seems to be noise: the lesser noise of the other pairs counts where chance explains these less. The refinement
   // needs it for its loss, and whether a homography suffices must not be judged by a threshold above the parallax of a
   // video.
