@@ -176,13 +176,13 @@ TEST_CASE("The measured noise is the truncated variance of all pairs, by their w
 
     double sum = 0, weight = 0;
     for (std::size_t i = 0; i < n; ++i) {
-      if (distances_sq[i] > 6.25 * search.noise_variance) continue;
+      if (distances_sq[i] > 6.25 * search.noise.variance) continue;
       sum += search.weights()[i] * distances_sq[i], weight += search.weights()[i];
     }
     CAPTURE(heavy);
     const double near = weight / search.total_weight() * static_cast<double>(n);
-    CHECK(search.near_pairs == Approx(near).epsilon(0.01));
-    CHECK(search.noise_variance == Approx(sum / weight / 0.911 * near / (near - 7)).epsilon(0.01));
+    CHECK(search.noise.near_pairs == Approx(near).epsilon(0.01));
+    CHECK(search.noise.variance == Approx(sum / weight / 0.911 * near / (near - 7)).epsilon(0.01));
   }
 }
 
@@ -203,7 +203,7 @@ TEST_CASE("The noise of an F that was fitted to few pairs is not underestimated"
     FactoredF F(cfp_test::scaled_fundamental(scene.F, pairs.scaling));
     cfp::detail::refine_fundamental(cfp::detail::exact_columns(pairs), 1e4 * px_sq, 30, 1e-9, F);
     search.measure_noise(F.matrix());
-    variance += search.noise_variance / px_sq / trials;
+    variance += search.noise.variance / px_sq / trials;
   }
   CAPTURE(variance);  // 0.27, give or take 0.006; 0.16 without the seven that F follows
   CHECK(variance > 0.24);

@@ -143,8 +143,7 @@ struct DegeneracyCheck {
     if (search.list.size() < 4) return true;
     const Matrix3<T> before = H;
     const auto inside = [&](std::size_t i) {
-      return window.contains(FundamentalEvidence<T>::cell_of(pairs.row(prev_x)[i], pairs.cell[0]),
-                             FundamentalEvidence<T>::cell_of(pairs.row(prev_y)[i], pairs.cell[1]));
+      return window.contains(window_cell(pairs, 0, pairs.row(prev_x)[i]), window_cell(pairs, 1, pairs.row(prev_y)[i]));
     };
     PairColumns<float> columns = thinned_columns(pairs);
     std::array<float, PairArrays::enough> weights = {};

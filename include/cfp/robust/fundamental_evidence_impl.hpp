@@ -27,7 +27,7 @@ inline namespace CFP_ISA {
 // parallax mostly near it: each range of d has a share of its own. T is double.
 template <typename T>
 struct FundamentalEvidence {
-  static constexpr std::size_t cells = 16;              // of the previous image, either way: PairArrays::cell
+  static constexpr std::size_t cells = PairArrays::window_cells;
   static constexpr std::size_t ranges = 6, shares = 5;  // of d, doubling
   static constexpr T share[shares] = {T(0), T(0.1), T(0.3), T(0.6), T(0.9)};
 
@@ -71,11 +71,6 @@ struct FundamentalEvidence {
     [[nodiscard]] T value() const noexcept { return log + std::log(rest); }
   };
 
-  // Column or row of a place along an axis; the outermost ones hold all beyond.
-  [[nodiscard]] static std::size_t cell_of(T along, T pitch) noexcept {
-    constexpr T middle = cells / 2;
-    return pitch > 0 ? static_cast<std::size_t>(std::clamp(along / pitch + middle, T(0), 2 * middle - T(0.01))) : 0;
-  }
   [[nodiscard]] std::size_t range_of(std::size_t k) const noexcept { return static_cast<std::size_t>(range[k]); }
 
   // Of the F whose distances were measured last against H. Some F = [e']x H goes through any two pairs, the loudest if
@@ -107,7 +102,7 @@ struct FundamentalEvidence {
   // Fills the arrays; returns how many distinct pairs F explains.
   T compare(const Matrix3<T>& H) noexcept {
     // Rounded to a grid, neighbours err alike, by up to its pitch: what is smaller tells nothing.
-    const T noise = (std::max)(search.noise_variance, T(pairs.grid_sq));
+    const T noise = (std::max)(search.noise.variance, T(pairs.grid_sq));
     const T per_s2 = 1 / (4 * noise + T(2e-4) * pairs.factor * pairs.factor);
     const T limit = search.wide_limit();
     T distinct = 0;
@@ -131,7 +126,7 @@ struct FundamentalEvidence {
   void find_windows(const T (&share_of_range)[ranges], Verdict& out) const noexcept {
     LogProduct products[cells][cells];
     for (std::size_t k = 0; k < count; ++k) {
-      LogProduct& cell = products[cell_of(y[k], pairs.cell[1])][cell_of(x[k], pairs.cell[0])];
+      LogProduct& cell = products[window_cell(pairs, 1, y[k])][window_cell(pairs, 0, x[k])];
       cell.multiply(1 + share_of_range[range_of(k)] * gain[k]);
     }
     T sums[cells + 1][cells + 1] = {};  // of all cells above and to the left
@@ -147,7 +142,7 @@ struct FundamentalEvidence {
         }
       }
     };
-    find_least(5, cells, out.person);
+    find_least(PairArrays::person_cells, cells, out.person);
     find_least(10, 6, out.broad);
     // One of the many broad windows holds most of little evidence by chance.
     out.broad.evidence += (std::max)(T(16) - out.all / 5, T(0));
@@ -194,7 +189,7 @@ struct FundamentalEvidence {
   // Takes away the pairs near the line of the previous image that carries most of the gains.
   void drop_line() noexcept {
     using P = simd::Packet<T>;
-    const P zero(T(0)), one(T(1)), width_sq(64 * (std::max)(search.noise_variance, search.limit / T(3.84)));
+    const P zero(T(0)), one(T(1)), width_sq(64 * (std::max)(search.noise.variance, search.limit / T(3.84)));
     Random random(pairs.size, "fundamental_evidence");
     const auto point = [&] {
       const std::size_t k = random.index(static_cast<std::uint32_t>(count));

@@ -24,14 +24,15 @@ struct CellCounts {
 enum PairRow : std::size_t { prev_x, prev_y, cur_x, cur_y, score_weight, evidence_weight, own_weight, pair_rows };
 
 struct PairArrays : RansacColumns<pair_rows> {
-  static constexpr std::size_t enough = 256;  // pairs, to refine a candidate
+  static constexpr std::size_t enough = 256;       // pairs, to refine a candidate
+  static constexpr std::size_t window_cells = 16;  // of the previous image, either way
+  static constexpr std::size_t person_cells = 5;   // that somebody may be wide; as high as the image
 
   PairScaling scaling;
   double factor = 0;  // 0: the points of an image coincide, nothing else is set
-  // Pitch of the cells by which places in the previous image are told apart, along either axis: a person may be five of
-  // them wide and any number high, and what is broad ten by six. Of the spread of the points, so that in an image of
-  // 640 x 480 px full of them cells are squares of some 48 px.
-  double cell[2] = {1, 1};
+  // Pitch of the cells by which places in the previous image are told apart, along either axis. Of the spread of the
+  // points, so that in an image of 640 x 480 px full of them cells are squares of some 48 px.
+  double window_pitch[2] = {1, 1};
   double grid_sq = 0;          // squared pitch of the grid that all coordinates lie on, scaled; 0 without one
   double total_shared = 0;     // sum of the weights in the score
   std::vector<float> thinned;  // see thinned_columns
@@ -73,6 +74,13 @@ template <typename T>
 template <typename T>
 [[nodiscard]] Vector3<T> current_point(const PairArrays& pairs, std::size_t i) noexcept {
   return {pairs.row(cur_x)[i], pairs.row(cur_y)[i], T(1)};
+}
+
+// Column (axis 0) or row (1) of a place in the previous image; the outermost ones hold all beyond.
+[[nodiscard]] inline std::size_t window_cell(const PairArrays& pairs, std::size_t axis, double along) noexcept {
+  constexpr double middle = PairArrays::window_cells / 2;
+  const double pitch = pairs.window_pitch[axis];
+  return pitch > 0 ? static_cast<std::size_t>(std::clamp(along / pitch + middle, 0.0, 2 * middle - 0.01)) : 0;
 }
 
 // Empties the cells and makes room for so many pairs.
@@ -149,7 +157,7 @@ void load_pairs(const PointPairs<Scalar>& input, double cell_px, PairArrays& pai
   for (std::size_t axis = 0; axis < 2; ++axis) {
     double spread = 0;
     for (std::size_t i = 0; i < pairs.size; ++i) spread += std::abs(pairs.row(prev_x + axis)[i]);
-    pairs.cell[axis] = cells_of_spread[axis] * spread / static_cast<double>(pairs.size);
+    pairs.window_pitch[axis] = cells_of_spread[axis] * spread / static_cast<double>(pairs.size);
   }
   const double grid = grid_px(input) * pairs.factor;
   pairs.grid_sq = grid * grid;

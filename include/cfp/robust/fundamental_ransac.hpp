@@ -114,7 +114,7 @@ template <typename Scalar>
     result.status = found.confident ? RansacStatus::ok : RansacStatus::iteration_limit;
     report_fundamental(F, search, options.min_inliers, inlier_mask, result);
     workspace.F = F;
-    workspace.noise_variance = search.noise_variance;
+    workspace.noise_variance = search.noise.variance;
   } else if (check.dominant) {
     report_homography(check, K, options.min_inliers, inlier_mask, result);
   }

@@ -1,6 +1,5 @@
 /// @file fundamental_search_impl.hpp
-/// The search of fundamental_ransac.hpp: samples, local optimisation, measured noise, final refinement. Not an
-/// interface.
+/// The search of fundamental_ransac.hpp: samples, local optimisation, final refinement. Not an interface.
 #pragma once
 
 #include <algorithm>
@@ -12,6 +11,7 @@
 #include "cfp/core/random.hpp"
 #include "cfp/geometry/fundamental.hpp"
 #include "cfp/math/matrix3.hpp"
+#include "cfp/robust/fundamental_noise_impl.hpp"
 #include "cfp/robust/fundamental_pairs_impl.hpp"
 #include "cfp/robust/fundamental_sampson_impl.hpp"
 #include "cfp/robust/ransac.hpp"
@@ -43,8 +43,7 @@ struct FundamentalSearch {
   std::vector<std::uint32_t>& list;  // scratch, as long as the pairs
   std::vector<T>& distances_sq;      // Sampson, of the F that was tested or measured last
   Random random;
-  T noise_variance = limit / T(3.84);  // of the Sampson distances of true pairs, as measured
-  T near_pairs = 0;                    // by weight, within 2.5 standard deviations of it
+  PairNoise<T> noise{limit / T(3.84), 0};
 
   // Scales of the loss x / (1 + x): of the score and of the score of inner samples, in squared thresholds; the final
   // one in variances of the measured noise. The threshold is a tolerance, mostly far above the noise: under its
@@ -64,7 +63,7 @@ struct FundamentalSearch {
   }
 
   // Squared Sampson distance that 95 % of the true pairs stay below.
-  [[nodiscard]] T noise_limit() const noexcept { return T(3.84) * noise_variance; }
+  [[nodiscard]] T noise_limit() const noexcept { return T(3.84) * noise.variance; }
   [[nodiscard]] T wide_limit() const noexcept { return (std::max)(limit, noise_limit()); }
 
   template <typename Visit>
@@ -111,10 +110,9 @@ struct FundamentalSearch {
       return static_cast<std::ptrdiff_t>(random.index(static_cast<std::uint32_t>(n)));
     };
     const auto first = list.begin();
-    const T middle = pairs.row(prev_x)[*(first + index_below(list.end() - first))];
-    const auto beside = [&](std::uint32_t i) {
-      return std::abs(pairs.row(prev_x)[i] - middle) > T(2.5) * pairs.cell[0];
-    };
+    const T middle = pairs.row(prev_x)[*(first + index_below(list.end() - first))],
+            half_width = T(0.5) * PairArrays::person_cells * pairs.window_pitch[0];
+    const auto beside = [&](std::uint32_t i) { return std::abs(pairs.row(prev_x)[i] - middle) > half_width; };
     const std::ptrdiff_t outside = std::partition(first, list.end(), beside) - first,
                          n = outside < 8 ? list.end() - first : outside;
     Sample sample;
@@ -145,9 +143,9 @@ struct FundamentalSearch {
     }
     const T widest = wide_limit();
     const auto refined_nats = [&](FactoredF<T>& of) {
-      refine_fundamental(thinned_columns(pairs), (std::min)(widest, final_scale * noise_variance), 2, 1e-3, of);
+      refine_fundamental(thinned_columns(pairs), (std::min)(widest, final_scale * noise.variance), 2, 1e-3, of);
       measure_noise(of.matrix());
-      return nats();
+      return nats(pairs, noise);
     };
     T most = refined_nats(F);
     for (const Candidate& start : best) {
@@ -159,18 +157,6 @@ struct FundamentalSearch {
     }
   }
 
-  // Minus the logarithm of the number of F that chance lets have so many of the pairs so near as the one whose noise
-  // was measured last: weighs few pairs and little noise against many and more. A mismatch lies anywhere within some
-  // tenth of the image. C(n, k) by its entropy, C(k, 7) as (k - 3)^7 / 7!, of which 3.38 is the seventh root. Source:
-  // Moisan and Stival, "A probabilistic criterion to detect rigid point matches between two images and estimate the
-  // fundamental matrix", IJCV 2004.
-  [[nodiscard]] T nats() const noexcept {
-    const T n = static_cast<T>(pairs.size), k = near_pairs, reach = T(0.25);
-    if (!(k > 7)) return -std::numeric_limits<T>::infinity();
-    const T subsets = k * std::log(n / k) + (n > k ? (n - k) * std::log(n / (n - k)) : T(0));
-    return (k - 7) * std::log(reach / (T(2.5) * std::sqrt(noise_variance))) - subsets - 7 * std::log((k - 3) / T(3.38));
-  }
-
   // More rounds where the search ran out of samples: its F may be a poor one, which inner samples mend step by step. F
   // is the one whose noise was measured last, before and after.
   void polish(Model& F, int rounds) noexcept {
@@ -179,7 +165,7 @@ struct FundamentalSearch {
       explore(factored);
       measure_noise(factored.matrix());
     }
-    refine_fundamental(exact_columns(pairs), final_scale * noise_variance, 14, 1e-5, factored);
+    refine_fundamental(exact_columns(pairs), final_scale * noise.variance, 14, 1e-5, factored);
     F = factored.matrix();
     measure_noise(F);
   }
@@ -189,49 +175,7 @@ struct FundamentalSearch {
     sampson_distances_sq(exact_columns(pairs), F, distances_sq);
     measure_noise();
   }
-  // Of distances_sq: see settle_noise. Where it comes near to what the cut leaves of any distribution the noise exceeds
-  // the threshold, and a wider cut tells by how much. Somebody who leaves the lines by less than the threshold
-  // seems to be noise: the lesser noise of the other pairs counts where chance explains these less. The refinement
-  // needs it for its loss, and whether a homography suffices must not be judged by a threshold above the parallax of a
-  // video.
-  void measure_noise() noexcept {
-    T cut = limit;
-    for (int width = 0; width < 3; ++width, cut *= 4) {
-      settle_noise(cut / T(3.84), cut);
-      if (noise_variance < T(0.22) * cut) break;
-    }
-    if (cut > limit) return;
-    const T variance = noise_variance, near = near_pairs, explained = nats();
-    settle_noise(variance / 16, cut);
-    if (!(nats() > explained)) noise_variance = variance, near_pairs = near;
-  }
-
-  // A truncated variance of distances_sq, iterated from `start` to its fixed point; 0.911 is the variance that a normal
-  // distribution keeps within 2.5 sigma. At least 0.01 px.
-  void settle_noise(T start, T cut) noexcept {
-    using P = simd::Packet<T>;
-    const P zero(T(0));
-    const T floor = T(1e-4) * pairs.factor * pairs.factor;
-    noise_variance = start;
-    for (int step = 0; step < 10; ++step) {
-      const P farthest((std::min)(cut, T(6.25) * noise_variance));
-      P sum = zero, weight = zero;
-      for (std::size_t i = 0; i < pairs.size; i += P::lanes) {
-        const P d2 = P::load(distances_sq.data() + i), w = P::load(pairs.row(score_weight) + i);
-        const auto near = d2 <= farthest;
-        sum += select(near, w * d2, zero);
-        weight += select(near, w, zero);
-      }
-      const T near = reduce_add(weight);
-      near_pairs = near / total_weight() * static_cast<T>(pairs.size);
-      if (!(near > 0)) return;
-      const T freedom = near_pairs / (std::max)(near_pairs - 7, T(1));  // F follows seven of their distances
-      const T next = (std::max)(freedom * reduce_add(sum) / near / T(0.911), floor);
-      const bool settled = std::abs(next - noise_variance) < T(5e-3) * next;
-      noise_variance = next;
-      if (settled) return;
-    }
-  }
+  void measure_noise() noexcept { noise = measured_noise(pairs, span<const T>(distances_sq), limit); }
 };
 
 }  // namespace CFP_ISA
