@@ -416,18 +416,12 @@ TEST_CASE("Who is nearer than what his box is taken to hold does not support the
     for (int k = 0; k < 130; ++k) add(random.uniform(110, 490), random.uniform(60, 470), random.uniform(4, 5), 0);
     for (int k = 0; k < 60; ++k) add(random.uniform(500, 640), random.uniform(0, 480), random.uniform(2, 5), 0);
     scene.previous_depths = scene.depths;
+    scene.boxes = {{100, 50, 500, 480}};
     FrameRun<double> run(scene);
     cfp::Frame<double> frame = run.frame();
     frame.flow.previous_depths = scene.depths;
-    cfp::begin_frame(run.previous_frame(), run.state);
-    run.state.current.object_depths.push_back({0, 4.7});  // his box once fell on the wall
-    cfp::begin_frame(frame, run.state);
-    cfp::TrackedBox<double> box;
-    box.box = {100, 50, 500, 480};
-    box.detection = 0;
-    box.associated = true;
-    run.state.boxes.push_back(box);
-    cfp::estimate_objects(frame, scene.camera, {}, run.state);
+    run.previous_object_depths = {{0, 4.7}};  // his box once fell on the wall
+    run.coarse({}, frame, scene.camera);
     const std::vector<char>& support = run.state.scratch.outside;
     for (std::size_t i = 0; i < on_person; ++i) CHECK(support[i] == 0);
     const auto& labels = run.state.scratch.pair_label;

@@ -321,8 +321,7 @@ TEST_CASE("The wall beside a walker's silhouette does not move with him", "[fram
   int moving = 0, accused = 0;
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
     const bool moves = run.state.flow_probability[i] >= 0 && run.state.flow_probability[i] < 0.5;
-    if (i >= own) accused += moves ? 1 : 0;
-    if (i < own) moving += moves ? 1 : 0;
+    (i < own ? moving : accused) += moves ? 1 : 0;
   }
   CHECK(moving > 20);
   CHECK(accused == 0);

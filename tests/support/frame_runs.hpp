@@ -56,6 +56,7 @@ struct FrameRun {
   const cfp::FrameReport& coarse(const cfp::FrameOptions& options, const cfp::Frame<Scalar>& current,
                                  const Camera& camera) {
     cfp::begin_frame(previous_frame(), state);
+    state.current.object_depths = previous_object_depths;
     cfp::begin_frame(current, state);
     for (std::size_t b = 0; b < scene.boxes.size(); ++b) {
       cfp::TrackedBox<Scalar> box;
@@ -90,6 +91,7 @@ struct FrameRun {
 
   DynamicScene<Scalar> scene;
   std::vector<Scalar> m;
+  std::vector<cfp::ObjectDepth<Scalar>> previous_object_depths;  // of the boxes in the frame before
   cfp::PoseEstimate pose;
   cfp::FrameState<Scalar> state;
 };

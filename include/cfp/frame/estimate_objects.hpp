@@ -20,6 +20,16 @@ namespace cfp {
 namespace detail {
 inline namespace CFP_ISA {
 
+/// Whether a depth is known and beyond all of the foreground, or before it; false where the depths could not tell.
+template <typename Scalar>
+[[nodiscard]] bool is_behind(const ForegroundResult& separated, Scalar depth) noexcept {
+  return separated.status == ForegroundStatus::ok && is_valid_depth(depth) && depth > Scalar(separated.far_m);
+}
+template <typename Scalar>
+[[nodiscard]] bool is_before(const ForegroundResult& separated, Scalar depth) noexcept {
+  return separated.status == ForegroundStatus::ok && is_valid_depth(depth) && depth < Scalar(separated.near_m);
+}
+
 /// Labels undecided the pairs just outside of a box, but for those behind its object.
 template <typename Scalar>
 void label_margin(const Box<Scalar>& box, const ForegroundResult& separated, const FlowPairs<Scalar>& flow,
@@ -27,9 +37,7 @@ void label_margin(const Box<Scalar>& box, const ForegroundResult& separated, con
   const Box<Scalar> wide = widened(box, Scalar(margin));
   for (std::size_t i = 0; i < labels.size(); ++i) {
     if (labels[i] != PairLabel::outside || !contains(wide, flow.current(i, 0), flow.current(i, 1))) continue;
-    const bool behind = separated.status == ForegroundStatus::ok && is_valid_depth(flow.previous_depths[i]) &&
-                        flow.previous_depths[i] > Scalar(separated.far_m);
-    if (!behind) labels[i] = PairLabel::undecided;
+    if (!is_behind(separated, flow.depth(i))) labels[i] = PairLabel::undecided;
   }
 }
 
@@ -54,11 +62,8 @@ void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameS
     const PairLabel farther = by_mask ? PairLabel::undecided : PairLabel::background;
     for (std::size_t m = 0; m < scratch.members.size(); ++m) {
       const auto i = static_cast<std::size_t>(scratch.members[m]);
-      const bool nearer = separated.status == ForegroundStatus::ok && is_valid_depth(depths[i]) &&
-                          depths[i] < static_cast<Scalar>(separated.near_m);
-      scratch.pair_label[b * n + i] = scratch.mask[m] != 0 ? PairLabel::foreground
-                                      : nearer             ? PairLabel::undecided
-                                                           : farther;
+      const PairLabel beside = is_before(separated, flow.depth(i)) ? PairLabel::undecided : farther;
+      scratch.pair_label[b * n + i] = scratch.mask[m] != 0 ? PairLabel::foreground : beside;
     }
     if (!depths.empty() || by_mask)
       label_margin(box.box, separated, flow, depths.empty() ? 0 : options.coarse.flow.margin,

@@ -28,14 +28,15 @@ void score_flow_at_keypoints(const Frame<Scalar>& frame, const FrameOptions& opt
   const Scalar depth_share = static_cast<Scalar>(options.coarse.unreported.depth_share);
   PointGrid<Scalar>& grid = state.scratch.grid;
   const auto is_known = [&](std::size_t p) { return has_distance(state.flow_distances[p]); };
-  fill_grid(frame.flow.current, is_known, radius_px, grid);
+  const FlowPairs<Scalar> flow = flow_with_depths(frame, state);
+  fill_grid(flow.current, is_known, radius_px, grid);
   for (std::size_t i = 0; i < state.size(); ++i) {
     if (state.box[i] == no_box) continue;
     const Box<Scalar>& box = state.boxes[static_cast<std::size_t>(state.box[i])].box;
     const auto& [x, y] = state.current.keypoints[i];
     const Scalar depth = state.current.depths.empty() ? Scalar(0) : state.current.depths[i];
     const std::size_t pair = nearest(grid, x, y, state.flow_distances.size(), [&](const auto& p) {
-      const Scalar its = state.flow_depths.empty() ? Scalar(0) : state.flow_depths[p.index];
+      const Scalar its = flow.depth(p.index);
       const bool apart = is_valid_depth(depth) && is_valid_depth(its) && std::abs(its - depth) > depth_share * depth;
       return contains(box, p.x, p.y) && !apart;
     });
