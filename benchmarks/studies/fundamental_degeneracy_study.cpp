@@ -20,15 +20,20 @@
 //
 // CFP_STUDY_ALONE=1 CFP_STUDY_SEED=77 cfp_fundamental_degeneracy_study 100: wrong 1.23 %; 128 of 1782 cells are surely
 // above 1 %, in 77 of them the pairs tell (broad movers 24, uneven noise 14, crossing 13, turn 6, volume + walker 7,
-// few 6, two lines 5, rest 2). Beside a walker and 40 % of mismatches 1 % of the F of exact pairs are wrong and 11 % at
-// 0.1 px; 13 and 19 % before samples left out the neighbours of one inlier and the lesser of two noises counted (40
-// problems). In the corridor's cells without 90 % of mismatches 26 % are lost, 94 before windows were of either axis'
-// own spread (20 problems). That noise prefers a direction is not noticed. Broad movers: wrong 7.4 %, 78 % before
-// windows were that wide. Plane ahead, 20 problems of seed 7: 11.3 % before distances from H were measured under the
-// noise of both images, in up to 100 % of a cell; now none. People who cross 3.3 %, whole pixels 0 (CFP_STUDY_SEED=9,
-// 40 problems of kinds 22 to 25, before 96e5a81 and after: crossing 25.6 and 30.7 -> 2.6 and 4.4 %; of whole pixels up
-// to 6 % of a cell -> 0; of the known cells of `corner` lost 22.7 -> 1.6 %). CFP_STUDY_SEED=11
-// cfp_fundamental_degeneracy_study 40 0 1 2 3: of 189 known cells 45 lose more than 5 %, 43 of them with 20 pairs.
+// few 6, two lines 5, rest 2). That noise prefers a direction is not noticed. People who cross 3.3 %, whole pixels 0.
+//
+// What the rules brought, wrong in percent before and after:
+// - samples that leave out the neighbours of one inlier, and the lesser of two noises: beside a walker and 40 % of
+//   mismatches 13 and 1 of exact pairs, 19 and 11 at 0.1 px (seed 77, 40 and 100 problems);
+// - windows of either axis' own spread: of the corridor's cells without 90 % of mismatches 94 and 26 % are lost (seed
+//   77, 20 problems);
+// - broad windows: broad movers 78 and 7.4;
+// - distances from H under the noise of both images: plane ahead 11.3, up to 100 in a cell, and none (seed 7, 20);
+// - 96e5a81: crossing 25.6 and 30.7, then 2.6 and 4.4; whole pixels up to 6 of a cell and none; of the known cells of
+//   `corner` 22.7 and 1.6 % are lost (seed 9, 40 problems of kinds 22 to 25).
+//
+// CFP_STUDY_SEED=11 cfp_fundamental_degeneracy_study 40 0 1 2 3: of 189 known cells 45 lose more than 5 %, 43 of them
+// with 20 pairs.
 //
 // Arguments: [problems per cell, default 40] [kinds by number, default all] or --smoke. CFP_STUDY_ALONE: without the
 // peers; CFP_STUDY_SEED: draws other scenes.
