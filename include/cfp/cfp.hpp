@@ -43,6 +43,7 @@
 #include "cfp/frame/label_image.hpp"
 #include "cfp/frame/label_keypoints.hpp"
 #include "cfp/frame/match_in_boxes.hpp"
+#include "cfp/frame/moving_parts.hpp"
 #include "cfp/frame/pose_health.hpp"
 #include "cfp/frame/refine_motion.hpp"
 #include "cfp/frame/static_probability.hpp"

@@ -221,6 +221,7 @@ static void instantiate_frame() noexcept {
   use(&cfp::estimate_flow_model<Scalar>);
   use(&cfp::flow_distances<Scalar>);
   use(&cfp::estimate_camera_motion<Scalar>);
+  use(&cfp::leave_out_moving_parts<Scalar>);
   use(&cfp::refine_camera_motion<Scalar>);
   use(&cfp::join<Scalar>);
   use(&cfp::relative_motion<Scalar, Eigen::Matrix<Scalar, 12, 12>>);

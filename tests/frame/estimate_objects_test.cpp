@@ -541,6 +541,25 @@ TEST_CASE("What the rows of a rolling shutter err by hides nobody and moves nobo
   CHECK(called(1.5, 0.003) >= 95);  // 0.8 px
 }
 
+TEST_CASE("What moves slowly beside all boxes makes nobody move who stands", "[frame]") {
+  const auto called = [](double thing_motion_m, double person_motion_m) {
+    return called_moving("thing", true, [&](DynamicScene<double>& scene, cfp::Random& random) {
+      scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.005, 0.002, 0.004, 0.001, -0.002, 0.001));
+      const auto add = [&](double x, double y, double z, double shift) {
+        add_pair(scene, {x, y}, z, shift, 0.2, random);
+      };
+      for (int k = 0; k < 300; ++k) add(random.uniform(20, 620), random.uniform(20, 460), random.uniform(3.5, 5), 0);
+      for (int k = 0; k < 40; ++k)
+        add(random.uniform(450, 600), random.uniform(250, 400), random.uniform(2.4, 2.8), thing_motion_m);
+      for (int k = 0; k < 60; ++k)
+        add(random.uniform(270, 370), random.uniform(120, 420), random.uniform(1.95, 2.05), person_motion_m);
+    });
+  };
+  CHECK(called(0, 0) <= 4);
+  CHECK(called(0.005, 0) <= 25);  // 1 px; 100 if it bent the camera's motion
+  CHECK(called(0.005, 0.006) >= 95);
+}
+
 TEST_CASE("Where the image errs by more than its noise nobody who stands moves for it", "[frame]") {
   const auto called = [](double error_px, double person_motion_m) {
     return called_moving("waves", true, [&](DynamicScene<double>& scene, cfp::Random& random) {

@@ -5,8 +5,11 @@
 #include <cmath>
 #include <vector>
 
+#include <Eigen/Cholesky>
+
 #include "cfp/core/random.hpp"
 #include "cfp/frame/camera_motion.hpp"
+#include "cfp/frame/moving_parts.hpp"
 
 namespace cfp_test {
 
@@ -26,6 +29,7 @@ struct MovingFlowOptions {
   double share = 0, moves_px = 0;  ///< of the pairs, or of the image; how far they move
   double noise_px = 0.1;
   double wrong_depths = 0;  ///< share of all pairs
+  double nearest_m = 1;     ///< of what is at rest; the farthest is 5 m away
 };
 
 struct MovingFlow {
@@ -40,6 +44,17 @@ struct MovingFlow {
     const std::vector<char> outside(depths.size(), 1);
     return cfp::estimate_camera_motion<double>({previous, current, depths}, outside, camera, options, workspace);
   }
+  [[nodiscard]] cfp::CameraMotion<double> estimate_without_moving_parts(
+      const cfp::CameraMotionOptions& options, cfp::CameraMotionWorkspace<double>& workspace) const {
+    return cfp::leave_out_moving_parts<double>(estimate(options, workspace), {previous, current, depths}, flow_camera,
+                                               options, workspace);
+  }
+  /// The squared distance of that motion from the true one in the measure of its covariance: six degrees of freedom.
+  [[nodiscard]] double error_sq(const cfp::CameraMotion<double>& found) const {
+    const cfp::Vector6<double> error = cfp::se3_log(found.T_cur_prev * T_cur_prev.inverse());
+    const cfp::Matrix6<double> covariance = found.covariance;
+    return error.dot(covariance.llt().solve(error));
+  }
   /// By how many pixels that motion moves what is at rest at 2 m, at most.
   [[nodiscard]] double error_px(const cfp::CameraMotion<double>& found) const {
     const cfp::SE3<double> error = T_cur_prev.inverse() * found.T_cur_prev;
@@ -47,7 +62,7 @@ struct MovingFlow {
   }
 };
 
-/// A room 1 to 5 m away with the depth noise of structured light; the camera moves by some 15 mm and 8 mrad.
+/// A room with the depth noise of structured light; the camera moves by some 15 mm and 8 mrad.
 inline MovingFlow make_moving_flow(const MovingFlowOptions& options, std::size_t pairs, cfp::Random& random) {
   MovingFlow flow;
   flow.T_cur_prev = random_motion(0.015, 0.008, random);
@@ -63,7 +78,7 @@ inline MovingFlow make_moving_flow(const MovingFlowOptions& options, std::size_t
     const cfp::Vector2<double> p{random.uniform(10, 630), random.uniform(10, 470)};
     const bool inside = p.x() > left && p.x() < left + width && p.y() > top && p.y() < top + height;
     const bool moves = spread ? random.uniform() < options.share : inside;
-    const double z = moves && !spread ? near_m + 0.1 * random.normal() : random.uniform(1, 5);
+    const double z = moves && !spread ? near_m + 0.1 * random.normal() : random.uniform(options.nearest_m, 5);
     cfp::Vector3<double> ray;
     cfp::Vector2<double> q;
     if (!flow_camera.unproject(p, ray)) continue;

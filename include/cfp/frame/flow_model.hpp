@@ -9,6 +9,7 @@
 #include "cfp/core/span.hpp"
 #include "cfp/frame/camera_motion.hpp"
 #include "cfp/frame/flow_model_types.hpp"
+#include "cfp/frame/moving_parts.hpp"
 #include "cfp/frame/shared_error_impl.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/epipolar.hpp"
@@ -182,7 +183,10 @@ FlowModel<Scalar> estimate_flow_model(const FlowPairs<Scalar>& flow, span<const 
   CFP_ASSERT(flow.previous.size() == flow.current.size() && outside.size() == flow.current.size());
   CFP_ASSERT(detail::fits(flow.current.size(), flow.previous_depths));
   CameraMotion<Scalar> motion;
-  if (options.use_depth) motion = estimate_camera_motion(flow, outside, camera, options.motion, workspace.motion);
+  if (options.use_depth) {
+    motion = estimate_camera_motion(flow, outside, camera, options.motion, workspace.motion);
+    motion = leave_out_moving_parts(motion, flow, camera, options.motion, workspace.motion);
+  }
   if (motion.known) return detail::model_of(motion, {flow, camera, options.motion, workspace.motion}, 6);
   return detail::estimate_without_depths(flow, outside, camera, options, workspace, [](auto&, auto&) { return 6; });
 }

@@ -83,6 +83,7 @@ template <typename Scalar>
   CameraMotionWorkspace<Scalar>& workspace = state.scratch.flow.motion;
   CameraMotion<Scalar> motion = estimate_camera_motion(flow, outside, camera, options.motion, workspace);
   if (!motion.known) return {};
+  motion = leave_out_moving_parts(motion, flow, camera, options.motion, workspace);
   const bool straightened =
       !given && straighten(camera, options.motion, workspace, state.scratch.straight, flow, motion);
   FlowModel<Scalar> model = model_of<Scalar>(motion, {flow, camera, options.motion, workspace}, straightened ? 9 : 6);

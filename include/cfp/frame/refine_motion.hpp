@@ -26,10 +26,6 @@ struct RefinedMotion : CameraMotion<Scalar> {
 };
 
 namespace detail {
-
-/// Two motions that differ by more are not one: chi-squared of 6 degrees of freedom, one in a thousand.
-inline constexpr double most_motion_distance_sq = 22.5;
-
 inline namespace CFP_ISA {
 
 /// A host's motion and the pairs on no object as a model of least_squares.hpp. The sums and the distances of the pairs,

@@ -42,6 +42,13 @@ struct TimedMotion {
   Scalar time_s = 0;
 };
 
+namespace detail {
+
+/// Two motions that differ by more are not one: chi-squared of 6 degrees of freedom, one in a thousand.
+inline constexpr double most_motion_distance_sq = 22.5;
+
+}  // namespace detail
+
 inline namespace CFP_ISA {
 
 /// The motion between two poses of one camera whose errors have this joint covariance, 12 x 12: of (xi_prev, xi_cur) in

@@ -1,0 +1,88 @@
+/// @file moving_parts.hpp
+/// The camera's motion without the parts of the image that pull at it. Not in the paper, whose camera's motion follows
+/// whatever is in no box.
+#pragma once
+
+#include <limits>
+#include <utility>
+
+#include "cfp/core/span.hpp"
+#include "cfp/frame/camera_motion.hpp"
+#include "cfp/frame/image_parts_impl.hpp"
+#include "cfp/frame/shared_error_impl.hpp"
+#include "cfp/frame/smooth_error_impl.hpp"
+#include "cfp/geometry/flow_pairs.hpp"
+#include "cfp/geometry/motion_residual_impl.hpp"
+#include "cfp/math/se3.hpp"
+
+namespace cfp {
+
+namespace detail {
+inline namespace CFP_ISA {
+
+/// The pairs that tell, by the part of the image that they are in.
+template <typename Scalar>
+[[nodiscard]] ImageParts parts_of(const PairsWithDepth<Scalar>& pairs, const CameraMotion<Scalar>& motion) noexcept {
+  ImageParts parts;
+  MotionResidual<Scalar> pair;
+  for (const auto& point : pairs.workspace.grid.points) {
+    if (!pairs.tells(point.index) || !pairs.residual_of(point.index, motion.T_cur_prev, pair)) continue;
+    const auto sigma_px = static_cast<double>(motion.sigma_px * pairs.flow.relative_sigma(point.index));
+    add_pair(pair, sigma_px, Vector6<double>::Zero(), parts.at(pairs.workspace.grid, point).equations);
+  }
+  return parts;
+}
+
+/// Whether the pairs that tell err by more than noise under their motion: by a smooth error, or by what neighbours err
+/// by together, over a tenth of the noise.
+template <typename Scalar>
+[[nodiscard]] bool err_together(const PairsWithDepth<Scalar>& pairs, const CameraMotion<Scalar>& motion) noexcept {
+  SmoothErrorFit<Scalar> smooth{pairs, motion.T_cur_prev.template cast<double>()};
+  if (smooth.step(motion.sigma_px) && smooth.stands_out()) return true;
+  return shared_error(pairs, motion, 6).error_px > 0.1 * static_cast<double>(motion.sigma_px);
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
+
+inline namespace CFP_ISA {
+
+/// After estimate_camera_motion, of the same pairs: the motion without the parts of the image that ask for another one.
+/// What moves slowly and is on no object bends the motion until none of its pairs stands out, and makes what rests seem
+/// to move (cfp_camera_motion_study). The pairs in each of 4 x 4 parts have the normal equations g_k, H_k at the motion
+/// and would alone go on by xi_k = -H_k^-1 g_k. Of (xi - xi_k)^T H_k (xi - xi_k), xi the step of the parts that count,
+/// the largest one's part is left out, as long as that exceeds 22.5, of six degrees of freedom one in a thousand, and
+/// at most a quarter of the parts; then refine_pose by the last round of `pose`. The motion as it came where no part
+/// pulls, or where the rest errs together all the same: then nothing moves but the image errs, as a lens makes it
+/// (examples/slam/WEIGHTS.md). The pairs left out take no part in what `workspace` is used for later. O(pairs).
+template <typename Scalar>
+[[nodiscard]] CameraMotion<Scalar> leave_out_moving_parts(const CameraMotion<Scalar>& motion,
+                                                          const FlowPairs<Scalar>& flow,
+                                                          const PinholeCamera<Scalar>& camera,
+                                                          const CameraMotionOptions& options,
+                                                          CameraMotionWorkspace<Scalar>& workspace) {
+  CFP_ASSERT(!motion.known || workspace.points.size() == flow.current.size());
+  if (!motion.known) return motion;
+  const detail::PairsWithDepth<Scalar> pairs{flow, camera, options, workspace};
+  detail::ImageParts parts = detail::parts_of(pairs, motion);
+  Vector6<double> step;
+  if (!parts.leave_out_moving(step)) return motion;
+
+  auto& left_out = workspace.grid.unsorted;  // x: of the point, not of the pixel
+  left_out.clear();
+  for (auto point : workspace.grid.points) {
+    if (!pairs.tells(point.index) || parts.at(workspace.grid, point).counts) continue;
+    point.x = std::exchange(workspace.points[point.index][0], std::numeric_limits<Scalar>::quiet_NaN());
+    left_out.push_back(point);
+  }
+  workspace.taken -= left_out.size();
+  SE3<double> T = se3_exp(step) * motion.T_cur_prev.template cast<double>();
+  const CameraMotion<Scalar> rest = pairs.refine(motion.sigma_px, detail::last_round(options.pose, 1), T);
+  if (rest.known && !detail::err_together(pairs, rest)) return rest;
+  workspace.taken += left_out.size();
+  for (const auto& point : left_out) workspace.points[point.index][0] = point.x;
+  return motion;
+}
+
+}  // namespace CFP_ISA
+}  // namespace cfp
