@@ -4,15 +4,127 @@
 /// at rest, and is blind along its lines.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <vector>
 
 #include "cfp/core/span.hpp"
-#include "cfp/frame/camera_motion_impl.hpp"
 #include "cfp/frame/camera_motion_types.hpp"
 #include "cfp/frame/pair_points_impl.hpp"
 #include "cfp/geometry/flow_pairs.hpp"
+#include "cfp/geometry/motion_distance.hpp"
+#include "cfp/optimization/pose/pose_refinement.hpp"
+#include "cfp/robust/pnp_ransac.hpp"
 
 namespace cfp {
+
+namespace detail {
+inline namespace CFP_ISA {
+
+/// The noise of the flow by robust_sigma, within the bounds of the options.
+template <typename Scalar>
+[[nodiscard]] Scalar flow_sigma(span<Scalar> distances, int coordinates, const CameraMotionOptions& options) noexcept {
+  return std::clamp(robust_sigma(distances, coordinates), Scalar(options.min_sigma_px), Scalar(options.max_sigma_px));
+}
+
+/// The pairs that tell, those with a point in workspace.points, and what can be had of them.
+template <typename Scalar>
+struct PairsWithDepth {
+  const FlowPairs<Scalar>& flow;
+  const PinholeCamera<Scalar>& camera;
+  const CameraMotionOptions& options;
+  CameraMotionWorkspace<Scalar>& workspace;
+
+  [[nodiscard]] bool tells(std::size_t i) const noexcept { return is_finite(workspace.points[i][0]); }
+
+  /// expected_residual of pair i under a motion.
+  [[nodiscard]] bool residual_of(std::size_t i, const SE3<Scalar>& T, MotionResidual<Scalar>& out) const noexcept {
+    return expected_residual<PinholeCamera<Scalar>, Scalar>(flow.previous[i], workspace.points[i][2], flow.current[i],
+                                                            T, camera, options.distance, out);
+  }
+
+  /// The noise of pair i's pixel: what is near is no lever.
+  [[nodiscard]] Scalar pixel_sigma_of(std::size_t i, Scalar sigma_px) const noexcept {
+    return sigma_px * flow.relative_sigma(i) * (std::max)(Scalar(1), workspace.near_m / workspace.points[i][2]);
+  }
+
+  /// The noise that they show under a motion.
+  [[nodiscard]] Scalar noise_under(const SE3<double>& T_cur_prev, Scalar sigma_px) const {
+    std::vector<Scalar>& distances = workspace.distances;
+    distances.clear();
+    distances.reserve(workspace.points.size());
+    const SE3<Scalar> T = T_cur_prev.template cast<Scalar>();
+    MotionResidual<Scalar> pair;
+    for (std::size_t i = 0; i < workspace.points.size(); ++i) {
+      const Scalar relative = flow.relative_sigma(i);
+      if (tells(i) && residual_of(i, T, pair)) distances.push_back(distance_of(pair, sigma_px * relative) / relative);
+    }
+    return flow_sigma(span<Scalar>(distances), 2, options);
+  }
+
+  /// The same with the error of its depth, which shows where the camera moves.
+  [[nodiscard]] Scalar sigma_of(std::size_t i, Scalar sigma_px, const SE3<Scalar>& T) const noexcept {
+    const Scalar of_pixel = pixel_sigma_of(i, sigma_px);
+    MotionResidual<Scalar> pair;
+    if (T.translation.isZero(0) || !residual_of(i, T, pair)) return of_pixel;
+    return std::sqrt(of_pixel * of_pixel + pair.sigma_z * pair.sigma_z * pair.along.squaredNorm());
+  }
+
+  /// refine_pose from T at a noise; T becomes the result, and the motion has the noise that is left.
+  [[nodiscard]] CameraMotion<Scalar> refine(Scalar sigma_px, const PoseOptions& rounds, SE3<double>& T) const {
+    const SE3<Scalar> so_far = T.template cast<Scalar>();
+    workspace.sigmas.clear();
+    for (std::size_t i = 0; i < workspace.points.size(); ++i) workspace.sigmas.push_back(sigma_of(i, sigma_px, so_far));
+    PoseObservations<Scalar> observations;
+    observations.points = workspace.points;
+    observations.pixels = flow.current;
+    observations.sigmas = workspace.sigmas;
+    const PoseResult refined = refine_pose(observations, camera, T, rounds, workspace.pose);
+    CameraMotion<Scalar> motion;
+    Matrix6<double> covariance;
+    motion.known =
+        is_solved(refined.status) &&
+        static_cast<double>(refined.inliers) >= options.min_inlier_share * static_cast<double>(workspace.taken) &&
+        invert_normal_equations<6>(refined.information, 1e-12, covariance);
+    if (!motion.known) return motion;
+    T = refined.T_cam_world;
+    motion.T_cur_prev = T.template cast<Scalar>();
+    motion.covariance = covariance.template cast<Scalar>();
+    motion.sigma_px = noise_under(T, sigma_px);
+    return motion;
+  }
+
+  /// The motion that most of them agree to; false, and T untouched, without one. Its threshold is below sigma_px, their
+  /// noise under a motion which what moves may have led astray: a wider one would hold both.
+  [[nodiscard]] bool search(Scalar sigma_px, SE3<double>& T) const {
+    constexpr std::size_t most = 150;  // pairs; more take their time and find little more
+    PnpRansacOptions ransac;
+    ransac.threshold_px = 0.7 * (std::min)(static_cast<double>(sigma_px), 1e3);
+    ransac.max_iterations = 50;
+    workspace.sigmas.assign(workspace.points.size(), Scalar(0));
+    for (std::size_t i = 0, k = 0; i < workspace.points.size(); ++i) {
+      if (!tells(i)) continue;
+      if (k * most / workspace.taken != (k + 1) * most / workspace.taken) workspace.sigmas[i] = Scalar(1);
+      ++k;
+    }
+    const PnpRansacResult<Scalar> found = pnp_ransac(PointSpan<Scalar, 3>(workspace.points), flow.current,
+                                                     workspace.sigmas, camera, ransac, workspace.search);
+    if (found.found()) T = found.T_cam_world.template cast<double>();
+    return found.found();
+  }
+};
+
+/// The last round alone, its scale times a factor.
+[[nodiscard]] inline PoseOptions last_round(PoseOptions options, double factor) noexcept {
+  options.rounds[0] = options.rounds[options.round_count - 1];
+  options.rounds[0].scale *= factor;
+  options.round_count = 1;
+  return options;
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
 
 inline namespace CFP_ISA {
 
