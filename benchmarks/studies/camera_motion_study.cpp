@@ -78,7 +78,7 @@ struct SlowErrors {
   void add(const cfp_test::MovingFlow& flow, const cfp::CameraMotion<double>& found) {
     if (!found.known) return;
     errors_px.push_back(flow.error_px(found));
-    wrong += flow.error_sq(found) > 22.5 ? 1 : 0;
+    wrong += cfp_test::normalized_error_sq(found, flow.T_cur_prev) > 22.5 ? 1 : 0;
   }
   void print() {
     std::sort(errors_px.begin(), errors_px.end());

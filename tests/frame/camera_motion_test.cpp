@@ -6,6 +6,8 @@
 #include <limits>
 #include <vector>
 
+#include <Eigen/Cholesky>
+
 #include "cfp/core/random.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
@@ -78,7 +80,7 @@ TEST_CASE("The covariance of the camera's motion is that of its error", "[frame]
     const cfp::CameraMotion<double> found =
         cfp::estimate_camera_motion<double>(f.pairs(), f.outside, camera, {}, workspace);
     REQUIRE(found.known);
-    sum += cfp_test::MovingFlow{T, {}, {}, {}}.error_sq(found);
+    sum += cfp_test::normalized_error_sq(found, T);
   }
   // Six for six unknowns; depths, which have noise, too, count as exact.
   CHECK(sum / runs > 5);
@@ -114,8 +116,8 @@ TEST_CASE("A part of the image that moves slowly does not bend the camera's moti
         const cfp::CameraMotion<double> of_all = f.estimate({}, workspace),
                                         found = f.estimate_without_moving_parts({}, workspace);
         REQUIRE(found.known);
-        bent += f.error_sq(of_all) > 22.5 ? 1 : 0;  // once in a thousand
-        wrong += f.error_sq(found) > 22.5 ? 1 : 0;
+        bent += cfp_test::normalized_error_sq(of_all, f.T_cur_prev) > 22.5 ? 1 : 0;  // once in a thousand
+        wrong += cfp_test::normalized_error_sq(found, f.T_cur_prev) > 22.5 ? 1 : 0;
       }
       CHECK(2 * wrong < bent);  // 11 to 23, and 37 to 96
     }
@@ -397,8 +399,7 @@ TEST_CASE("A few near depths that are wrong do not tell the translation before a
       const cfp::CameraMotion<double> found =
           cfp::estimate_camera_motion<double>(f.pairs(), f.outside, camera, options, workspace);
       REQUIRE(found.known);
-      const cfp::Vector6<double> error = cfp::se3_log(found.T_cur_prev * T.inverse());
-      return error.dot(found.covariance.llt().solve(error)) / 6;
+      return cfp_test::normalized_error_sq(found, T) / 6;
     };
     without_wrong_nees += nees(bounded) / runs;
     f.depths[0] = 0.8, f.depths[1] = 1, f.depths[2] = 1.5;

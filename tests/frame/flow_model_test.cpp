@@ -4,11 +4,10 @@
 #include <cmath>
 #include <vector>
 
-#include <Eigen/Cholesky>
-
 #include "cfp/core/random.hpp"
 #include "support/catch.hpp"
 #include "support/engines.hpp"
+#include "support/moving_flow.hpp"
 
 namespace {
 
@@ -87,9 +86,7 @@ TEST_CASE("Before a wall the motion is known up to scale, and how well", "[frame
     CHECK(model.support == cfp::FlowSupport::outside_pairs);
     CHECK(model.status != cfp::RansacStatus::ok);
     const cfp::SE3<double> in_walls{T.rotation, T.translation / 4};
-    const cfp::Vector6<double> error = cfp::se3_log(in_walls * model.motion.T_cur_prev.inverse());
-    const Eigen::Matrix<double, 6, 6> covariance = model.motion.covariance;
-    nees += error.dot(covariance.llt().solve(error)) / seeds;
+    nees += cfp_test::normalized_error_sq(model.motion, in_walls) / seeds;
   }
   CHECK(nees > 4);
   CHECK(nees < 9);
@@ -132,13 +129,8 @@ TEST_CASE("What neighbours err by together is measured, and the motion is as unc
       measured += model.shared_error_px / seeds;
       const cfp::CameraMotion<double> alone = cfp::estimate_camera_motion<double>(
           {room.previous, room.current, depths}, room.outside, room.camera, options.motion, workspace.motion);
-      const auto squared_error = [&](const cfp::UncertainMotion<double>& found) {
-        const cfp::Vector6<double> error = cfp::se3_log(T * found.T_cur_prev.inverse());
-        const Eigen::Matrix<double, 6, 6> covariance = found.covariance;
-        return error.dot(covariance.llt().solve(error));
-      };
-      nees += squared_error(model.motion) / seeds;
-      nees_if_alone += squared_error(alone) / seeds;
+      nees += cfp_test::normalized_error_sq(model.motion, T) / seeds;
+      nees_if_alone += cfp_test::normalized_error_sq(alone, T) / seeds;
     }
     CHECK(measured < shared + 0.05);
     CHECK(measured > 0.2 * shared);

@@ -21,6 +21,12 @@ inline cfp::SE3<double> random_motion(double translation_m, double rotation_rad,
   return cfp::se3_exp(xi);
 }
 
+/// The squared distance of a motion from the true one in the measure of its covariance: six degrees of freedom.
+inline double normalized_error_sq(const cfp::UncertainMotion<double>& found, const cfp::SE3<double>& T_cur_prev) {
+  const cfp::Vector6<double> error = cfp::se3_log(found.T_cur_prev * T_cur_prev.inverse());
+  return error.dot(found.covariance.llt().solve(error));
+}
+
 /// What moves: pairs all over the image by one vector, or a region 1.2 to 3 m away, by one vector or as a rigid body.
 enum class Mover { spread, region, rigid_region };
 
@@ -48,12 +54,6 @@ struct MovingFlow {
       const cfp::CameraMotionOptions& options, cfp::CameraMotionWorkspace<double>& workspace) const {
     return cfp::leave_out_moving_parts<double>(estimate(options, workspace), {previous, current, depths}, flow_camera,
                                                options, workspace);
-  }
-  /// The squared distance of that motion from the true one in the measure of its covariance: six degrees of freedom.
-  [[nodiscard]] double error_sq(const cfp::CameraMotion<double>& found) const {
-    const cfp::Vector6<double> error = cfp::se3_log(found.T_cur_prev * T_cur_prev.inverse());
-    const cfp::Matrix6<double> covariance = found.covariance;
-    return error.dot(covariance.llt().solve(error));
   }
   /// By how many pixels that motion moves what is at rest at 2 m, at most.
   [[nodiscard]] double error_px(const cfp::CameraMotion<double>& found) const {
