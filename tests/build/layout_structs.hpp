@@ -183,8 +183,8 @@
   CFP_LAYOUT(cfp::PoseStep<float>, dt_s) \
   CFP_LAYOUT(cfp::PoseStep<double>, dt_s) \
   CFP_LAYOUT_OPAQUE(cfp::FrameInterval) \
-  CFP_LAYOUT(cfp::FrameMemory<float>, motion) \
-  CFP_LAYOUT(cfp::FrameMemory<double>, motion) \
+  CFP_LAYOUT(cfp::FrameMemory<float>, shared_error_sq) \
+  CFP_LAYOUT(cfp::FrameMemory<double>, shared_error_sq) \
   CFP_LAYOUT(cfp::FrameScratch<float>, mask) \
   CFP_LAYOUT(cfp::FrameScratch<double>, mask) \
   CFP_LAYOUT(cfp::FrameState<float>, scratch) \

@@ -575,6 +575,33 @@ TEST_CASE("Where the image errs by more than its noise nobody who stands moves f
   CHECK(called(0.6, 0.03) >= 95);
 }
 
+TEST_CASE("What the image erred by in the frames before is not forgotten in one whose pairs hardly show it",
+          "[frame]") {
+  const auto called = [](bool remembers, double person_motion_m) {
+    FrameRun<double> run{DynamicScene<double>()};
+    int moving = 0;
+    for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+      cfp::Random random(seed, "waves");
+      run.scene = {};
+      run.scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.005, 0.002, 0.004, 0.001, -0.002, 0.001));
+      const auto add = add_to(run.scene, random, waves(0.3, random));
+      for (int k = 0; k < 60; ++k) add(random.uniform(20, 620), random.uniform(20, 460), random.uniform(2.5, 5), 0);
+      for (int k = 0; k < 60; ++k)
+        add(random.uniform(270, 370), random.uniform(120, 420), random.uniform(0.95, 1.05), person_motion_m);
+      run.scene.boxes = {{250, 100, 390, 440}};
+      cfp::Frame<double> frame = run.frame();
+      frame.flow.previous_depths = run.scene.depths;
+      if (!remembers) run.state = {};
+      run.coarse({}, frame, run.scene.camera);
+      moving += run.state.objects[0].static_probability <= 0.9 ? 1 : 0;
+    }
+    return moving;
+  };
+  CHECK(called(false, 0) >= 30);  // else nothing was asked
+  CHECK(called(true, 0) <= 10);
+  CHECK(called(true, 0.01) >= 190);
+}
+
 TEST_CASE("With one camera nobody who stands moves for what F errs by, beside its pairs and before them", "[frame]") {
   const auto called = [](bool all_around, double error_px, double person_motion_m) {
     return called_moving("one camera", false, [&](DynamicScene<double>& scene, cfp::Random& random) {

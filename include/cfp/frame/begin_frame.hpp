@@ -20,6 +20,7 @@ void copy_frame(const Frame<Scalar>& frame, const FrameMemory<Scalar>& previous,
   current.timestamp_s = stamped ? frame.timestamp_s : previous.timestamp_s;
   current.object_depths.clear();
   current.motion = {};
+  current.shared_error_sq = previous.known ? previous.shared_error_sq : std::nullopt;
   current.keypoints.resize(frame.keypoints.size());
   for (std::size_t i = 0; i < frame.keypoints.size(); ++i)
     current.keypoints[i] = {frame.keypoints(i, 0), frame.keypoints(i, 1)};

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "cfp/core/span.hpp"
@@ -39,32 +40,31 @@ template <typename Scalar>
 /// Makes the covariance of the model count what neighbours err by together.
 template <typename Scalar>
 void count_shared_error(const SharedError& shared, FlowModel<Scalar>& model) noexcept {
-  model.shared_error_px = shared.error_px;
-  model.shared_factor = shared.variance_factor;
-  model.F_covariance *= shared.variance_factor;
-  model.motion.covariance *= static_cast<Scalar>(shared.variance_factor);
+  const double error_sq = (std::max)(shared.error_sq, 0.0), sigma_px = static_cast<double>(model.sigma_px);
+  model.shared_error_px = std::sqrt(error_sq);
+  model.shared_factor = 1 + shared.pairs * error_sq / (sigma_px * sigma_px);
+  model.F_covariance *= model.shared_factor;
+  model.motion.covariance *= static_cast<Scalar>(model.shared_factor);
 }
 
-/// The same of a motion to which, and to what was taken out of the pairs before, so many parameters were fitted, with
-/// what the pairs err by together.
+/// The same of a motion that was fitted to the pairs, with what these err by together.
 template <typename Scalar>
-[[nodiscard]] FlowModel<Scalar> model_of(const CameraMotion<Scalar>& motion, const PairsWithDepth<Scalar>& pairs,
-                                         int parameters) {
+[[nodiscard]] FlowModel<Scalar> model_of(const CameraMotion<Scalar>& motion, const SharedError& shared) {
   FlowModel<Scalar> model = model_of(FlowModelKind::motion, FlowSupport::outside_pairs, motion);
-  count_shared_error(shared_error(pairs, motion, parameters), model);
+  count_shared_error(shared, model);
   return model;
 }
 
 /// The same of a motion up to scale, of pairs at the depth of the room, 1: how far each of them is beside it is no
-/// error.
+/// error. So many parameters were fitted to them.
 template <typename Scalar>
 [[nodiscard]] FlowModel<Scalar> model_up_to_scale(const CameraMotion<Scalar>& motion,
                                                   const PairsWithDepth<Scalar>& pairs, RansacStatus no_fundamental,
                                                   int parameters) {
   CameraMotionOptions any_depth = pairs.options;
   any_depth.distance.depth_noise = {1, 0, 0};
-  FlowModel<Scalar> model =
-      model_of<Scalar>(motion, {pairs.flow, pairs.camera, any_depth, pairs.workspace}, parameters);
+  FlowModel<Scalar> model = model_of(
+      motion, shared_error<Scalar>({pairs.flow, pairs.camera, any_depth, pairs.workspace}, motion, parameters));
   model.kind = FlowModelKind::motion_up_to_scale;
   model.status = no_fundamental;
   return model;
@@ -187,7 +187,10 @@ FlowModel<Scalar> estimate_flow_model(const FlowPairs<Scalar>& flow, span<const 
     motion = estimate_camera_motion(flow, outside, camera, options.motion, workspace.motion);
     motion = leave_out_moving_parts(motion, flow, camera, options.motion, workspace.motion);
   }
-  if (motion.known) return detail::model_of(motion, {flow, camera, options.motion, workspace.motion}, 6);
+  if (motion.known) {
+    return detail::model_of(motion,
+                            detail::shared_error<Scalar>({flow, camera, options.motion, workspace.motion}, motion, 6));
+  }
   return detail::estimate_without_depths(flow, outside, camera, options, workspace, [](auto&, auto&) { return 6; });
 }
 

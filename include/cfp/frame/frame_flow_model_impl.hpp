@@ -3,6 +3,8 @@
 /// what the frame before lets expect. Not an interface.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -68,6 +70,18 @@ template <typename Scalar>
   return true;
 }
 
+/// What the pairs err by together in this frame or, if it is more, in the mean of the last third of a second: what
+/// makes it lasts, and a dozen parts of one image hardly measure it (examples/slam/WEIGHTS.md).
+template <typename Scalar>
+[[nodiscard]] SharedError remember_shared_error(SharedError shared, FrameState<Scalar>& state) noexcept {
+  constexpr double memory_s = 0.3;
+  std::optional<double>& mean_sq = state.current.shared_error_sq;
+  const double share = mean_sq ? -std::expm1(-(std::max)(elapsed_s(state), 0.0) / memory_s) : 1;
+  if (shared.known) mean_sq = share * shared.error_sq + (1 - share) * mean_sq.value_or(0);
+  shared.error_sq = (std::max)(shared.error_sq, mean_sq.value_or(0));
+  return shared;
+}
+
 /// The model by the pairs' depths, joined with the host's motion or what the frame before lets expect; none where they
 /// do not tell. Without boxes few depths are left out: see UnreportedOptions::min_known_depths. The pairs become those
 /// that it judges: without their smooth error, unless the host's motion tells of the turn that is part of it.
@@ -86,7 +100,9 @@ template <typename Scalar>
   motion = leave_out_moving_parts(motion, flow, camera, options.motion, workspace);
   const bool straightened =
       !given && straighten(camera, options.motion, workspace, state.scratch.straight, flow, motion);
-  FlowModel<Scalar> model = model_of<Scalar>(motion, {flow, camera, options.motion, workspace}, straightened ? 9 : 6);
+  const SharedError shared =
+      shared_error<Scalar>({flow, camera, options.motion, workspace}, motion, straightened ? 9 : 6);
+  FlowModel<Scalar> model = model_of(motion, remember_shared_error(shared, state));
   const double time_s = elapsed_s(state), acceleration = options.camera_acceleration_m_s2;
   const TimedMotion<double>& last = state.previous.motion;
   if (given)

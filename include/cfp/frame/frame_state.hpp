@@ -83,6 +83,7 @@ struct FrameMemory {
   std::vector<std::uint8_t> descriptors;           ///< one after the other; empty: none
   std::size_t descriptor_bytes = 0;                ///< of each
   TimedMotion<double> motion;                      ///< of the camera until then, by the flow's depths
+  std::optional<double> shared_error_sq;           ///< px^2: what pairs with depth erred by together until then, mean
 
   [[nodiscard]] DescriptorSpan descriptor_view() const noexcept {
     return {descriptors.data(), descriptors.empty() ? 0 : keypoints.size(), descriptor_bytes, descriptor_bytes};

@@ -39,7 +39,8 @@ template <typename Scalar>
 [[nodiscard]] bool err_together(const PairsWithDepth<Scalar>& pairs, const CameraMotion<Scalar>& motion) noexcept {
   SmoothErrorFit<Scalar> smooth{pairs, motion.T_cur_prev.template cast<double>()};
   if (smooth.step(motion.sigma_px) && smooth.stands_out()) return true;
-  return shared_error(pairs, motion, 6).error_px > 0.1 * static_cast<double>(motion.sigma_px);
+  const double most_px = 0.1 * static_cast<double>(motion.sigma_px);
+  return shared_error(pairs, motion, 6).error_sq > most_px * most_px;
 }
 
 }  // namespace CFP_ISA

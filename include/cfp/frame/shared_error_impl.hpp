@@ -19,8 +19,9 @@ namespace cfp::detail {
 /// Rolling shutter, a lens or a focal length that is not quite as told, depth that is late or beside its image: no
 /// noise, for the mean of many neighbours has all of it.
 struct SharedError {
-  double error_px = 0;         // standard deviation of one coordinate, beside the pairs' noise
-  double variance_factor = 1;  // of what is fitted to all pairs: so many times that of pairs which err alone
+  bool known = false;
+  double error_sq = 0;  // variance of one coordinate, beside the pairs' noise, px^2; below 0 by chance
+  double pairs = 0;     // that share it, in the mean of the parts
 };
 
 inline namespace CFP_ISA {
@@ -60,8 +61,8 @@ struct ResidualPart {
 /// residual, false without one. In each of 4 x 3 parts of what they cover the mean of n residuals has the variance
 /// sigma^2 / n + e^2 per coordinate; e is had from the upper quartile of the parts, as what errs may be a part of the
 /// image, and what moves there may be another. So many parameters were fitted to the two coordinates of all n parts:
-/// e^2 is n / (n - parameters / 2) times what is left of it, and n times at most. Fewer than four parts with five pairs
-/// that agree tell nothing.
+/// e^2 is n / (n - parameters / 2) times what is left of it, and n times at most. Not known of fewer than four parts
+/// with five pairs that agree.
 template <typename Scalar, typename Tells, typename Residual>
 [[nodiscard]] SharedError shared_error(const FlowPairs<Scalar>& flow, Scalar sigma_px, int parameters, Tells&& tells,
                                        Residual&& residual) noexcept {
@@ -93,10 +94,14 @@ template <typename Scalar, typename Tells, typename Residual>
     error_sq[n++] = (part.sum.squaredNorm() / (part.variance * upper_quartile) - 1) / part.pairs();
     told_by += part.pairs();
   }
-  if (n < fewest_parts) return {};
   const double told = static_cast<double>(n), free = (std::max)(told - 0.5 * parameters, 1.0);
-  const double e_sq = (std::max)(quantile(span<double>(error_sq.data(), n), 0.75), 0.0) * told / free;
-  return {static_cast<double>(sigma_px) * std::sqrt(e_sq), 1 + e_sq * told_by / told};
+  SharedError shared;
+  if (n > 0) shared.pairs = told_by / told;
+  shared.known = n >= fewest_parts;
+  if (!shared.known) return shared;
+  const auto sigma_sq = static_cast<double>(sigma_px) * static_cast<double>(sigma_px);
+  shared.error_sq = sigma_sq * quantile(span<double>(error_sq.data(), n), 0.75) * told / free;
+  return shared;
 }
 
 /// Of the pairs with a point, under the motion that was fitted to them.
