@@ -68,6 +68,18 @@ TEST_CASE("A refused step raises the damping to its floor, and small damping fal
   CHECK(script.dampings == std::vector<double>{0, 1e-3, 4e-3, 4e-3 * (1.0 / 3), 0});
 }
 
+TEST_CASE("A step that was damped tells of no minimum by how little it brings", "[optimization][least_squares]") {
+  cfp::LevenbergMarquardtOptions options;
+  options.initial_damping = 1;
+  options.min_relative_decrease = 1e-4;
+  Script script{{-1, 0.05, 1, 1, 0.05, 1}, {}, 1e3};
+  const cfp::LeastSquaresResult result = minimize_least_squares(script, options);
+  CHECK(result.status == cfp::SolverStatus::converged);
+  CHECK(result.iterations == 5);  // the first below the damping of the start that brings less than 1e-4
+  CHECK(script.dampings[1] > 1);
+  CHECK(script.dampings[4] < 1);
+}
+
 namespace {
 
 // Rosenbrock's valley, r = (1 - x, 10 (y - x^2)), from the far side.

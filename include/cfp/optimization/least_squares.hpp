@@ -80,6 +80,8 @@ inline namespace CFP_ISA {
 /// Runs the loop. The cost never rises; what the problem holds at the end belongs to the last accepted step. A system
 /// that is not positive definite is damped, or, with damping 0, ends as degenerate.
 ///
+/// Only a step that was hardly damped tells of a minimum by how little it promises or brings.
+///
 /// A step is judged by its gain = (cost before - cost after) / (predicted decrease); NaN is refused. Accepted (gain
 /// above 1e-3): the damping shrinks by max(1/3, 1 - (2 gain - 1)^3), and does not grow for gain >= 1/2; below
 /// rejected_damping it falls to min_damping at once. Refused: it grows 2, 4, 8, … times.
@@ -98,7 +100,7 @@ LeastSquaresResult minimize_least_squares(Problem& problem, const LevenbergMarqu
     ++result.iterations;
     const double promised = problem.propose(damping);
     if (is_finite(promised)) {
-      // A small promise says something about the minimum only where the damping is small, too.
+      // Little promised or won says something about the minimum only where the damping is small, too.
       const bool damped = damping > (std::max)(options.initial_damping, options.rejected_damping);
       const double enough = (std::max)(options.min_absolute_decrease, options.min_relative_decrease * cost);
       if (!(promised > (damped ? 0 : enough))) {
@@ -115,7 +117,7 @@ LeastSquaresResult minimize_least_squares(Problem& problem, const LevenbergMarqu
         problem.accept();
         ++result.accepted;
         cost = next;
-        if (decrease > options.min_relative_decrease * cost) continue;
+        if (damped || decrease > options.min_relative_decrease * cost) continue;
         result.status = SolverStatus::converged;
         break;
       }
