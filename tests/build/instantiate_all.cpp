@@ -38,6 +38,7 @@ static void instantiate_math() noexcept {
   use(&cfp::order_statistic<Scalar>);
   use(&cfp::se3_exp<Scalar>);
   use(&cfp::se3_log<Scalar>);
+  use(&cfp::camera_centre<Scalar>);
   use(&cfp::adjoint<Scalar>);
   use(&cfp::hat<Scalar>);
   use<cfp::Matrix3<Scalar> (*)(const cfp::Vector3<Scalar>&) noexcept>(&cfp::so3_exp<Scalar>);

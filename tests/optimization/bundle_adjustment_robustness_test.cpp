@@ -454,3 +454,46 @@ TEST_CASE("Options of the bundle adjustment outside their range are named, neste
   options.levenberg_marquardt.max_iterations = -1;
   CHECK(invalid_field(options).string() == "levenberg_marquardt.max_iterations");
 }
+
+TEST_CASE("Rotations that are off in their last digits do not move cameras that are far from the origin",
+          "[optimization][bundle_adjustment]") {
+  const auto far_off = [](double error) {
+    cfp_test::BaScene scene = cfp_test::make_ba_scene({}, 8);
+    cfp::Random random(8, "digits");
+    const cfp::Vector3<double> origin(1e4, -2e4, 5e3);
+    for (cfp::Vector3<double>& point : scene.points) point += origin;
+    for (cfp::SE3<double>& pose : scene.poses) {
+      const cfp::Vector3<double> centre = pose.inverse().translation + origin;
+      for (int i = 0; i < 9; ++i) pose.rotation(i / 3, i % 3) += error * random.normal();
+      pose.translation = -(pose.rotation * centre);
+    }
+    return adjust(scene);
+  };
+  const cfp::BundleResult exact = far_off(0);
+  REQUIRE(cfp::is_solved(exact.status));
+  for (const double error : {1e-7, 1e-5}) {
+    const cfp::BundleResult off = far_off(error);
+    CAPTURE(error, to_string(off.status));
+    CHECK(cfp::is_solved(off.status));
+    CHECK((off.used == exact.used && off.behind == exact.behind));
+    CHECK(off.initial_cost == Approx(exact.initial_cost).epsilon(1e-3));
+    CHECK(off.final_cost == Approx(exact.final_cost).epsilon(1e-3));
+  }
+}
+
+TEST_CASE("A point at the least depth, where a step may leave it, does not undo the solution",
+          "[optimization][bundle_adjustment]") {
+  cfp::Random random(9, "border");
+  for (int i = 0; i < 200; ++i) {
+    cfp_test::BaScene scene = cfp_test::make_ba_scene({}, 9);
+    const std::size_t k = random.index(10), o = random.index(1000);
+    scene.poses[k] = {cfp::so3_exp(cfp_test::random_vector(random, 1)), cfp_test::random_vector(random, 1)};
+    scene.pose[o] = static_cast<int>(k);
+    const double z = cfp::Tolerance<double>::min_depth * (1 + 1e-12 * random.normal());
+    scene.points[static_cast<std::size_t>(scene.point[o])] =
+        scene.poses[k].inverse() * cfp::Vector3<double>(0.1 * z, 0.1 * z, z);
+    const cfp::BundleResult result = adjust(scene);
+    CHECK(cfp::is_solved(result.status));
+    CHECK(result.behind >= 1);
+  }
+}

@@ -87,7 +87,11 @@ TEST_CASE("The final cost is that of the poses returned, also when the rotations
   cfp_test::BaScene scene = cfp_test::make_ba_scene(mixed_scene(), 3);
   for (auto& pose : scene.poses) pose.rotation *= 1.004;
   cfp_test::BaScene normalised = scene;
-  for (auto& pose : normalised.poses) pose.rotation = cfp::normalized_rotation(pose.rotation);
+  for (auto& pose : normalised.poses) {
+    const cfp::Vector3<double> centre = cfp::camera_centre(pose);
+    pose.rotation = cfp::normalized_rotation(pose.rotation);
+    pose.translation = -(pose.rotation * centre);
+  }
   const cfp::BundleOptions options;
   const double initial = cost_of(normalised, options);
   const cfp::BundleResult result = adjust(scene, options);

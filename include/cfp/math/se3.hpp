@@ -71,6 +71,13 @@ template <typename Scalar>
   return A;
 }
 
+/// The centre of a camera in the world. For T of a host, whose rotation may be off in its last digits: its transpose in
+/// the place of its inverse would move a camera that is far from the origin.
+template <typename Scalar>
+[[nodiscard]] Vector3<Scalar> camera_centre(const SE3<Scalar>& T_cam_world) noexcept {
+  return -(inverse(T_cam_world.rotation) * T_cam_world.translation);
+}
+
 /// Whether T is finite (translation within 1e9) and its rotation one to 1e-2: a float matrix from a host is off by 1e-7
 /// or, after many products, more; a scaled or mirrored one is a mistake.
 template <typename Scalar>

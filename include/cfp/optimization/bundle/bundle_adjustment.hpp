@@ -24,9 +24,10 @@ inline namespace CFP_ISA {
 /// Adjusts the free poses and all points of the problem, in place.
 ///
 /// - Stops as LevenbergMarquardtOptions says; status, costs and counts are in the result. The cost never rises.
-/// - Rotations are normalised before the first evaluation; one that is off by more than 1e-2 is no rotation, and its
-///   observations are invalid.
-/// - Observations whose point the camera does not see at the start (behind it, for example) are left out of the whole
+/// - Rotations are normalised before the first evaluation, and the cameras' centres stay; one that is off by more than
+///   1e-2 is no rotation, and its observations are invalid.
+/// - Observations whose point the camera does not see at the start (behind it, say, or within 2 um) are left out of the
+/// whole
 ///   solve; a step that brings a used observation behind its camera is refused and the damping raised. Call again to
 ///   readmit.
 /// - Gauge: nothing is added to the cost. With no pose (mono: or only one) fixed, the damping alone holds the free

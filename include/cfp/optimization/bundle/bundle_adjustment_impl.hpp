@@ -74,11 +74,7 @@ void prepare(const BundleProblem<Camera, Scalar>& problem, BundleWorkspace& work
     linear->poses.resize(BundleKind<6>::system * index.free_poses);
     linear->costs.resize(poses);
   }
-  for (std::size_t k = 0; k < poses; ++k) {
-    const SE3<double>& pose = problem.poses[to_index(index.caller_pose[k])];
-    const Matrix3<double> rotation = normalized_rotation(pose.rotation);
-    workspace.state.poses[k] = {rotation, -(rotation.transpose() * pose.translation)};
-  }
+  for (std::size_t k = 0; k < poses; ++k) workspace.state.poses[k] = index.caller_poses[to_index(index.caller_pose[k])];
   for (std::size_t j = 0; j < index.points; ++j)
     workspace.state.points[j] = problem.points[to_index(index.caller_point[j])];
   workspace.next_state = workspace.state;
@@ -171,13 +167,14 @@ void write_back(const BundleProblem<Camera, Scalar>& problem, const BundleWorksp
 }
 
 template <typename Camera, typename Scalar>
-void write_squared_errors(const BundleProblem<Camera, Scalar>& problem, const BundleIndex& index,
+void write_squared_errors(const BundleProblem<Camera, Scalar>& problem, BundleIndex& index,
                           span<double> squared_errors) noexcept {
   CFP_ASSERT(squared_errors.size() == problem.observations.pose.size());
+  read_poses(problem.poses, index);
   for (std::size_t i = 0; i < squared_errors.size(); ++i) {
     BundleMeasurement m;
     const bool valid = read_measurement(problem, i, m) && index.is_rigid[to_index(m.pose)] != 0;
-    const double error = valid ? squared_error(problem, m) : -1;
+    const double error = valid ? squared_error(problem, index, m) : -1;
     squared_errors[i] = is_finite(error) && is_finite(error * m.weight) ? error : -1;
   }
 }

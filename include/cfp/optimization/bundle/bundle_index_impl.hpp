@@ -9,7 +9,9 @@
 #include <array>
 #include <vector>
 
+#include "cfp/math/so3.hpp"
 #include "cfp/optimization/bundle/block_cholesky_impl.hpp"
+#include "cfp/optimization/bundle/bundle_chunk_impl.hpp"
 #include "cfp/optimization/bundle/bundle_problem.hpp"
 
 namespace cfp::detail {
@@ -43,6 +45,7 @@ struct BundleIndex {
 
   // Scratch while building.
   std::vector<BundleMeasurement> kept;
+  std::vector<BundlePose> caller_poses;
   std::vector<int> pose_number, point_number, order;
   std::vector<char> is_rigid, is_met;
 };
@@ -73,13 +76,29 @@ template <typename Camera>
   return cameras.size() == 1 ? cameras[0] : cameras[to_index(pose)];
 }
 
-/// |r|^2 / sigma^2 of one observation; -1 when the camera does not see the point.
+/// The caller's poses as the solver has them, identity where one is no rigid motion.
+inline void read_poses(span<const SE3<double>> poses, BundleIndex& index) {
+  index.caller_poses.assign(poses.size(), {Matrix3<double>::Identity(), Vector3<double>::Zero()});
+  index.is_rigid.assign(poses.size(), char(0));
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    if (!is_rigid_motion(poses[k])) continue;
+    index.is_rigid[k] = char(1);
+    index.caller_poses[k] = {normalized_rotation(poses[k].rotation), camera_centre(poses[k])};
+  }
+}
+
+/// |r|^2 / sigma^2 of one observation; -1 when the camera does not see the point. A step may have left a point at
+/// min_depth: one within twice that is not seen, lest its last digits decide whether there is a cost.
 template <typename Camera, typename Scalar>
-[[nodiscard]] double squared_error(const BundleProblem<Camera, Scalar>& problem, const BundleMeasurement& m) noexcept {
+[[nodiscard]] double squared_error(const BundleProblem<Camera, Scalar>& problem, const BundleIndex& index,
+                                   const BundleMeasurement& m) noexcept {
   using Real = typename Camera::ScalarType;
-  const Vector3<double> p = problem.poses[to_index(m.pose)] * problem.points[to_index(m.point)];
+  const BundlePose& pose = index.caller_poses[to_index(m.pose)];
+  const Vector3<double> p = pose.rotation * (problem.points[to_index(m.point)] - pose.center);
   Vector2<Real> pixel;
-  if (!camera_of(problem.cameras, m.pose).project(p.template cast<Real>(), pixel)) return -1;
+  if (!(p.z() > 2 * Tolerance<double>::min_depth) ||
+      !camera_of(problem.cameras, m.pose).project(p.template cast<Real>(), pixel))
+    return -1;
   const double du = static_cast<double>(pixel.x()) - m.u, dv = static_cast<double>(pixel.y()) - m.v;
   const double dr = m.stereo ? du + m.disparity - problem.baseline_fx / p.z() : 0.0;
   return (du * du + dv * dv + dr * dr) * m.information;
@@ -96,8 +115,7 @@ void select_observations(const BundleProblem<Camera, Scalar>& problem, BundleInd
   index.kept.clear();
   index.pose_number.assign(problem.poses.size(), -1);
   index.point_number.assign(problem.points.size(), -1);
-  index.is_rigid.resize(problem.poses.size());
-  for (std::size_t k = 0; k < problem.poses.size(); ++k) index.is_rigid[k] = is_rigid_motion(problem.poses[k]) ? 1 : 0;
+  read_poses(problem.poses, index);
   for (std::size_t i = 0; i < n; ++i) {
     BundleMeasurement m;
     if (!read_measurement(problem, i, m)) {
@@ -106,7 +124,7 @@ void select_observations(const BundleProblem<Camera, Scalar>& problem, BundleInd
       ++result.zero_weight;
     } else if (index.is_rigid[to_index(m.pose)] == 0 || !is_finite(problem.points[to_index(m.point)].sum())) {
       ++result.invalid;
-    } else if (const double error = squared_error(problem, m); error < 0) {
+    } else if (const double error = squared_error(problem, index, m); error < 0) {
       ++result.behind;
     } else if (!is_finite(error * m.weight)) {
       ++result.invalid;

@@ -45,8 +45,8 @@ struct BundleOptions {
 };
 
 /// Costs are sums of w rho(|r|^2 / sigma^2) over the used observations; the final one is that of the poses and points
-/// returned, rotations of fixed poses normalised. Every observation is counted once: used + zero_weight + invalid +
-/// behind = all.
+/// returned, the rotations of fixed ones normalised about their centres. Every observation is counted once: used +
+/// zero_weight + invalid + behind = all.
 struct BundleResult : LeastSquaresResult {
   std::size_t used = 0;         ///< observations in the cost
   std::size_t zero_weight = 0;  ///< left out: w = 0
