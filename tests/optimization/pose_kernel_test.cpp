@@ -15,24 +15,27 @@ using cfp::Vector6;
 using cfp::detail::PoseColumns;
 using cfp::detail::PoseSystem;
 
-/// The residual of one observation in pixels, written down once more: u, v and, with a depth, u_right.
-Eigen::Vector3d residual(const cfp::SE3<double>& T, const Eigen::Vector3d& X, const cfp::PinholeCamera<double>& camera,
-                         double baseline_fx, bool stereo) {
+enum class Third { none, depth, u_right };
+
+/// What is measured of one observation in pixels, written down once more: u, v and the third row.
+Eigen::Vector3d expected_pixels(const cfp::SE3<double>& T, const Eigen::Vector3d& X,
+                                const cfp::PinholeCamera<double>& camera, double baseline_fx, Third third) {
   const Eigen::Vector3d p = T.rotation * X + T.translation;
-  const double u = camera.fx * p.x() / p.z() + camera.cx;
-  return {u, camera.fy * p.y() / p.z() + camera.cy, stereo ? u - baseline_fx / p.z() : 0.0};
+  const double u = camera.fx * p.x() / p.z() + camera.cx, disparity = baseline_fx / p.z();
+  return {u, camera.fy * p.y() / p.z() + camera.cy,
+          third == Third::none ? 0.0 : (third == Third::u_right ? u : 0.0) - disparity};
 }
 
 /// Normal equations of one observation (residual r, information W) from central differences through the library's
 /// update.
 PoseSystem numeric_system(const cfp::SE3<double>& T, const Eigen::Vector3d& X, const Eigen::Vector3d& r, double W,
-                          const cfp::PinholeCamera<double>& camera, double baseline_fx, bool stereo) {
+                          const cfp::PinholeCamera<double>& camera, double baseline_fx, Third third) {
   Eigen::Matrix<double, 3, 6> J;
   for (int k = 0; k < 6; ++k) {
     const double h = 1e-6;
     const Vector6<double> step = Vector6<double>::Unit(k) * h;
-    J.col(k) = (residual(cfp::se3_exp<double>(step) * T, X, camera, baseline_fx, stereo) -
-                residual(cfp::se3_exp<double>(Vector6<double>(-step)) * T, X, camera, baseline_fx, stereo)) /
+    J.col(k) = (expected_pixels(cfp::se3_exp<double>(step) * T, X, camera, baseline_fx, third) -
+                expected_pixels(cfp::se3_exp<double>(Vector6<double>(-step)) * T, X, camera, baseline_fx, third)) /
                (2 * h);
   }
   PoseSystem system;
@@ -57,16 +60,18 @@ TEMPLATE_TEST_CASE("Pose kernel: H and g equal those of numeric Jacobians, pixel
     const Eigen::Vector3d p(random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(0.6, 4));
     const Eigen::Vector3d X = T.rotation.transpose() * (p - T.translation);
     const double information = random.uniform(0.2, 2), weight = random.uniform(0.1, 1);
-    const bool stereo = i % 2 == 1;
+    const Third third = std::array{Third::none, Third::depth, Third::u_right}[static_cast<std::size_t>(i % 3)];
+    const bool stereo = third != Third::none;
     const Eigen::Vector3d r(random.uniform(-4, 4), random.uniform(-4, 4), stereo ? random.uniform(-4, 4) : 0.0);
-    const Eigen::Vector3d measured = residual(T, X, camera, baseline_fx, stereo) - r;
+    const Eigen::Vector3d measured = expected_pixels(T, X, camera, baseline_fx, third) - r;
 
     const std::size_t lanes = P::lanes;
     std::vector<Scalar> storage[10];
     PoseColumns<Scalar> columns;
     columns.baseline_fx = baseline_fx;
-    Scalar** pointers[10] = {&columns.x,       &columns.y,           &columns.z,      &columns.u,     &columns.v,
-                             &columns.u_right, &columns.information, &columns.active, &columns.error, &columns.weight};
+    columns.third_has_u = third == Third::depth ? 0 : 1;
+    Scalar** pointers[10] = {&columns.x,     &columns.y,           &columns.z,      &columns.u,     &columns.v,
+                             &columns.third, &columns.information, &columns.active, &columns.error, &columns.weight};
     const auto fill = [&](bool normalised) {
       const double fu = normalised ? 1 / camera.fx : 1, fv = normalised ? 1 / camera.fy : 1,
                    cu = normalised ? camera.cx : 0, cv = normalised ? camera.cy : 0;
@@ -75,7 +80,7 @@ TEMPLATE_TEST_CASE("Pose kernel: H and g equal those of numeric Jacobians, pixel
                                  X.z(),
                                  (measured[0] - cu) * fu,
                                  (measured[1] - cv) * fv,
-                                 (measured[2] - cu) * fu,
+                                 (measured[2] - columns.third_has_u * cu) * fu,
                                  information / (fu * fu),
                                  weight,
                                  0,
@@ -86,7 +91,7 @@ TEMPLATE_TEST_CASE("Pose kernel: H and g equal those of numeric Jacobians, pixel
         *pointers[c] = storage[c].data();
       }
     };
-    const PoseSystem expected = numeric_system(T, X, r, weight * information, camera, baseline_fx, stereo);
+    const PoseSystem expected = numeric_system(T, X, r, weight * information, camera, baseline_fx, third);
     const auto check = [&](const PoseSystem& system) {
       const Matrix6<double> H = system.equations.H.selfadjointView<Eigen::Upper>();
       CAPTURE(i, stereo, H, expected.equations.H, system.equations.g.transpose(), expected.equations.g.transpose());

@@ -242,23 +242,19 @@ TEST_CASE("Pose refinement: float is as accurate as double, wherever the origin 
   CHECK(ratio[50] == Approx(1.0).epsilon(0.01));
 }
 
-TEST_CASE("Pose refinement: depth, u_right, sigma and its inverse square are two names for one thing",
-          "[optimization]") {
+TEST_CASE("Pose refinement: sigma and its inverse square are two names for one thing", "[optimization]") {
   const auto scene = make_pose_scene<double>(9, mixed());
-  std::vector<double> u_right, inverse_sq;
-  for (std::size_t i = 0; i < scene.points.size(); ++i) {
-    u_right.push_back(scene.depths[i] > 0 ? scene.pixels[i][0] - scene.baseline_fx / scene.depths[i] : std::nan(""));
-    inverse_sq.push_back(1 / (scene.sigmas[i] * scene.sigmas[i]));
-  }
+  std::vector<double> inverse_sq;
+  for (const double sigma : scene.sigmas) inverse_sq.push_back(1 / (sigma * sigma));
   auto view = scene.observations();
-  view.depths = {}, view.sigmas = {};
-  view.u_right = u_right, view.inverse_sigmas_sq = inverse_sq;
+  view.sigmas = {};
+  view.inverse_sigmas_sq = inverse_sq;
   cfp::PoseWorkspace<double> workspace;
   const auto a = refine(scene), b = cfp::refine_pose(view, scene.camera, scene.start, tight(), workspace);
   CHECK(a.used_stereo > 50);
-  CHECK(a.used_stereo < std::count_if(
-                            scene.depths.begin(), scene.depths.end(), [](double d) { return d > 0; }));
-  CHECK(b.used_stereo == a.used_stereo);  // both leave out columns left of the image's border
+  CHECK(a.used_stereo ==
+        std::count_if(scene.depths.begin(), scene.depths.end(), [](double depth) { return depth > 0; }));
+  CHECK(b.used_stereo == a.used_stereo);
   CHECK(centre_distance(a.T_cam_world, b.T_cam_world) < 1e-9);
 }
 
@@ -320,19 +316,37 @@ TEST_CASE("Pose refinement: two arrays for one quantity are refused, not silentl
 
 TEST_CASE("Pose refinement: the inverse of the information is the pose's covariance, outliers or not",
           "[optimization]") {
-  for (const double outlier_share : {0.0, 0.3}) {
+  enum class Third { none, depth, right_image, right_of_depth };
+  const auto nees = [](double outlier_share, Third third) {
     double sum = 0;
-    const int scenes = 600;
-    for (int seed = 0; seed < scenes; ++seed) {
+    constexpr int scenes = 600;
+    cfp::PoseWorkspace<double> workspace;
+    for (std::uint64_t seed = 0; seed < scenes; ++seed) {
       PoseSceneOptions options;
       options.outlier_share = outlier_share;
-      const auto scene = make_pose_scene<double>(static_cast<std::uint64_t>(seed), options);
-      const auto result = refine(scene, {}, cfp::PoseOptions());
+      options.stereo_share = third == Third::none ? 0 : 1;
+      const auto scene = make_pose_scene<double>(seed, options);
+      cfp::Random random(seed, "right image");
+      std::vector<double> u_right;
+      for (std::size_t i = 0; i < scene.points.size(); ++i) {
+        const cfp::Vector3<double> X(scene.points[i][0], scene.points[i][1], scene.points[i][2]), p = scene.truth * X;
+        const double of_point = scene.camera.fx * p.x() / p.z() + scene.camera.cx - scene.baseline_fx / p.z();
+        u_right.push_back(third == Third::right_image ? of_point + random.normal()
+                                                      : scene.pixels[i][0] - scene.baseline_fx / scene.depths[i]);
+      }
+      auto view = scene.observations();
+      if (third == Third::right_image || third == Third::right_of_depth) view.depths = {}, view.u_right = u_right;
+      const auto result = cfp::refine_pose(view, scene.camera, scene.start, {}, workspace);
       const cfp::Vector6<double> error = cfp::se3_log<double>(scene.truth * result.T_cam_world.inverse());
       sum += error.dot(result.information * error);
     }
+    return sum / scenes;
+  };
+  for (const double outlier_share : {0.0, 0.3}) {
     CAPTURE(outlier_share);
-    CHECK(sum / scenes == Approx(6).margin(0.6));  // chi^2 with 6 degrees of freedom: the mean of 600 is 6 +- 0.14
+    for (const Third third : {Third::none, Third::depth, Third::right_image})
+      CHECK(nees(outlier_share, third) == Approx(6).margin(0.6));  // chi^2 of 6: the mean of 600 is 6 +- 0.14
+    CHECK(nees(outlier_share, Third::right_of_depth) > 7.5);       // made of u, whose noise then counts twice
   }
 }
 

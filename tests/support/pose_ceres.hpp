@@ -47,7 +47,7 @@ class PixelError final : public ceres::SizedCostFunction<Rows, 12> {
     const double iz = 1 / depth, iz2 = iz * iz;
     r[0] = (fx * x * iz + cx - z[0]) * inverse_sigma;
     r[1] = (fy * y * iz + cy - z[1]) * inverse_sigma;
-    if (Rows == 3) r[2] = (fx * x * iz + cx - bf * iz - z[2]) * inverse_sigma;
+    if (Rows == 3) r[2] = (z[2] - bf * iz) * inverse_sigma;  // of the disparity
     if (jacobians == nullptr || jacobians[0] == nullptr) return true;
     double* J = jacobians[0];  // the form of ORB-SLAM2's EdgeSE3ProjectXYZOnlyPose, columns reordered to (translation,
                                // rotation)
@@ -60,7 +60,7 @@ class PixelError final : public ceres::SizedCostFunction<Rows, 12> {
     for (int i = 0; i < 12; ++i) J[12 + i] = i < 6 ? row1[i] : 0;
     if (Rows == 3) {
       const double extra[6] = {0, 0, s * bf * iz2, s * bf * y * iz2, -s * bf * x * iz2, 0};
-      for (int i = 0; i < 12; ++i) J[24 + i] = i < 6 ? row0[i] + extra[i] : 0;
+      for (int i = 0; i < 12; ++i) J[24 + i] = i < 6 ? extra[i] : 0;
     }
     return true;
   }
@@ -113,12 +113,11 @@ CeresPose ceres_refine(const PoseScene<Scalar>& scene, const std::vector<Scalar>
     cost.fx = scene.camera.fx, cost.fy = scene.camera.fy, cost.cx = scene.camera.cx, cost.cy = scene.camera.cy,
     cost.bf = scene.baseline_fx;
     cost.z[0] = static_cast<double>(scene.pixels[i][0]), cost.z[1] = static_cast<double>(scene.pixels[i][1]);
-    cost.z[2] = cost.z[0] - scene.baseline_fx / static_cast<double>(scene.depths[i]);
+    cost.z[2] = scene.baseline_fx / static_cast<double>(scene.depths[i]);
     cost.inverse_sigma = 1 / static_cast<double>(scene.sigmas[i]);
   };
   for (std::size_t i = 0; i < n; ++i) {
-    // A column left of the right image's border is no measurement.
-    if (scene.depths[i] > 0 && scene.pixels[i][0] - scene.baseline_fx / scene.depths[i] > 0) {
+    if (scene.depths[i] > 0) {
       fill(*(stereo[i] = std::make_unique<PixelError<3>>()), i);
     } else {
       fill(*(mono[i] = std::make_unique<PixelError<2>>()), i);

@@ -5,11 +5,11 @@
 /// With p = T X = (x z, y z, z), q = 1/z and xi = (rho, w), T <- exp(xi) T, a pinhole camera has the rows (divided by
 /// fx or fy)
 ///   d x   = [ q  0  -x q  -x y       1 + x^2   -y ]       d y = [ 0  q  -y q  -(1 + y^2)  x y  x ]
-///   d u_r = [ q  0  -k q  -k y       1 + k x   -y ]       with k = u_r = x - b q, b the stereo baseline in m,
-/// so the rows of u and u_right differ in one factor only and their products sum up in n, m1 = sum k, m2 = sum k^2 (k =
-/// x for u): a depth costs few operations more than a pixel. The row of v has kappa = fy^2 / fx^2 times their weight,
-/// so that its products join theirs before the multiplication with the weight. H(0,1) = 0, H(1,1) = kappa H(0,0) / n,
-/// H(2,5) = -H(0,3) - H(1,4).
+///   d k   = [ c q  0  -k q  -k y   c + k x   -c y ]       with k = c x - b q, b the stereo baseline in m,
+/// c = 1 for u_right, c = 0 for a depth, so the rows of u and of k differ in two factors only and their products sum up
+/// in n = sum c, m1 = sum c k, m2 = sum k^2 (c = 1 and k = x for u): a depth costs few operations more than a pixel.
+/// The row of v has kappa = fy^2 / fx^2 times their weight, so that its products join theirs before the multiplication
+/// with the weight. H(0,1) = 0, H(1,1) = kappa H(0,0) / n, H(2,5) = -H(0,3) - H(1,4).
 #pragma once
 
 #include <algorithm>
@@ -56,7 +56,8 @@ void add_observations(const PoseColumns<Scalar>& columns, std::size_t begin, std
   const P kappa = constant(aspect_sq), base = constant(columns.baseline_fx / static_cast<double>(camera.fx));
   const P near = constant(static_cast<double>(Tolerance<Scalar>::min_depth)), wide = constant(100), one = constant(1),
           zero = constant(0), tiny = (std::numeric_limits<Scalar>::min)();
-  const P n = constant(stereo ? 2 : 1);
+  const double third_rows = stereo ? columns.third_has_u : 0;
+  const P third_has_u = constant(third_rows), n = constant(1 + third_rows);
   const Loss loss = given_loss;  // a copy, which the stores below cannot change
 
   while (begin < end) {
@@ -73,13 +74,13 @@ void add_observations(const PoseColumns<Scalar>& columns, std::size_t begin, std
       const P x = px * q, y = py * q;
       const P ru = x - P::load(columns.u + begin), rv = y - P::load(columns.v + begin);
 
-      // The rows of u and u_right: the sums of k and k^2, of r and k r.
+      // The rows of u and of k: the sums of c k and k^2, of c r and k r.
       P m1 = x, m2 = x * x, sr = ru, skr = x * ru, uu = ru * ru;
       if constexpr (stereo) {
-        const P k = x - base * q;
-        const P r = k - P::load(columns.u_right + begin);
-        m1 = m1 + k, m2 = multiply_add(k, k, m2), sr = sr + r, skr = multiply_add(k, r, skr),
-        uu = multiply_add(r, r, uu);
+        const P k = third_has_u * x - base * q;
+        const P r = k - P::load(columns.third + begin);
+        m1 = multiply_add(third_has_u, k, m1), m2 = multiply_add(k, k, m2), sr = multiply_add(third_has_u, r, sr),
+        skr = multiply_add(k, r, skr), uu = multiply_add(r, r, uu);
       }
       const P kv = kappa * rv;
       const P information = P::load(columns.information + begin), active = P::load(columns.active + begin);
@@ -126,7 +127,7 @@ void add_observations(const PoseColumns<Scalar>& columns, std::size_t begin, std
     system.influence += total[influence];
     Vector6<double>& g = system.equations.g;
     g[0] += total[g0], g[1] += total[g1], g[2] -= total[g2], g[3] -= total[g3], g[4] += total[g4], g[5] -= total[g5];
-    constexpr double rows = stereo ? 2 : 1;
+    const double rows = 1 + third_rows;
     Matrix6<double>& H = system.equations.H;
     H(0, 0) += rows * total[h00], H(0, 2) -= total[h02], H(0, 3) -= total[h03], H(0, 4) += total[h04],
         H(0, 5) -= rows * total[h05];
@@ -164,8 +165,9 @@ void add_observations(const PoseColumns<Scalar>& columns, std::size_t begin, std
     r[1] = static_cast<double>(pixel.y()) - static_cast<double>(columns.v[i]);
     D.template topRows<2>() = pixel_by_point.template cast<double>();
     if constexpr (stereo) {
-      r[2] = static_cast<double>(pixel.x()) - columns.baseline_fx / p.z() - static_cast<double>(columns.u_right[i]);
-      D.row(2) = D.row(0);
+      r[2] = columns.third_has_u * static_cast<double>(pixel.x()) - columns.baseline_fx / p.z() -
+             static_cast<double>(columns.third[i]);
+      D.row(2) = columns.third_has_u * D.row(0);
       D(2, 2) += columns.baseline_fx / (p.z() * p.z());
     }
     const double s = information * r.squaredNorm();

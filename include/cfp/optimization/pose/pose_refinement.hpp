@@ -2,7 +2,7 @@
 /// Weighted pose refinement (motion-only bundle adjustment; paper section IV-A.2, the probabilities as weights).
 ///
 ///   minimise over T = T_cam_world   sum over i of  w_i rho(s_i),   s_i = |r_i|^2 / sigma_i^2
-///   r_i = projection of T X_i - pixel_i        (2 rows; with a depth a third one: u - fx b / z - u_right)
+///   r_i = projection of T X_i - pixel_i        (2 rows; a third one of a depth or of u_right: PoseObservations)
 ///
 /// The weight stands outside the loss and the outlier test sees s alone (5.991 for 2 rows, 7.815 for 3): a point that
 /// is probably moving never becomes harder to reject. (g2o as ORB-SLAM2 uses it puts the factor inside, rho(w s) tested
@@ -48,7 +48,7 @@ template <typename Scalar, typename Input, typename Camera>
     return result;
   }
   const SE3<double> start{normalized_rotation(T_cam_world.rotation), Vector3<double>::Zero()};
-  const Vector3<double> centre = -(start.rotation.transpose() * T_cam_world.translation);
+  const Vector3<double> centre = camera_centre(T_cam_world);
   detail::PoseModel<Scalar, Camera> model{camera, options, {}, {}, {}};
   detail::load_columns(o, camera, centre, workspace, model.columns, result);
   if (result.used < options.min_observations) {
