@@ -122,8 +122,8 @@
   CFP_LAYOUT(cfp::P3PProblem<double>, rays)                              \
   CFP_LAYOUT(cfp::P3PSolutions<float>, status)                           \
   CFP_LAYOUT(cfp::P3PSolutions<double>, status)                          \
-  CFP_LAYOUT(cfp::BundleObservations<float>, weights)                        \
-  CFP_LAYOUT(cfp::BundleObservations<double>, weights)                       \
+  CFP_LAYOUT(cfp::BundleObservations<float>, depths)                        \
+  CFP_LAYOUT(cfp::BundleObservations<double>, depths)                       \
   CFP_LAYOUT(cfp::BundleProblem<>, baseline_fx)                              \
   CFP_LAYOUT(cfp::BundleOptions, chi2_stereo)                        \
   CFP_LAYOUT(cfp::BundleResult, factor_blocks)                       \

@@ -23,13 +23,20 @@ struct AnyCamera {
   }
 };
 
+bool has_third(const cfp_test::BaScene& scene, std::size_t i) {
+  return (scene.gives_depths ? scene.depths : scene.u_right)[i] > 0;
+}
+
 cfp::Vector3<double> residual(const cfp_test::BaScene& scene, std::size_t i, const BundlePose& pose,
                               const cfp::Vector3<double>& x) {
   const cfp::Vector3<double> p = pose.rotation * (x - pose.center);
   cfp::Vector2<double> pixel = cfp::Vector2<double>::Zero();
   REQUIRE(scene.camera.project(p, pixel));
-  const double right = scene.u_right[i] > 0 ? pixel.x() - scene.baseline_fx / p.z() - scene.u_right[i] : 0.0;
-  return {pixel.x() - scene.pixels[i].x(), pixel.y() - scene.pixels[i].y(), right};
+  const double disparity = scene.baseline_fx / p.z();
+  const double third = !has_third(scene, i) ? 0.0
+                       : scene.gives_depths ? scene.baseline_fx / scene.depths[i] - disparity
+                                            : pixel.x() - disparity - scene.u_right[i];
+  return {pixel.x() - scene.pixels[i].x(), pixel.y() - scene.pixels[i].y(), third};
 }
 
 /// The pose after the library's own update.
@@ -75,7 +82,7 @@ DenseSystem dense_system(const cfp_test::BaScene& scene, const cfp::BundleWorksp
           (residual(scene, i, pose, up) - residual(scene, i, pose, down)) / (2 * h);
     }
     const double inv_sigma_sq = 1 / (scene.sigma[i] * scene.sigma[i]);
-    const Loss& loss = scene.u_right[i] > 0 ? stereo : mono;
+    const Loss& loss = has_third(scene, i) ? stereo : mono;
     const double omega = scene.weights[i] * inv_sigma_sq * loss.first(r.squaredNorm() * inv_sigma_sq);
     system.H += omega * J.transpose() * J;
     system.g += omega * J.transpose() * r;
@@ -87,7 +94,8 @@ DenseSystem dense_system(const cfp_test::BaScene& scene, const cfp::BundleWorksp
 }
 
 template <template <typename> class Loss, typename Camera>
-void check_step(double delta, double stereo_share, const Camera& camera, bool few_points = false) {
+void check_step(double delta, double stereo_share, const Camera& camera, bool few_points = false,
+                bool gives_depths = false) {
   cfp_test::BaSceneOptions options;
   options.poses = few_points ? 30 : 5;
   options.points = few_points ? 4 : 25;
@@ -96,6 +104,7 @@ void check_step(double delta, double stereo_share, const Camera& camera, bool fe
   options.random_weights = options.octaves = true;
   options.outlier_share = 0.2;
   cfp_test::BaScene scene = cfp_test::make_ba_scene(options, 7);
+  scene.gives_depths = gives_depths;
   const cfp::BundleProblem<> pinhole = scene.problem();
   const cfp::BundleProblem<Camera> problem{
       pinhole.poses,        pinhole.points,      cfp::span<const Camera>(&camera, 1),
@@ -158,6 +167,14 @@ TEST_CASE("With few points the poses are eliminated: the same step", "[optimizat
   for (const double stereo_share : {0.0, 0.5, 1.0}) {
     CAPTURE(stereo_share);
     check_step<cfp::Huber>(2.5, stereo_share, camera, true);
+  }
+}
+
+TEST_CASE("A depth is a disparity: the same step", "[optimization][bundle_adjustment]") {
+  const cfp::PinholeCamera<double> camera = cfp_test::BaScene{}.camera;
+  for (const bool few_points : {false, true}) {
+    check_step<cfp::Huber>(2.5, 0.5, camera, few_points, true);
+    check_step<cfp::Trivial>(2.5, 1.0, AnyCamera{camera}, few_points, true);
   }
 }
 

@@ -249,3 +249,36 @@ TEST_CASE("Squared errors at the solution judge every observation, those of weig
     CHECK_THAT(errors[i], WithinAbs(square / (scene.sigma[i] * scene.sigma[i]), 1e-6 * (1 + square)));
   }
 }
+
+TEST_CASE("A depth whose noise is its own serves better as a depth than as a column made of it and of u",
+          "[optimization][bundle_adjustment]") {
+  cfp_test::BaSceneOptions options;
+  options.points = 300;
+  options.stereo_share = 1;
+  double sum_sq[2] = {};
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    for (const bool gives_depths : {false, true}) {
+      cfp_test::BaScene scene = cfp_test::make_ba_scene(options, seed);
+      scene.gives_depths = gives_depths;
+      for (std::size_t i = 0; i < scene.depths.size(); ++i)
+        scene.u_right[i] = scene.pixels[i].x() - scene.baseline_fx / scene.depths[i];
+      REQUIRE(cfp::is_solved(adjust(scene).status));
+      sum_sq[gives_depths ? 1 : 0] += scene.position_error() * scene.position_error();
+    }
+  }
+  CAPTURE(sum_sq[0], sum_sq[1]);
+  CHECK(sum_sq[1] < 0.9 * sum_sq[0]);
+}
+
+TEST_CASE("u_right and depths at once are refused", "[optimization][bundle_adjustment]") {
+  cfp_test::BaScene scene = cfp_test::make_ba_scene({}, 1);
+  const cfp_test::BaScene before = scene;
+  cfp::BundleProblem<> problem = scene.problem();
+  problem.observations.depths = scene.depths;
+  std::vector<double> squared_errors(scene.pose.size(), 1);
+  cfp::BundleWorkspace workspace;
+  CHECK(cfp::adjust_bundle(problem, {}, workspace, squared_errors).status == cfp::SolverStatus::invalid_input);
+  CHECK(largest_difference(scene, before) == 0);
+  CHECK(std::count(squared_errors.begin(), squared_errors.end(), -1) ==
+        static_cast<std::ptrdiff_t>(squared_errors.size()));
+}

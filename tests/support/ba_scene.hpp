@@ -20,7 +20,7 @@ struct BaSceneOptions {
   int fixed = 2;                ///< the first poses, held at the truth
   double outlier_share = 0.05;  ///< observations moved by up to 40 px
   double noise_px = 1;
-  double stereo_share = 0;         ///< observations with u_right
+  double stereo_share = 0;         ///< observations with u_right, or a depth of the same disparity
   double start_position_m = 0.01;  ///< standard deviation of the start of free poses
   double start_angle_deg = 0.5;
   double start_point_m = 0.02;
@@ -36,7 +36,8 @@ struct BaScene {
   std::vector<char> fixed;
   std::vector<int> pose, point;
   std::vector<cfp::Vector2<double>> pixels;
-  std::vector<double> u_right, sigma, weights;
+  std::vector<double> u_right, depths, sigma, weights;
+  bool gives_depths = false;  ///< in the place of u_right
 
   [[nodiscard]] cfp::BundleProblem<> problem() {
     cfp::BundleProblem<> p;
@@ -44,6 +45,7 @@ struct BaScene {
     p.points = points;
     p.cameras = cfp::span<const cfp::PinholeCamera<double>>(&camera, 1);
     p.observations = {pose, point, pixels, u_right, sigma, weights};
+    if (gives_depths) p.observations.u_right = {}, p.observations.depths = depths;
     p.fixed_poses = fixed;
     p.baseline_fx = baseline_fx;
     return p;
@@ -103,12 +105,15 @@ inline BaScene make_ba_scene(const BaSceneOptions& options, std::uint64_t seed) 
         const double du = outlier ? random.uniform(-40, 40) : 0, dv = outlier ? random.uniform(-40, 40) : 0;
         const double right = pixel.x() - scene.baseline_fx / p.z() + sigma * options.noise_px * random.normal() +
                              (outlier ? random.uniform(-40, 40) : 0);
+        const double measured = scene.baseline_fx / (pixel.x() - right);
         pixel.x() += sigma * options.noise_px * random.normal() + du;
         pixel.y() += sigma * options.noise_px * random.normal() + dv;
         scene.pose.push_back(k);
         scene.point.push_back(j);
         scene.pixels.push_back(pixel);
-        scene.u_right.push_back(random.uniform() < options.stereo_share ? right : -1.0);
+        const bool stereo = random.uniform() < options.stereo_share;
+        scene.u_right.push_back(stereo ? right : -1.0);
+        scene.depths.push_back(stereo ? measured : -1.0);
         scene.sigma.push_back(sigma);
         scene.weights.push_back(options.random_weights ? random.uniform() : 1.0);
         ++views;

@@ -33,7 +33,7 @@ class LocalBundle {
     problem.poses = poses_;
     problem.points = positions_;
     problem.cameras = {&view_.exact, 1};
-    problem.observations = {pose_index_, point_index_, pixels_, u_right_, sigma_, weight_};
+    problem.observations = {pose_index_, point_index_, pixels_, {}, sigma_, weight_, depths_};
     problem.fixed_poses = fixed_;
     problem.baseline_fx = view_.baseline_fx;
     squared_errors_.resize(pose_index_.size());
@@ -54,7 +54,7 @@ class LocalBundle {
       if (MapPoint* const point = map.find(points_[p])) point->position = positions_[p];
     }
     for (std::size_t o = 0; o < squared_errors_.size(); ++o) {
-      const double limit = u_right_[o] > 0 ? options_.chi2_stereo : options_.chi2_mono;
+      const double limit = depths_[o] > 0 ? options_.chi2_stereo : options_.chi2_mono;
       const int point = points_[static_cast<std::size_t>(point_index_[o])];
       if (map.is_alive(point) && !(squared_errors_[o] >= 0 && squared_errors_[o] <= limit))
         map.erase_observation(point, keyframes_[static_cast<std::size_t>(pose_index_[o])]);
@@ -90,8 +90,7 @@ class LocalBundle {
     pose_index_.push_back(pose);
     point_index_.push_back(point);
     pixels_.push_back(frame.pixels[i]);
-    const float z = frame.depths_m[i];
-    u_right_.push_back(z > 0 ? frame.pixels[i][0] - static_cast<float>(view_.baseline_fx) / z : -1.0F);
+    depths_.push_back(frame.depths_m[i]);
     sigma_.push_back(view_.sigma(frame.keypoints[i]));
     weight_.push_back(frame.static_probability[i] * map.point(frame.map_point[i]).static_probability);
   }
@@ -105,7 +104,7 @@ class LocalBundle {
   std::vector<cfp::Vector3<double>> positions_;
   std::vector<int> pose_index_, point_index_;
   std::vector<std::array<float, 2>> pixels_;
-  std::vector<float> u_right_, sigma_, weight_;
+  std::vector<float> depths_, sigma_, weight_;
   std::vector<double> squared_errors_;
 };
 

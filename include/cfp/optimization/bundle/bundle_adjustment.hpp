@@ -1,8 +1,8 @@
 /// @file bundle_adjustment.hpp
 /// Weighted bundle adjustment: camera poses and points that minimise
 ///   cost = sum over observations of w rho(|r|^2 / sigma^2),
-/// r = projection - (u, v), or - (u, v, u_right) for a stereo or RGB-D observation. The weight stands outside the loss,
-/// for the reason given in pose_refinement.hpp.
+/// r = projection - (u, v), or - (u, v, u_right) for a stereo observation, or (u, v, disparity) for a depth. The weight
+/// stands outside the loss, for the reason given in pose_refinement.hpp.
 ///
 /// Levenberg-Marquardt on the normal equations, points eliminated (Schur complement), the reduced camera system
 /// factorised by block Cholesky within its envelope. Time and memory per iteration are linear in the observations, in
@@ -12,6 +12,7 @@
 /// Argyros: SBA, 2009.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <type_traits>
 
@@ -40,12 +41,18 @@ inline namespace CFP_ISA {
 /// - squared_errors, when not empty: one per observation, |r|^2 / sigma^2 at the solution, for the caller's outlier
 ///   test (against 5.991 mono, 7.815 RGB-D; the weight has no part in it); -1 when the camera does not see the point or
 ///   the observation is invalid. Observations of weight 0 are judged, too.
+/// - u_right and depths at once: invalid_input.
 /// Preconditions (asserted): arrays of one length where they are parallel; cameras: one, or one per pose.
 template <typename Camera, typename Scalar, typename Executor = SingleThread>
 [[nodiscard]] BundleResult adjust_bundle(const BundleProblem<Camera, Scalar>& problem, const BundleOptions& options,
                                          BundleWorkspace& workspace, span<double> squared_errors = {},
                                          Executor&& executor = Executor()) {
   BundleResult result;
+  if (!problem.observations.u_right.empty() && !problem.observations.depths.empty()) {
+    std::fill(squared_errors.begin(), squared_errors.end(), -1.0);
+    result.status = SolverStatus::invalid_input;
+    return result;
+  }
   detail::build_index(problem, workspace.index, result);
   detail::prepare(problem, workspace, result);
   if (result.used > 0) {

@@ -63,9 +63,11 @@ template <typename Camera, typename Scalar>
   m.weight = observations.weights.empty() ? 1.0 : static_cast<double>(observations.weights[i]);
   const double sigma = observations.sigmas.empty() ? 1.0 : static_cast<double>(observations.sigmas[i]);
   m.information = 1 / (sigma * sigma);
-  const double right = observations.u_right.empty() ? -1.0 : static_cast<double>(observations.u_right[i]);
-  m.stereo = right > 0 && is_finite(right) && problem.baseline_fx > 0 && is_finite(problem.baseline_fx);
-  m.disparity = m.stereo ? m.u - right : 0.0;
+  const bool has_depths = !observations.depths.empty();
+  const span<const Scalar> thirds = has_depths ? observations.depths : observations.u_right;
+  const double third = thirds.empty() ? -1.0 : static_cast<double>(thirds[i]);
+  m.stereo = third > 0 && is_finite(third) && problem.baseline_fx > 0 && is_finite(problem.baseline_fx);
+  m.disparity = !m.stereo ? 0.0 : has_depths ? problem.baseline_fx / third : m.u - third;
   return m.pose >= 0 && to_index(m.pose) < problem.poses.size() && m.point >= 0 &&
          to_index(m.point) < problem.points.size() && is_finite(m.u) && is_finite(m.v) && m.weight >= 0 &&
          is_finite(m.weight) && sigma > 0 && m.information > 0 && is_finite(m.information);
@@ -74,6 +76,12 @@ template <typename Camera, typename Scalar>
 template <typename Camera>
 [[nodiscard]] const Camera& camera_of(span<const Camera> cameras, int pose) noexcept {
   return cameras.size() == 1 ? cameras[0] : cameras[to_index(pose)];
+}
+
+/// The factor of u in the third row: 1 where that is of u_right = u - fx b / z, 0 where it is of the disparity alone.
+template <typename Camera, typename Scalar>
+[[nodiscard]] double third_has_u(const BundleProblem<Camera, Scalar>& problem) noexcept {
+  return problem.observations.depths.empty() ? 1 : 0;
 }
 
 /// The caller's poses as the solver has them, identity where one is no rigid motion.
@@ -100,7 +108,7 @@ template <typename Camera, typename Scalar>
       !camera_of(problem.cameras, m.pose).project(p.template cast<Real>(), pixel))
     return -1;
   const double du = static_cast<double>(pixel.x()) - m.u, dv = static_cast<double>(pixel.y()) - m.v;
-  const double dr = m.stereo ? du + m.disparity - problem.baseline_fx / p.z() : 0.0;
+  const double dr = m.stereo ? third_has_u(problem) * du + m.disparity - problem.baseline_fx / p.z() : 0.0;
   return (du * du + dv * dv + dr * dr) * m.information;
 }
 
@@ -109,7 +117,7 @@ template <typename Camera, typename Scalar>
 void select_observations(const BundleProblem<Camera, Scalar>& problem, BundleIndex& index, BundleResult& result) {
   const auto& o = problem.observations;
   const std::size_t n = o.pose.size();
-  CFP_ASSERT(o.point.size() == n && o.pixels.size() == n && fits(n, o.u_right, o.sigmas, o.weights));
+  CFP_ASSERT(o.point.size() == n && o.pixels.size() == n && fits(n, o.u_right, o.sigmas, o.weights, o.depths));
   CFP_ASSERT(fits(problem.poses.size(), problem.fixed_poses));
   CFP_ASSERT(n == 0 || problem.cameras.size() == 1 || problem.cameras.size() == problem.poses.size());
   index.kept.clear();

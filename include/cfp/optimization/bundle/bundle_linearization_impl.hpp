@@ -71,8 +71,8 @@ struct BundleKind {
 
 /// N, n and the cost of the chunk.
 template <bool Stereo, typename Loss>
-double weigh_chunk(int padded, double baseline_fx, const Loss& loss, const Matrix3<double>& rotation,
-                   BundleChunk& chunk) noexcept {
+double weigh_chunk(int padded, double baseline_fx, double third_has_u, const Loss& loss,
+                   const Matrix3<double>& rotation, BundleChunk& chunk) noexcept {
   using P = simd::Packet<double>;
   static_assert(to_index(BundleChunk::lanes) % P::lanes == 0);
   P cost = 0.0;
@@ -84,8 +84,8 @@ double weigh_chunk(int padded, double baseline_fx, const Loss& loss, const Matri
       for (int c = 0; c < 3; ++c) J[row][c] = at(chunk.row[row][c]);
     if constexpr (Stereo) {
       const P disparity = P(baseline_fx) / depth;
-      r[2] = r[0] + at(chunk.disparity) - disparity;
-      for (int c = 0; c < 3; ++c) J[2][c] = J[0][c] + disparity / depth * rotation(2, c);
+      r[2] = P(third_has_u) * r[0] + at(chunk.disparity) - disparity;
+      for (int c = 0; c < 3; ++c) J[2][c] = P(third_has_u) * J[0][c] + disparity / depth * rotation(2, c);
     }
     const P s = information * (r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
     const P omega = weight * information * loss.first(s);
@@ -157,7 +157,7 @@ void linearize_pose(const BundleProblem<Camera, Scalar>& problem, const BundleIn
   BundleChunk chunk;
   BundlePoseSums sums = {};
   double cost[2] = {};
-  for (const std::size_t kind : {0U, 1U}) {  // pixels; pixels with u_right
+  for (const std::size_t kind : {0U, 1U}) {  // pixels; pixels with a third row
     const std::size_t end = index.range_begin[2 * k + kind + 1];
     for (std::size_t first = index.range_begin[2 * k + kind]; first < end; first += BundleChunk::size) {
       const int count = static_cast<int>((std::min)(end - first, to_index(BundleChunk::size)));
@@ -169,8 +169,9 @@ void linearize_pose(const BundleProblem<Camera, Scalar>& problem, const BundleIn
         chunk.weight[i] = i < count ? m.weight : 0, chunk.information[i] = m.information;
       }
       project_chunk(camera, pose, padded, chunk);
-      cost[kind] += kind == 0 ? weigh_chunk<false>(padded, 0, mono, pose.rotation, chunk)
-                              : weigh_chunk<true>(padded, problem.baseline_fx, stereo, pose.rotation, chunk);
+      cost[kind] += kind == 0 ? weigh_chunk<false>(padded, 0, 0, mono, pose.rotation, chunk)
+                              : weigh_chunk<true>(padded, problem.baseline_fx, third_has_u(problem), stereo,
+                                                  pose.rotation, chunk);
       for (int i = 0; i < count; ++i) {
         double* const slot =
             out.slots.data() + BundleLinearization::slot_doubles * index.observations[first + to_index(i)].slot;

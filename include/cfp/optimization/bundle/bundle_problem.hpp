@@ -24,6 +24,7 @@ struct BundleObservations {
   span<const Scalar> u_right = {};  ///< px, as in PoseObservations: not > 0 or NaN: a pixel only. Empty: all mono
   span<const Scalar> sigmas = {};   ///< px, ORB-SLAM2: the scale factor of the octave. Empty: all 1
   span<const Scalar> weights = {};  ///< w >= 0, for example the static probability. Empty: all 1
+  span<const Scalar> depths = {};   ///< m, instead of u_right, as in PoseObservations: what an RGB-D camera measures
 };
 
 /// What to adjust. Views only: the arrays must live during the call; poses and points are read and written.
