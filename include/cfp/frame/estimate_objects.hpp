@@ -58,7 +58,8 @@ void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameS
       return label_at(frame.labels, flow.current(i, 0), flow.current(i, 1)) - 1;
     };
     const span<const Scalar> depths = is_told_by_depth(box, options) ? flow.previous_depths : span<const Scalar>();
-    const auto [by_mask, separated] = find_members(box, flow.current, depths, detection_at, options, state);
+    const auto [by_mask, separated] =
+        find_members(box, flow.current, depths, !frame.labels.empty(), detection_at, options, state);
     const PairLabel farther = by_mask ? PairLabel::undecided : PairLabel::background;
     for (std::size_t m = 0; m < scratch.members.size(); ++m) {
       const auto i = static_cast<std::size_t>(scratch.members[m]);

@@ -121,13 +121,15 @@ void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, Fr
   CFP_ASSERT(detail::fits(state.size(), frame.object_of_keypoint));
   FrameReport& report = state.report;
   report.undecided_foregrounds = 0;
+  const bool named = !frame.labels.empty() || !frame.object_of_keypoint.empty();
   const auto detection_at = [&](std::size_t i) { return detail::detection_of_keypoint(i, frame, state); };
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     const TrackedBox<Scalar>& box = state.boxes[b];
     const bool by_depth = detail::is_told_by_depth(box, options);
-    const auto [by_mask, separated] = detail::find_members(
-        box, PointSpan<Scalar, 2>(state.current.keypoints),
-        by_depth ? span<const Scalar>(state.current.depths) : span<const Scalar>(), detection_at, options, state);
+    const auto [by_mask, separated] =
+        detail::find_members(box, PointSpan<Scalar, 2>(state.current.keypoints),
+                             by_depth ? span<const Scalar>(state.current.depths) : span<const Scalar>(), named,
+                             detection_at, options, state);
     if (separated.status == ForegroundStatus::ok)
       state.current.object_depths.push_back({box.id, static_cast<Scalar>(separated.depth_m)});
     else if (by_depth && !by_mask)

@@ -23,11 +23,12 @@ struct ObjectMembers {
 };
 
 /// Sets scratch.members to the pixels that `detection_at(i)` names for the box's detection or, where it names none, as
-/// for a box without a mask, to those in the box. Marks in scratch.mask which of them lie on the object: all where
-/// there are no depths, and where these cannot tell.
+/// for a box without a mask (`named` false: for all boxes), to those in the box. Marks in scratch.mask which of them
+/// lie on the object: all where there are no depths, and where these cannot tell.
 template <typename Scalar, typename DetectionAt>
 ObjectMembers find_members(const TrackedBox<Scalar>& box, const PointSpan<Scalar, 2>& pixels, span<const Scalar> depths,
-                           const DetectionAt& detection_at, const FrameOptions& options, FrameState<Scalar>& state) {
+                           bool named, const DetectionAt& detection_at, const FrameOptions& options,
+                           FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
   const auto take = [&](const auto& belongs) {
     scratch.members.resize(pixels.size());
@@ -39,7 +40,7 @@ ObjectMembers find_members(const TrackedBox<Scalar>& box, const PointSpan<Scalar
     scratch.members.resize(count);
   };
   scratch.members.clear();
-  if (!box.compensated()) take([&](std::size_t i) { return detection_at(i) == box.detection; });
+  if (named && !box.compensated()) take([&](std::size_t i) { return detection_at(i) == box.detection; });
   const bool by_mask = !scratch.members.empty();
   if (!by_mask) take([&](std::size_t i) { return contains(box.box, pixels(i, 0), pixels(i, 1)); });
   scratch.mask.assign(scratch.members.size(), char(1));
