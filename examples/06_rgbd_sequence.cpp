@@ -100,7 +100,7 @@ class PoseSolver {
     observations.weights = weights;
     observations.sigmas = sigmas_;
     observations.depths = depths_;
-    observations.baseline_fx = 40;  // ORB-SLAM2's Camera.bf for this sensor
+    observations.baseline_fx = 320;  // px m: of the stereo camera whose disparity errs by a pixel where a depth errs
     const cfp::PoseResult result = cfp::refine_pose(observations, camera_, start_, cfp::PoseOptions{}, workspace_);
     if (!cfp::is_solved(result.status)) return {};
     start_ = result.T_cam_world;

@@ -23,14 +23,14 @@ struct Pose {  // T_cam_world, Ceres' parameters
 };
 
 // [glue]
-// One observation: u, v and, with a depth, u - bf / z, each over sigma.
+// One observation: u, v and, with a depth, the disparity bf / z, each over sigma.
 struct ReprojectionError {
   Eigen::Vector3d point;                     // world, m
   Eigen::Vector2d pixel;                     // px
   double fx, fy, cx, cy;                     // px
   double sigma_px = 1, depth_m = 0, bf = 0;  // depth_m or bf not positive: none
 
-  bool has_depth() const { return depth_m > 0 && bf > 0 && pixel.x() > bf / depth_m; }  // as refine_pose
+  bool has_depth() const { return depth_m > 0 && bf > 0; }  // as refine_pose
 
   template <typename T>
   bool operator()(const T* rotation, const T* translation, T* residual) const {
@@ -39,7 +39,7 @@ struct ReprojectionError {
     const T u = fx * p.x() / p.z() + cx, v = fy * p.y() / p.z() + cy;
     residual[0] = (u - pixel.x()) / sigma_px;
     residual[1] = (v - pixel.y()) / sigma_px;
-    if (has_depth()) residual[2] = (u - bf / p.z() - (pixel.x() - bf / depth_m)) / sigma_px;
+    if (has_depth()) residual[2] = (bf / depth_m - bf / p.z()) / sigma_px;
     return true;
   }
 };

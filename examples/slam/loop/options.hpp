@@ -23,7 +23,7 @@ struct Options {
   double flow_edge_px = 0;  // so near to the edge of a surface, the depth of a flow pair is not believed; 0: it is
   cfp::PoseOptions pose;
   double keypoint_sigma_px = 1;  // of one coordinate, at level 0 of the pyramid
-  double baseline_fx = 80;       // of depth as a stereo camera's; ORB-SLAM2 has 40
+  double baseline_fx = 320;      // of the stereo camera whose disparity errs by a pixel where a depth errs
   // What a pose must have: inliers, their share, spread, metres and radians of uncertainty. One of the coarse weights
   // is from few points, so not exact yet, but from points that agree. For one from the map alone nothing but the image
   // speaks: 2.5 standard deviations are the 5 cm of a right pose.

@@ -22,9 +22,11 @@ namespace cfp {
 /// A third row comes from a depth z, of which the disparity fx b / z has the noise sigma beside that of the pixel, or
 /// from the column of the point in a right image, u_right = u - fx b / z, which has it. ORB-SLAM2's mvuRight of an
 /// RGB-D camera is no such column but made of u and z: its noise is u's as well, and with it the pose seems up to 1.4
-/// times as certain as it is; give the depth. A third row counts when z is positive and finite, and u_right positive
-/// (as in ORB-SLAM2, which marks "none" with -1), and column or disparity at most 1e7 px; otherwise the observation is
-/// a pixel only. Bundle adjustment takes any finite u_right above 0.
+/// times as certain as it is; give the depth. For depths baseline_fx may be of no camera that there is: where they err
+/// by c z^2 it is a pixel for 1 / c, some 500 px m for structured light (examples/slam/RESULTS.md). A third row counts
+/// when z is positive and finite, and u_right positive (as in ORB-SLAM2, which marks "none" with -1), and column or
+/// disparity at most 1e7 px; otherwise the observation is a pixel only. Bundle adjustment takes any finite u_right
+/// above 0.
 template <typename Scalar>
 struct PoseObservations {
   PointSpan<Scalar, 3> points;           ///< X, world frame, m
