@@ -70,8 +70,9 @@ TEMPLATE_TEST_CASE("Pose kernel: H and g equal those of numeric Jacobians, pixel
     PoseColumns<Scalar> columns;
     columns.baseline_fx = baseline_fx;
     columns.third_has_u = third == Third::depth ? 0 : 1;
-    Scalar** pointers[10] = {&columns.x,     &columns.y,           &columns.z,      &columns.u,     &columns.v,
-                             &columns.third, &columns.information, &columns.active, &columns.error, &columns.weight};
+    Scalar** pointers[10] = {&columns.x,     &columns.y,         &columns.z,           &columns.u,
+                             &columns.v,     &columns.disparity, &columns.information, &columns.active,
+                             &columns.error, &columns.weight};
     const auto fill = [&](bool normalised) {
       const double fu = normalised ? 1 / camera.fx : 1, fv = normalised ? 1 / camera.fy : 1,
                    cu = normalised ? camera.cx : 0, cv = normalised ? camera.cy : 0;
@@ -80,7 +81,7 @@ TEMPLATE_TEST_CASE("Pose kernel: H and g equal those of numeric Jacobians, pixel
                                  X.z(),
                                  (measured[0] - cu) * fu,
                                  (measured[1] - cv) * fv,
-                                 (measured[2] - columns.third_has_u * cu) * fu,
+                                 (columns.third_has_u * measured[0] - measured[2]) * fu,
                                  information / (fu * fu),
                                  weight,
                                  0,

@@ -33,7 +33,12 @@ class LocalBundle {
     problem.poses = poses_;
     problem.points = positions_;
     problem.cameras = {&view_.exact, 1};
-    problem.observations = {pose_index_, point_index_, pixels_, {}, sigma_, weight_, depths_};
+    problem.observations.pose = pose_index_;
+    problem.observations.point = point_index_;
+    problem.observations.pixels = pixels_;
+    problem.observations.depths = depths_;
+    problem.observations.sigmas = sigma_;
+    problem.observations.weights = weight_;
     problem.fixed_poses = fixed_;
     problem.baseline_fx = view_.baseline_fx;
     squared_errors_.resize(pose_index_.size());

@@ -3,6 +3,7 @@
 /// numbers such as ceres::Jet (through argument-dependent lookup), and NaN always takes the failing branch.
 #pragma once
 
+#include <cmath>
 #include <limits>
 
 #include "cfp/version.hpp"
@@ -43,6 +44,11 @@ template <typename Scalar>
 
 /// The number of frames after `count`, for ages and runs: stays at 10^9, three years of frames at 10 Hz.
 [[nodiscard]] constexpr int next_count(int count) noexcept { return count < 1000000000 ? count + 1 : count; }
+
+/// What is left of a memory after dt_s, exp(-dt / tau), tau > 0; all of it where no time has passed.
+[[nodiscard]] inline double kept_share(double dt_s, double time_constant_s) noexcept {
+  return std::exp(-(dt_s > 0 ? dt_s : 0.0) / time_constant_s);
+}
 
 /// A depth measurement that can be used: finite and positive (ORB-SLAM2 marks missing depth with -1, sensors with 0 or
 /// NaN).

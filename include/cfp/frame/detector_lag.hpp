@@ -6,8 +6,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 
+#include "cfp/core/numeric.hpp"
 #include "cfp/core/options.hpp"
 #include "cfp/frame/frame_state.hpp"
 
@@ -52,7 +52,7 @@ class DetectorLag {
   /// O(boxes that move x pairs).
   double update(const Frame<Scalar>& frame, const FrameState<Scalar>& state) noexcept {
     const double dt = detail::elapsed_s(state);
-    const double kept = dt > 0 && is_finite(dt) ? std::exp(-dt / options_.memory_s) : 1;
+    const double kept = is_finite(dt) ? kept_share(dt, options_.memory_s) : 1;
     boxes_ *= kept;
     for (double& sum : scores_) sum *= kept;
     const bool judged = state.report.flow_model == FlowModelKind::motion && state.report.flow_sigma_px > 0 &&

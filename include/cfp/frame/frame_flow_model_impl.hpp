@@ -4,10 +4,10 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 #include <vector>
 
+#include "cfp/core/numeric.hpp"
 #include "cfp/frame/flow_model.hpp"
 #include "cfp/frame/frame_options.hpp"
 #include "cfp/frame/frame_state.hpp"
@@ -76,8 +76,8 @@ template <typename Scalar>
 [[nodiscard]] SharedError remember_shared_error(SharedError shared, FrameState<Scalar>& state) noexcept {
   constexpr double memory_s = 0.3;
   std::optional<double>& mean_sq = state.current.shared_error_sq;
-  const double share = mean_sq ? -std::expm1(-(std::max)(elapsed_s(state), 0.0) / memory_s) : 1;
-  if (shared.known) mean_sq = share * shared.error_sq + (1 - share) * mean_sq.value_or(0);
+  const double now = shared.error_sq, before = mean_sq.value_or(now);
+  if (shared.known) mean_sq = now + kept_share(elapsed_s(state), memory_s) * (before - now);
   shared.error_sq = (std::max)(shared.error_sq, mean_sq.value_or(0));
   return shared;
 }

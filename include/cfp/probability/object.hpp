@@ -158,7 +158,7 @@ template <typename Range, typename Scalar = range_value_t<Range>>
 inline ObjectProbability remember_object(const ObjectProbability& object, double dt_s, double object_threshold,
                                          const ObjectMemoryOptions& options, ObjectMemory& memory) noexcept {
   if (!(options.time_constant_s > 0)) return object;
-  memory.evidence *= std::exp(-(dt_s > 0 ? dt_s : 0.0) / options.time_constant_s);
+  memory.evidence *= kept_share(dt_s, options.time_constant_s);
   if (object.status == Status::ok) {
     const double limit = options.evidence_limit;
     const double now = object_evidence(object.static_probability, object_threshold, limit);

@@ -27,10 +27,9 @@ inline namespace CFP_ISA {
 /// - Stops as LevenbergMarquardtOptions says; status, costs and counts are in the result. The cost never rises.
 /// - Rotations are normalised before the first evaluation, and the cameras' centres stay; one that is off by more than
 ///   1e-2 is no rotation, and its observations are invalid.
-/// - Observations whose point the camera does not see at the start (behind it, say, or within 2 um) are left out of the
-/// whole
-///   solve; a step that brings a used observation behind its camera is refused and the damping raised. Call again to
-///   readmit.
+/// - Observations whose point the camera does not see at the start (behind it, say, or within 2 um) are left out of
+///   the whole solve; a step that brings a used observation behind its camera is refused and the damping raised. Call
+///   again to readmit.
 /// - Gauge: nothing is added to the cost. With no pose (mono: or only one) fixed, the damping alone holds the free
 ///   directions, and the solution stays near the start along them.
 /// - A fixed pose, a free pose or a point without a used observation keeps its bits. When no step was accepted, or

@@ -15,16 +15,17 @@ namespace cfp::detail {
 /// packets with weight 0.
 template <typename Scalar>
 struct PoseColumns {
-  Scalar *x = nullptr, *y = nullptr, *z = nullptr;      // point relative to the start position, world axes, m
-  Scalar *u = nullptr, *v = nullptr, *third = nullptr;  // px; pinhole: (pixel - centre) / focal length
-  Scalar* information = nullptr;                        // 1 / sigma^2; pinhole: fx^2 / sigma^2
-  Scalar* weight = nullptr;                             // w / mean w
-  Scalar* active = nullptr;                             // weight, or 0 for an outlier left out
-  Scalar* error = nullptr;                              // s; negative: behind the camera, |s| as last seen in front
-  std::uint32_t* index = nullptr;                       // of the caller's observation
+  Scalar *x = nullptr, *y = nullptr, *z = nullptr;  // point relative to the start position, world axes, m
+  Scalar *u = nullptr, *v = nullptr;                // px; pinhole: (pixel - centre) / focal length
+  Scalar* disparity = nullptr;                      // px; pinhole: / fx
+  Scalar* information = nullptr;                    // 1 / sigma^2; pinhole: fx^2 / sigma^2
+  Scalar* weight = nullptr;                         // w / mean w
+  Scalar* active = nullptr;                         // weight, or 0 for an outlier left out
+  Scalar* error = nullptr;                          // s; negative: behind the camera, |s| as last seen in front
+  std::uint32_t* index = nullptr;                   // of the caller's observation
   std::size_t mono_end = 0, stereo_begin = 0, stereo_end = 0;
   double mean_weight = 1, baseline_fx = 0;
-  double third_has_u = 1;  // 1: the third row is u_right = u - fx b / z; 0: -fx b / z, of a depth
+  double third_has_u = 1;  // 1: the third row is of u_right, the error of u and that of the disparity; 0: of this alone
 };
 
 inline namespace CFP_ISA {
@@ -59,7 +60,7 @@ void reserve_columns(std::size_t n, PoseWorkspace<Scalar>& workspace, PoseColumn
   columns.index = workspace.indices.data();
   const std::size_t misaligned = reinterpret_cast<std::uintptr_t>(workspace.columns.data()) / sizeof(Scalar) % line;
   Scalar* next = workspace.columns.data() + (line - misaligned) % line;
-  for (Scalar** column : {&columns.x, &columns.y, &columns.z, &columns.u, &columns.v, &columns.third,
+  for (Scalar** column : {&columns.x, &columns.y, &columns.z, &columns.u, &columns.v, &columns.disparity,
                           &columns.information, &columns.weight, &columns.active, &columns.error}) {
     *column = next;
     next += stride;
@@ -76,7 +77,7 @@ void finish_columns(PoseColumns<Scalar>& columns, std::size_t begin, std::size_t
     columns.error[i] = Scalar(0);
   }
   for (; end % simd::Packet<Scalar>::lanes != 0; ++end) {
-    for (Scalar* column : {columns.x, columns.y, columns.z, columns.u, columns.v, columns.third, columns.weight,
+    for (Scalar* column : {columns.x, columns.y, columns.z, columns.u, columns.v, columns.disparity, columns.weight,
                            columns.active, columns.error})
       column[end] = Scalar(0);
     columns.information[end] = Scalar(1);
@@ -118,14 +119,13 @@ void load_columns(const PoseObservations<Input>& observations, const Camera& cam
       ++(w >= 0 && w < 1e-30 ? result.zero_weight : result.invalid);
       continue;
     }
-    const double depth_or_right = b > 0 ? value(thirds, i, 0) : 0.0,
-                 third = has_depths ? -b / depth_or_right : depth_or_right;
-    const bool has_third = is_valid_depth(depth_or_right) && std::abs(third) <= 1e7;
+    const double third = b > 0 ? value(thirds, i, 0) : 0.0, disparity = has_depths ? b / third : u - third;
+    const bool has_third = is_valid_depth(third) && (has_depths ? disparity : third) <= 1e7;
     const std::size_t slot = has_third ? stereo++ : mono++;
     columns.x[slot] = static_cast<Scalar>(x), columns.y[slot] = static_cast<Scalar>(y);
     columns.z[slot] = static_cast<Scalar>(z);
     columns.u[slot] = static_cast<Scalar>((u - cu) * fu), columns.v[slot] = static_cast<Scalar>((v - cv) * fv);
-    columns.third[slot] = static_cast<Scalar>((third - columns.third_has_u * cu) * fu);
+    columns.disparity[slot] = static_cast<Scalar>(disparity * fu);
     const Scalar s = static_cast<Scalar>(given);
     columns.information[slot] = has_sigmas ? factor / (s * s) : factor * s;
     columns.weight[slot] = static_cast<Scalar>(w);

@@ -78,7 +78,7 @@ void add_observations(const PoseColumns<Scalar>& columns, std::size_t begin, std
       P m1 = x, m2 = x * x, sr = ru, skr = x * ru, uu = ru * ru;
       if constexpr (stereo) {
         const P k = third_has_u * x - base * q;
-        const P r = k - P::load(columns.third + begin);
+        const P r = multiply_add(third_has_u, ru, P::load(columns.disparity + begin) - base * q);
         m1 = multiply_add(third_has_u, k, m1), m2 = multiply_add(k, k, m2), sr = multiply_add(third_has_u, r, sr),
         skr = multiply_add(k, r, skr), uu = multiply_add(r, r, uu);
       }
@@ -165,8 +165,7 @@ void add_observations(const PoseColumns<Scalar>& columns, std::size_t begin, std
     r[1] = static_cast<double>(pixel.y()) - static_cast<double>(columns.v[i]);
     D.template topRows<2>() = pixel_by_point.template cast<double>();
     if constexpr (stereo) {
-      r[2] = columns.third_has_u * static_cast<double>(pixel.x()) - columns.baseline_fx / p.z() -
-             static_cast<double>(columns.third[i]);
+      r[2] = columns.third_has_u * r[0] + static_cast<double>(columns.disparity[i]) - columns.baseline_fx / p.z();
       D.row(2) = columns.third_has_u * D.row(0);
       D(2, 2) += columns.baseline_fx / (p.z() * p.z());
     }
