@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Cholesky>
@@ -25,23 +26,30 @@ struct Flow {
   [[nodiscard]] cfp::FlowPairs<double> pairs() const { return {previous, current, depths}; }
 };
 
+/// A pair of a point at rest at depth z, which is measured with such an error.
+void add_at_rest(const cfp::Vector2<double>& p, double z, double depth_sigma_m, const cfp::SE3<double>& T,
+                 double noise_px, cfp::Random& random, Flow& to) {
+  cfp::Vector3<double> ray;
+  cfp::Vector2<double> q;
+  REQUIRE(camera.unproject(p, ray));
+  if (!camera.project(T * cfp::Vector3<double>(z * ray), q)) return;
+  q += noise_px * cfp::Vector2<double>{random.normal(), random.normal()};
+  to.previous.push_back({p.x(), p.y()});
+  to.current.push_back({q.x(), q.y()});
+  to.depths.push_back(z + depth_sigma_m * random.normal());
+  to.outside.push_back(1);
+}
+
 /// n pairs of a static room under T; every `mover`-th one (0: none) moves on its own.
 Flow flow(int n, const cfp::SE3<double>& T, double noise_px, int mover, cfp::Random& random, double moves_px = 8) {
   Flow result;
   const cfp::DepthNoise depth_noise;
   for (int i = 0; i < n; ++i) {
-    const cfp::Vector2<double> p(random.uniform(20, 620), random.uniform(20, 460));
+    const cfp::Vector2<double> p{random.uniform(20, 620), random.uniform(20, 460)};
     const double z = random.uniform(1, 5);
-    cfp::Vector3<double> ray;
-    cfp::Vector2<double> q;
-    REQUIRE(camera.unproject(p, ray));
-    if (!camera.project(T * cfp::Vector3<double>(z * ray), q)) continue;
-    q += noise_px * cfp::Vector2<double>(random.normal(), random.normal());
-    if (mover > 0 && i % mover == 0) q.x() += moves_px;
-    result.previous.push_back({p.x(), p.y()});
-    result.current.push_back({q.x(), q.y()});
-    result.depths.push_back(z + depth_noise.sigma_m(z) * random.normal());
-    result.outside.push_back(1);
+    const std::size_t before = result.current.size();
+    add_at_rest(p, z, depth_noise.sigma_m(z), T, noise_px, random, result);
+    if (mover > 0 && i % mover == 0 && result.current.size() > before) result.current.back()[0] += moves_px;
   }
   return result;
 }
@@ -385,15 +393,7 @@ TEST_CASE("A few near depths that are wrong do not tell the translation before a
     Flow f;
     while (f.depths.size() < 60) {
       const cfp::Vector2<double> p{random.uniform(0, 640), random.uniform(0, 480)};
-      cfp::Vector3<double> ray;
-      cfp::Vector2<double> q;
-      REQUIRE(camera.unproject(p, ray));
-      REQUIRE(camera.project(T * cfp::Vector3<double>(6 * ray), q));
-      q += 0.2 * cfp::Vector2<double>{random.normal(), random.normal()};
-      f.previous.push_back({p.x(), p.y()});
-      f.current.push_back({q.x(), q.y()});
-      f.depths.push_back(6);
-      f.outside.push_back(1);
+      add_at_rest(p, 6, 0, T, 0.2, random, f);
     }
     const auto nees = [&](const cfp::CameraMotionOptions& options) {
       const cfp::CameraMotion<double> found =
@@ -419,6 +419,52 @@ TEST_CASE("A room whose neighbours share no depth keeps its pairs", "[frame][cam
   REQUIRE(found.known);
   const auto stays = [](const std::array<double, 3>& point) { return cfp::is_finite(point[0]); };
   CHECK(std::count_if(workspace.points.begin(), workspace.points.end(), stays) == std::ptrdiff_t(f.depths.size()));
+}
+
+TEST_CASE("Errors of depths neither shorten a motion nor hide what they do not bend", "[frame][camera_motion]") {
+  // A wall 6 to 8 m away: of the depths, what tells the translation from a turn is little more than their noise.
+  cfp::Random random(1, "far wall");
+  cfp::CameraMotionWorkspace<double> workspace;
+  const cfp::SE3<double> T{cfp::Matrix3<double>::Identity(), {0.2, 0.01, 0}};
+  const cfp::DepthNoise depth_noise;
+  double shorter = 0, error_sq = 0, nees = 0;
+  constexpr int runs = 60;
+  for (int run = 0; run < runs; ++run) {
+    Flow f;
+    while (f.depths.size() < 600) {
+      const cfp::Vector2<double> p{random.uniform(0, 640), random.uniform(0, 480)};
+      const double z = 7 + (p.x() - camera.cx) / 320;
+      add_at_rest(p, z, depth_noise.sigma_m(z), T, 0.1, random, f);
+    }
+    const cfp::CameraMotion<double> found =
+        cfp::estimate_camera_motion<double>(f.pairs(), f.outside, camera, {}, workspace);
+    REQUIRE(found.known);
+    shorter += (0.2 - found.T_cur_prev.translation.x()) / std::sqrt(found.covariance(0, 0)) / runs;
+    error_sq += (found.T_cur_prev.translation - T.translation).squaredNorm() / runs;
+    nees += cfp_test::normalized_error_sq(found, T) / 6 / runs;
+  }
+  CHECK(std::abs(shorter) < 0.5);       // in its sigmas; 1.6 with M at the measured depths
+  CHECK(std::sqrt(error_sq) < 0.0011);  // 1.8 mm
+  CHECK(nees < 1.3);
+}
+
+TEST_CASE("The motion of few pairs knows how little it knows", "[frame][camera_motion]") {
+  cfp::Random random(1, "few pairs");
+  cfp::CameraMotionWorkspace<double> workspace;
+  for (const auto& [n, least_share] : {std::pair<int, double>{12, 0.855}, {40, 0.915}}) {
+    int known = 0, held = 0;
+    for (int i = 0; i < 1000; ++i) {
+      const cfp::SE3<double> T = cfp_test::random_motion(0.02, 0.01, random);
+      const Flow f = flow(n, T, 0.2, 0, random);
+      const cfp::CameraMotion<double> found =
+          cfp::estimate_camera_motion<double>(f.pairs(), f.outside, camera, {}, workspace);
+      if (!found.known) continue;
+      ++known;
+      held += cfp_test::normalized_error_sq(found, T) < 12.592 ? 1 : 0;  // 95 % of chi^2, six degrees of freedom
+    }
+    CHECK(known > 950);
+    CHECK(held > least_share * known);  // 0.83 and 0.92 where the six parameters do not count
+  }
 }
 
 TEST_CASE("Before a car the errors of stereo depths hide no motion, and its covariance holds them",

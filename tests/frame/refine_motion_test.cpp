@@ -14,6 +14,7 @@ namespace {
 
 struct FlatFlow {
   std::vector<std::array<double, 2>> previous, current;
+  std::vector<double> depths;  // true
   std::vector<char> outside;
 
   [[nodiscard]] cfp::FlowPairs<double> pairs() const { return {previous, current, {}}; }
@@ -36,6 +37,7 @@ FlatFlow flat_flow(int n, const cfp::SE3<double>& T, double noise_px, cfp::Rando
     q += noise_px * cfp::Vector2<double>(random.normal(), random.normal());
     result.previous.push_back({p.x(), p.y()});
     result.current.push_back({q.x(), q.y()});
+    result.depths.push_back(z);
     result.outside.push_back(1);
   }
   return result;
@@ -141,6 +143,43 @@ TEST_CASE("An exact motion stays, and the noise of the pairs is measured", "[fra
     CHECK(found.coordinates == (t > 0 ? 1 : 2));
     CHECK_THAT(found.sigma_px, WithinAbs(0.3, 0.05));
   }
+}
+
+TEST_CASE("Without depths nobody claims to know the length of a motion better than the host",
+          "[frame][refine_motion]") {
+  cfp::Random random(9, "length");
+  double claimed_sq = 0, nees = 0;
+  constexpr int runs = 60;
+  for (int i = 0; i < runs; ++i) {
+    const cfp::SE3<double> T{cfp::so3_exp(cfp::Vector3<double>(0, 0.003, 0)), {0.1, 0, 0}};
+    const cfp::UncertainMotion<double> prior(with_error(T, 0.01, 0.001, random), 0.01, 0.001);
+    const cfp::RefinedMotion<double> found = refine_flat(prior, flat_flow(300, T, 0.2, random));
+    REQUIRE(found.known);
+    claimed_sq += found.covariance(0, 0) / runs;
+    nees += cfp_test::normalized_error_sq(found, T) / 6 / runs;
+  }
+  CHECK(std::sqrt(claimed_sq) > 0.0095);  // 5.4 mm where H counts along the line what the depth has explained
+  CHECK(nees < 1.3);
+}
+
+TEST_CASE("The noise of pairs with a depth and of pairs without one is one noise", "[frame][refine_motion]") {
+  cfp::Random random(10, "mixture");
+  const cfp::DepthNoise depth_noise;
+  double ratio = 0;
+  constexpr int runs = 40;
+  for (int i = 0; i < runs; ++i) {
+    const cfp::SE3<double> T = cfp_test::random_motion(0.05, 0.01, random);
+    const FlatFlow f = flat_flow(300, T, 0.2, random);
+    std::vector<double> depths, distances;
+    for (const double z : f.depths)
+      depths.push_back(random.uniform() < 0.3 ? z + depth_noise.sigma_m(z) * random.normal() : 0);
+    const cfp::UncertainMotion<double> prior(with_error(T, 0.005, 0.001, random), 0.005, 0.001);
+    const cfp::RefinedMotion<double> found = cfp::refine_camera_motion<double>(
+        prior, {f.previous, f.current, depths}, f.outside, cfp_test::flow_camera, {}, distances);
+    REQUIRE(found.known);
+    ratio += found.sigma_px / 0.2 / runs;
+  }
+  CHECK_THAT(ratio, WithinAbs(1, 0.05));  // 1.2 by the median of both
 }
 
 TEST_CASE("Too few pairs, or pairs that do not agree, refine nothing", "[frame][refine_motion]") {

@@ -86,7 +86,7 @@ template <typename Scalar>
     if (outside[i] != 0 && has_distance(distances[i])) distances[kept++] = distances[i];
   }
   if (kept >= options.min_outside_pairs)
-    model.sigma_px = flow_sigma(span<Scalar>(distances.data(), kept), model.coordinates, options.motion);
+    model.sigma_px = flow_sigma(span<Scalar>(distances.data(), kept), model.coordinates, 7, options.motion);
   return model;
 }
 

@@ -65,7 +65,9 @@ struct MotionRefinement {
       agreeing += term.weight;
       coordinates += term.weight * term.coordinates;
       cost += term.distance_sq * std::sqrt(term.weight);
-      distances[i] = sigma_px * static_cast<Scalar>(std::sqrt(term.distance_sq));
+      // As if of two coordinates: distances from lines are smaller, and the median is of both.
+      const double median = chi_median(term.coordinates > 1.5 ? 2 : 1) / chi_median(2);
+      distances[i] = sigma_px * static_cast<Scalar>(std::sqrt(term.distance_sq) / median);
     }
     return cost;
   }
@@ -78,7 +80,7 @@ struct MotionRefinement {
   [[nodiscard]] RefinedMotion<Scalar> refine(double first_scale) {
     constexpr int rounds = 2;
     LevenbergMarquardtOptions steps;
-    steps.max_iterations = 4;
+    steps.max_iterations = 15;
     steps.min_relative_decrease = 1e-3;
     RefinedMotion<Scalar> motion;
     const bool exact = prior.covariance.isZero(0);
@@ -92,7 +94,7 @@ struct MotionRefinement {
       NormalEquations<6> equations;
       linearize(refined.T_cur_prev, equations);
       motion.coordinates = coordinates > 1.5 * agreeing ? 2 : 1;
-      sigma_px = motion.sigma_px = flow_sigma(span<Scalar>(distances), motion.coordinates, options);
+      sigma_px = motion.sigma_px = flow_sigma(span<Scalar>(distances), 2, exact ? 0 : 6, options);
       return pairs >= static_cast<double>(options.min_pairs) && agreeing > 0;
     };
     for (int round = 0; round < rounds; ++round) {

@@ -35,14 +35,19 @@ template <typename Scalar>
   return kept;
 }
 
+/// The median of the chi distribution of one or two degrees of freedom.
+[[nodiscard]] constexpr double chi_median(int degrees_of_freedom) noexcept {
+  return degrees_of_freedom == 1 ? 0.674489750196082 : 1.177410022515475;
+}
+
 /// The standard deviation of one coordinate, from distances of static points of which at least half are right: their
-/// median over that of the chi distribution. degrees_of_freedom: 1 for distances from a line, 2 for distances from a
-/// point. Distances that are none are left out; none at all gives 0. `distances` is overwritten. O(n).
+/// median over that of the chi distribution; 7 % too large with a tenth of mismatches, 18 % with a fifth.
+/// degrees_of_freedom: 1 for distances from a line, 2 for distances from a point. Distances that are none are left out;
+/// none at all gives 0. `distances` is overwritten. O(n).
 template <typename Scalar>
 [[nodiscard]] Scalar robust_sigma(span<Scalar> distances, int degrees_of_freedom) noexcept {
   const std::size_t n = copy_distances(span<const Scalar>(distances), distances);
-  const Scalar median = quantile(distances.subspan(0, n), 0.5);
-  return median / Scalar(degrees_of_freedom == 1 ? 0.674489750196082 : 1.177410022515475);
+  return quantile(distances.subspan(0, n), 0.5) / Scalar(chi_median(degrees_of_freedom));
 }
 
 }  // namespace CFP_ISA

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/types.hpp"
@@ -63,21 +64,31 @@ template <typename Camera, typename Scalar>
   return motion_residual(pixel_prev, z, pixel_cur, T_cur_prev, camera, out);
 }
 
-/// At the measured depth, or at that which fits the pair best among what is likely of an unknown one: a Gauss-Newton
-/// step from the mean of its inverse. So what is left is noise, and the pair as near as it seems.
+/// Linearised at the depth that fits the pair best among what is likely, a Gauss-Newton step from its inverse: with a
+/// noisy depth H would have the square of its noise, and a motion would come out too short. r is what is left of a
+/// measured depth's; of an unknown one's, r without what the depth explains: nothing tells the length of the motion.
 template <typename Camera, typename Scalar>
 [[nodiscard]] bool likely_residual(const Vector2<Scalar>& pixel_prev, const Scalar& depth_prev,
                                    const Vector2<Scalar>& pixel_cur, const SE3<Scalar>& T_cur_prev,
                                    const Camera& camera, const Scalar& sigma_px, const MotionDistanceOptions& options,
                                    MotionResidual<Scalar>& out) noexcept {
   if (!expected_residual(pixel_prev, depth_prev, pixel_cur, T_cur_prev, camera, options, out)) return false;
-  if (is_valid_depth(depth_prev)) return true;
-  const Scalar mean = Scalar(options.unknown_depth.inverse_mean), sigma = Scalar(options.unknown_depth.inverse_sigma);
-  const Scalar variance = out.sigma_z * out.sigma_z;
+  const bool measured = is_valid_depth(depth_prev);
+  const Scalar mean = measured ? 1 / depth_prev : Scalar(options.unknown_depth.inverse_mean);
+  const Scalar variance = out.sigma_z * out.sigma_z, sigma = out.sigma_z * mean * mean;
   const Scalar farther = variance * out.along.dot(out.r) / (sigma_px * sigma_px + variance * out.along.squaredNorm());
-  const Scalar inverse = std::clamp(mean - farther * mean * mean, mean / 50, mean + 6 * sigma), z = 1 / inverse;
+  const Scalar inverse =
+      std::clamp(mean - farther * mean * mean, (std::max)(mean / 50, mean - 6 * sigma), mean + 6 * sigma);
+  const Scalar z = 1 / inverse;
+  if (!motion_residual(pixel_prev, z, pixel_cur, T_cur_prev, camera, out)) return false;
   out.sigma_z = z * z * sigma;
-  return motion_residual(pixel_prev, z, pixel_cur, T_cur_prev, camera, out);
+  if (measured) {
+    out.r += out.along * (z * z * (mean - inverse));
+  } else {
+    const Scalar spread = out.sigma_z / sigma_px;
+    out.sigma_z *= std::sqrt(2 + spread * spread * out.along.squaredNorm());  // W as that of r's square
+  }
+  return true;
 }
 
 /// Adds a pair in units of the noise: H += w M^T W^-1 M, g -= w M^T W^-1 r, W of the noise and of the depth's error
