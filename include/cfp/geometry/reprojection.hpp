@@ -10,7 +10,6 @@
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
-#include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/distance.hpp"
 #include "cfp/math/se3.hpp"
 

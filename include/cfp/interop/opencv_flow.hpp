@@ -16,8 +16,8 @@
 
 #include "cfp/core/options.hpp"
 #include "cfp/core/span.hpp"
-#include "cfp/frame/frame.hpp"
 #include "cfp/geometry/box.hpp"
+#include "cfp/geometry/flow_pairs.hpp"
 #include "cfp/interop/opencv.hpp"
 
 namespace cfp {

@@ -8,7 +8,6 @@
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/types.hpp"
-#include "cfp/math/matrix3.hpp"
 
 namespace cfp {
 inline namespace CFP_ISA {

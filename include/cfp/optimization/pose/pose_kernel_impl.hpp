@@ -19,7 +19,6 @@
 #include "cfp/math/normal_equations.hpp"
 #include "cfp/math/se3.hpp"
 #include "cfp/optimization/pose/pose_columns_impl.hpp"
-#include "cfp/optimization/robust_loss.hpp"
 #include "cfp/simd/packet.hpp"
 
 namespace cfp::detail {
