@@ -96,14 +96,12 @@ void load_columns(const PoseObservations<Input>& observations, const Camera& cam
     cu = static_cast<double>(camera.cx), cv = static_cast<double>(camera.cy);
   }
   const double b = observations.baseline_fx > 0 && observations.baseline_fx <= 1e6 ? observations.baseline_fx : 0;
-  const bool has_sigmas = !observations.sigmas.empty(), has_depths = !observations.depths.empty();
-  const span<const Input> noise = has_sigmas ? observations.sigmas : observations.inverse_sigmas_sq,
-                          thirds = has_depths ? observations.depths : observations.u_right;
+  const bool has_depths = !observations.depths.empty();
+  const span<const Input> thirds = has_depths ? observations.depths : observations.u_right;
   columns.third_has_u = has_depths ? 0 : 1;
   const auto value = [](span<const Input> values, std::size_t i, double otherwise) {
     return values.empty() ? otherwise : static_cast<double>(values[i]);
   };
-  const double widest = has_sigmas ? 1e6 : 1e12;
   const Scalar factor = static_cast<Scalar>(1 / (fu * fu));
   std::size_t mono = 0, stereo = columns.stereo_begin;
   double sum = 0, sum_sq = 0;
@@ -112,10 +110,10 @@ void load_columns(const PoseObservations<Input>& observations, const Camera& cam
                  y = static_cast<double>(observations.points(i, 1)) - centre.y(),
                  z = static_cast<double>(observations.points(i, 2)) - centre.z();
     const double u = static_cast<double>(observations.pixels(i, 0)), v = static_cast<double>(observations.pixels(i, 1));
-    const double w = value(observations.weights, i, 1), given = value(noise, i, 1);
+    const double w = value(observations.weights, i, 1), sigma = value(observations.sigmas, i, 1);
     // A sum with NaN or infinity is not below its bound.
     if (!(std::abs(x) + std::abs(y) + std::abs(z) <= 1e9 && std::abs(u - cu) + std::abs(v - cv) <= 1e7 && w >= 1e-30 &&
-          w <= 1e30 && given >= 1 / widest && given <= widest)) {
+          w <= 1e30 && sigma >= 1e-6 && sigma <= 1e6)) {
       ++(w >= 0 && w < 1e-30 ? result.zero_weight : result.invalid);
       continue;
     }
@@ -126,8 +124,7 @@ void load_columns(const PoseObservations<Input>& observations, const Camera& cam
     columns.z[slot] = static_cast<Scalar>(z);
     columns.u[slot] = static_cast<Scalar>((u - cu) * fu), columns.v[slot] = static_cast<Scalar>((v - cv) * fv);
     columns.disparity[slot] = static_cast<Scalar>(disparity * fu);
-    const Scalar s = static_cast<Scalar>(given);
-    columns.information[slot] = has_sigmas ? factor / (s * s) : factor * s;
+    columns.information[slot] = factor / (static_cast<Scalar>(sigma) * static_cast<Scalar>(sigma));
     columns.weight[slot] = static_cast<Scalar>(w);
     columns.index[slot] = static_cast<std::uint32_t>(i);
     sum += w, sum_sq += w * w;

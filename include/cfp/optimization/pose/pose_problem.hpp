@@ -16,8 +16,8 @@ namespace cfp {
 /// The caller's arrays, parallel, of n observations; nothing is kept. Optional spans are empty or of length n.
 /// An observation counts when point, pixel, weight and sigma are finite, the weight within [1e-30, 1e30], sigma within
 /// [1e-6, 1e6] px, the pixel within 1e7 px of the principal point and the point within 1e9 m of the camera (sums of
-/// absolute coordinates); others are skipped and counted. Of `sigmas` and `inverse_sigmas_sq`, and of `depths` and
-/// `u_right`, at most one may be given: both are invalid input.
+/// absolute coordinates); others are skipped and counted. Of `depths` and `u_right` at most one may be given: both are
+/// invalid input.
 ///
 /// A third row comes from a depth z, of which the disparity fx b / z has the noise sigma beside that of the pixel, or
 /// from the column of the point in a right image, u_right = u - fx b / z, which has it. ORB-SLAM2's mvuRight of an
@@ -29,14 +29,13 @@ namespace cfp {
 /// above 0.
 template <typename Scalar>
 struct PoseObservations {
-  PointSpan<Scalar, 3> points;           ///< X, world frame, m
-  PointSpan<Scalar, 2> pixels;           ///< px
-  span<const Scalar> weights;            ///< w >= 0, static probabilities for example; empty: 1. Below 1e-30: absent
-  span<const Scalar> sigmas;             ///< px, ORB-SLAM2: the scale factor of the octave; empty: 1
-  span<const Scalar> inverse_sigmas_sq;  ///< 1/px^2, instead of sigmas (ORB-SLAM2: mvInvLevelSigma2 of the octave)
-  span<const Scalar> depths;             ///< m, instead of u_right
-  span<const Scalar> u_right;            ///< px, instead of depths
-  double baseline_fx = 0;  ///< fx times stereo baseline, px m (ORB-SLAM2: Camera.bf); not in (0, 1e6]: pixels only
+  PointSpan<Scalar, 3> points;  ///< X, world frame, m
+  PointSpan<Scalar, 2> pixels;  ///< px
+  span<const Scalar> weights;   ///< w >= 0, static probabilities for example; empty: 1. Below 1e-30: absent
+  span<const Scalar> sigmas;    ///< px, ORB-SLAM2: the scale factor of the octave; empty: 1
+  span<const Scalar> depths;    ///< m, instead of u_right
+  span<const Scalar> u_right;   ///< px, instead of depths
+  double baseline_fx = 0;       ///< fx times stereo baseline, px m (ORB-SLAM2: Camera.bf); not in (0, 1e6]: pixels only
 };
 
 /// One robust solve within a refinement.

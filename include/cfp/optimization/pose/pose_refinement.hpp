@@ -161,11 +161,11 @@ template <typename Scalar, typename Input, typename Camera>
                                      PoseWorkspace<Scalar>& workspace, span<char> inliers = {}) {
   const PoseObservations<Input>& o = observations;
   CFP_ASSERT(!invalid_field(options) && o.pixels.size() == o.points.size());
-  CFP_ASSERT(detail::fits(o.points.size(), inliers, o.weights, o.sigmas, o.inverse_sigmas_sq, o.depths, o.u_right));
+  CFP_ASSERT(detail::fits(o.points.size(), inliers, o.weights, o.sigmas, o.depths, o.u_right));
   PoseResult result;
   result.T_cam_world = T_cam_world;
   std::fill(inliers.begin(), inliers.end(), char(0));
-  const bool twice = (!o.sigmas.empty() && !o.inverse_sigmas_sq.empty()) || (!o.depths.empty() && !o.u_right.empty());
+  const bool twice = !o.depths.empty() && !o.u_right.empty();
   if (twice || !is_rigid_motion(T_cam_world) || !detail::is_usable_camera(camera)) {
     if (!is_finite(T_cam_world.rotation.sum() + T_cam_world.translation.sum())) result.T_cam_world = SE3<double>();
     result.status = SolverStatus::invalid_input;
