@@ -26,7 +26,6 @@ WORKLOADS = [
       for n in (5, 10, 50, 200) for a, kind in ((BOXES, "boxes"), (UNIFORM, "uniform")) for peer, row in (("dlib", "dlib_max_cost"), ("scipy", "scipy"))],
     *[("math", f"chi-squared {what}, k = {k}", f"BM_chi_squared_{row}_cfp{scalar}/{k}", "Boost.Math", f"BM_chi_squared_{row}_boost/{k}", 1, 1)
       for what, row, scalar, k in (("tail", "survival", "<double>", 1), ("tail", "survival", "<double>", 2), ("tail", "survival", "<double>", 3), ("density", "density", "", 2))],
-    ("math", "0.8 quantile of 1000", "BM_quantile<float, Method::cfp>/1000", "std::nth_element", "BM_quantile<float, Method::nth_element>/1000", 1, 1),
     *[("fundamental", f"F, {n} pairs, {out} % outliers", f"{n} {out}%: cfp", peer, f"{n} {out}%: {peer}", *least)
       for n in (500, 1000) for out in (20, 40) for peer, least in (("cv USAC_MAGSAC", (1.7, 2.7)), ("cv FM_RANSAC 0.1 px", (1, 1)))],
     *[("pnp_ransac", f"pose without a start, {n} matches, {out} % outliers", f"{n} {out}%: cfp, weighted sampling", peer, f"{n} {out}%: {peer}", 1, 1)

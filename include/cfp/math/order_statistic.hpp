@@ -13,50 +13,6 @@
 #include "cfp/core/span.hpp"
 
 namespace cfp {
-
-namespace detail {
-inline namespace CFP_ISA {
-
-// Moves the values that `goes_first` accepts to the front and returns their number, without a branch to mispredict.
-template <typename Scalar, typename Predicate>
-std::size_t branchless_partition(Scalar* values, std::size_t n, const Predicate& goes_first) noexcept {
-  std::size_t front = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    const Scalar value = values[i];
-    values[i] = values[front];
-    values[front] = value;
-    front += goes_first(value) ? 1U : 0U;
-  }
-  return front;
-}
-
-// Hoare's quickselect: values[rank] becomes what sorting would put there, with nothing larger before it. Partitions
-// without branches make it several times as fast as std::nth_element.
-template <typename Scalar>
-void select_rank(Scalar* values, std::size_t n, std::size_t rank) noexcept {
-  constexpr std::size_t few = 16;
-  constexpr int max_rounds = 64;  // a heap finishes what so many pivots did not
-  for (int round = 0; n > few && round < max_rounds; ++round) {
-    const Scalar a = values[0], b = values[n / 2], c = values[n - 1];
-    const Scalar pivot = (std::max)((std::min)(a, b), (std::min)((std::max)(a, b), c));
-    const std::size_t below = branchless_partition(values, n, [pivot](Scalar x) { return x < pivot; });
-    if (rank < below) {
-      n = below;
-      continue;
-    }
-    const std::size_t up_to =
-        below + branchless_partition(values + below, n - below, [pivot](Scalar x) { return x <= pivot; });
-    if (rank < up_to) return;
-    values += up_to;
-    rank -= up_to;
-    n -= up_to;
-  }
-  std::partial_sort(values, values + rank + 1, values + n);
-}
-
-}  // namespace CFP_ISA
-}  // namespace detail
-
 inline namespace CFP_ISA {
 
 /// 1-based position of the q-quantile among n ascending values: ceil(q n), at least 1 and at most n; 0 for n = 0. A
@@ -71,12 +27,12 @@ inline namespace CFP_ISA {
 }
 
 /// The value at 0-based position rank0 of the ascending order (0: the smallest). Reorders `values`. 0 without values; a
-/// rank beyond the end counts as the last. Linear time, allocates nothing.
+/// rank beyond the end counts as the last. Linear time on average, allocates nothing.
 template <typename Scalar>
 [[nodiscard]] Scalar order_statistic(span<Scalar> values, std::size_t rank0) noexcept {
   if (values.empty()) return Scalar(0);
   rank0 = (std::min)(rank0, values.size() - 1);
-  detail::select_rank(values.data(), values.size(), rank0);
+  std::nth_element(values.begin(), values.begin() + rank0, values.end());
   return values[rank0];
 }
 
