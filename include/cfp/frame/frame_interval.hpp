@@ -36,7 +36,6 @@ class FrameInterval {
     if (!second) usual_s_ += 0.2 * ((std::min)(dt, 2 * usual_s_) - usual_s_);
     return gap;
   }
-  [[nodiscard]] double usual_s() const noexcept { return usual_s_; }  ///< 0: not known yet
 
  private:
   static constexpr double factor = 3, shortest_s = 0.2;
