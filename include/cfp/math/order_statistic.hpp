@@ -32,7 +32,9 @@ template <typename Scalar>
 [[nodiscard]] Scalar order_statistic(span<Scalar> values, std::size_t rank0) noexcept {
   if (values.empty()) return Scalar(0);
   rank0 = (std::min)(rank0, values.size() - 1);
-  std::nth_element(values.begin(), values.begin() + rank0, values.end());
+  // A comparison of its own, and so an nth_element that units with other vector flags do not share.
+  const auto below = [](Scalar a, Scalar b) { return a < b; };
+  std::nth_element(values.begin(), values.begin() + rank0, values.end(), below);
   return values[rank0];
 }
 
