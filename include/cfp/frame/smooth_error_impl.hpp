@@ -50,7 +50,7 @@ struct SmoothErrorFit {
       const auto sigma = static_cast<double>(pairs.pixel_sigma_of(i, sigma_px));
       const Matrix23<double> error = smooth_error_at<Scalar>(pairs.flow.current[i], pairs.camera);
       Eigen::Matrix<double, 2, 9> M;
-      M << pair.M.template cast<double>(), error;
+      M << pair.M().template cast<double>(), error;
       const Vector2<double> r = pair.r.template cast<double>() - error.lazyProduct(coefficients);
       add_pair<9>(M / sigma, r / sigma, (pair.along * pair.sigma_z).template cast<double>() / sigma,
                   Eigen::Matrix<double, 9, 1>::Zero(), sums);

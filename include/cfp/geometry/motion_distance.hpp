@@ -70,7 +70,7 @@ template <typename Camera, typename Scalar>
   if (motion == nullptr) return distance_of(pair, sigma_px);
   // W = I + A with A = M C M^T / sigma^2.
   const Real per_sigma = Real(1) / Real(sigma_px);
-  const Eigen::Matrix<Real, 6, 2> M = pair.M.transpose().template cast<Real>() * per_sigma,
+  const Eigen::Matrix<Real, 6, 2> M = pair.M().transpose().template cast<Real>() * per_sigma,
                                   CM = motion->covariance.lazyProduct(M);
   return distance_of(pair, sigma_px, M.col(0).dot(CM.col(0)), M.col(0).dot(CM.col(1)), M.col(1).dot(CM.col(1)));
 }

@@ -15,15 +15,6 @@
 
 namespace cfp::detail {
 
-/// A flow pair against the camera's motion. For local use: alignment depends on flags.
-template <typename Scalar>
-struct MotionResidual {
-  Vector2<Scalar> r;              // pixel_cur - project(p), px
-  Vector2<Scalar> along;          // J = d project / d z, px/m
-  Scalar sigma_z;                 // of the depth, m
-  Eigen::Matrix<Scalar, 2, 6> M;  // d project / d xi
-};
-
 /// What a pair says of a motion, in units of the noise.
 struct PairTerm {
   double weight = 0;       // of a Geman-McClure loss; 0 of what is not finite
@@ -33,6 +24,23 @@ struct PairTerm {
 
 inline namespace CFP_ISA {
 
+/// A flow pair against the camera's motion. For local use: alignment depends on flags.
+template <typename Scalar>
+struct MotionResidual {
+  Vector2<Scalar> r;          // pixel_cur - project(p), px
+  Vector2<Scalar> along;      // J = d project / d z, px/m
+  Scalar sigma_z;             // of the depth, m
+  Vector3<Scalar> point;      // in the current camera, m
+  Matrix23<Scalar> jacobian;  // d project / d point
+
+  [[nodiscard]] CFP_INLINE Eigen::Matrix<Scalar, 2, 6> M() const noexcept {  // d project / d xi
+    Eigen::Matrix<Scalar, 2, 6> result;
+    result.template leftCols<3>() = jacobian;
+    for (int row = 0; row < 2; ++row) result.template block<1, 3>(row, 3) = cross(point, jacobian.row(row)).transpose();
+    return result;
+  }
+};
+
 /// At depth z. False for a pixel without a ray or a point behind the current camera.
 template <typename Camera, typename Scalar>
 [[nodiscard]] CFP_INLINE bool motion_residual(const Vector2<Scalar>& pixel_prev, const Scalar& z,
@@ -40,14 +48,12 @@ template <typename Camera, typename Scalar>
                                               const Camera& camera, MotionResidual<Scalar>& out) noexcept {
   Vector3<Scalar> ray;
   if (!camera.unproject(pixel_prev, ray)) return false;
-  const Vector3<Scalar> turned = T_cur_prev.rotation * ray, point = turned * z + T_cur_prev.translation;
+  const Vector3<Scalar> turned = T_cur_prev.rotation * ray;
+  out.point = turned * z + T_cur_prev.translation;
   Vector2<Scalar> projected;
-  Matrix23<Scalar> jacobian;
-  if (!camera.project(point, projected, &jacobian)) return false;
+  if (!camera.project(out.point, projected, &out.jacobian)) return false;
   out.r = pixel_cur - projected;
-  out.along = jacobian.lazyProduct(turned);
-  out.M.template leftCols<3>() = jacobian;
-  for (int row = 0; row < 2; ++row) out.M.template block<1, 3>(row, 3) = cross(point, jacobian.row(row)).transpose();
+  out.along = out.jacobian.lazyProduct(turned);
   return true;
 }
 
@@ -115,7 +121,7 @@ PairTerm add_pair(const Eigen::Matrix<double, 2, N>& M, const Vector2<double>& r
 template <typename Scalar>
 PairTerm add_pair(const MotionResidual<Scalar>& pair, double sigma_px, const Vector6<double>& moved,
                   NormalEquations<6>& sums) noexcept {
-  const Eigen::Matrix<double, 2, 6> M = pair.M.template cast<double>() / sigma_px;
+  const Eigen::Matrix<double, 2, 6> M = pair.M().template cast<double>() / sigma_px;
   return add_pair<6>(M, pair.r.template cast<double>() / sigma_px,
                      (pair.along * pair.sigma_z).template cast<double>() / sigma_px, moved, sums);
 }
