@@ -170,6 +170,15 @@ TEST_CASE("Points that all coincide, anywhere, tell neither rotation nor scale",
   }
 }
 
+TEST_CASE("An octahedron and its mirror image fix no rotation", "[evaluation]") {
+  Points<double> from, to;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double side : {-1.0, 1.0}) from.push_back(side * cfp::Vector3<double>::Unit(axis));
+  }
+  for (const auto& p : from) to.push_back(-p);
+  CHECK(align(from, to, false).status == cfp::Status::degenerate);
+}
+
 TEST_CASE("Mirror-symmetric points that are turned about one axis are aligned exactly", "[evaluation]") {
   cfp::Random random(32, "symmetric");
   for (int round = 0; round < 500; ++round) {

@@ -67,6 +67,10 @@ TEST_CASE("One keypoint's weight is the frame's, in both stages and with every f
     check();
     run.fine(options);
     check();
+    cfp::weigh_keypoints<double>({}, options, run.state);  // a host that keeps no M
+    for (std::size_t i = 0; i < run.m.size(); ++i)
+      CHECK(cfp::keypoint_weight(i, -1, options, run.state) == run.state.weight[i]);
+    cfp::weigh_keypoints(m, options, run.state);
     if (wall_points == 4 && rule == cfp::WeightRule::product)
       CHECK(run.state.report.health.fallback == cfp::WeightFallback::all);
     if (wall_points == 700) CHECK(run.state.report.health.fallback == cfp::WeightFallback::none);

@@ -104,7 +104,7 @@ template <typename From, typename To>
     const double t = shift[c] * unit;
     S.translation[c] = is_finite(t) ? t : 0;
   }
-  result.status = d[1] > Tolerance<double>::degenerate * d[0] ? Status::ok : Status::degenerate;
+  result.status = d[1] + d[2] > Tolerance<double>::degenerate * d[0] ? Status::ok : Status::degenerate;
   return result;
 }
 

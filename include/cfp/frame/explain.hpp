@@ -126,8 +126,8 @@ template <typename Scalar>
   }
   e.static_probability = static_cast<double>(state.static_probability[i]);
   e.map_point_probability = static_cast<double>(map_point_probability);
-  e.reason = !(map_point_probability >= Scalar(0))                     ? WeightReason::keypoint_alone
-             : is_raised(e.label, state.report.health.fallback)        ? WeightReason::fallback
+  e.reason = is_raised(i, map_point_probability, state)                ? WeightReason::fallback
+             : !(map_point_probability >= Scalar(0))                   ? WeightReason::keypoint_alone
              : is_mismatched(i, map_point_probability, options, state) ? WeightReason::mismatch
                                                                        : WeightReason::map_point;
   e.weight = static_cast<double>(keypoint_weight(i, map_point_probability, options, state));

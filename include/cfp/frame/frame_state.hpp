@@ -136,6 +136,7 @@ struct FrameState {
                                            ///< boxes where it moves alone
   std::vector<Scalar> static_probability;  ///< per keypoint: K
   std::vector<Scalar> weight;              ///< per keypoint: what the pose is to use
+  bool all_observe = false;                ///< they were asked for without M: each counts as an observation
   FrameReport report;
   FrameScratch<Scalar> scratch;
 

@@ -95,11 +95,11 @@ class StaticProbability {
     return cfp::may_create_map_point(static_probability(keypoint, Scalar(-1)), options_);
   }
 
-  /// Forgets tracks and frames: after a jump in time or of the camera.
+  /// Forgets tracks and frames: after a jump in time or of the camera. The keypoints of the frame that was the last one
+  /// keep what is known of them until the next.
   void reset() noexcept {
     tracker_.reset();
     state_.previous.known = state_.current.known = false;
-    state_.boxes.clear();
     state_.report = {};
   }
 

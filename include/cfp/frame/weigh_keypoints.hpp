@@ -118,14 +118,22 @@ template <typename Scalar>
   return observation_weight(k, map_point_probability);
 }
 
+/// Whether the frame's fallback raises the weight of keypoint i: of those that observe a map point, with M, or of all
+/// where the host keeps none.
+template <typename Scalar>
+[[nodiscard]] bool is_raised(std::size_t i, non_deduced<Scalar> map_point_probability,
+                             const FrameState<Scalar>& state) noexcept {
+  return (map_point_probability >= Scalar(0) || state.all_observe) &&
+         is_raised(state.label[i], state.report.health.fallback);
+}
+
 /// The weight of keypoint i for a map point of probability M, the frame's fallback included.
 template <typename Scalar>
 [[nodiscard]] Scalar keypoint_weight(std::size_t i, non_deduced<Scalar> map_point_probability,
                                      const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
   CFP_ASSERT(i < state.size());
-  return map_point_probability >= Scalar(0) && is_raised(state.label[i], state.report.health.fallback)
-             ? Scalar(1)
-             : model_weight(i, map_point_probability, options, state);
+  return is_raised(i, map_point_probability, state) ? Scalar(1)
+                                                    : model_weight(i, map_point_probability, options, state);
 }
 
 /// M of the map point that keypoint i observes, after this frame: it learns from K, once the constraints were asked,
@@ -170,6 +178,7 @@ void weigh_keypoints(span<const non_deduced<Scalar>> map_point_probability, cons
                      FrameState<Scalar>& state) noexcept {
   CFP_ASSERT(detail::fits(state.size(), map_point_probability));
   state.report.mismatched = 0;
+  state.all_observe = map_point_probability.empty();
   for (std::size_t i = 0; i < state.size(); ++i) {
     const Scalar m = detail::map_point_at(map_point_probability, i);
     state.weight[i] = model_weight(i, m, options, state);

@@ -63,8 +63,9 @@ inline namespace CFP_ISA {
 /// (cfp_tracker_study). False, and `motion` stays, where that is nothing, where D is half a pixel or less, and below 12
 /// pairs.
 ///
-/// The caller leaves out what moves by itself; of the rest, less than half may be wrong. Coordinates finite and within
-/// +-1e6 px. `distances` is scratch memory. O(pairs), allocates only while it grows.
+/// The caller leaves out what moves by itself; of the rest, less than half may be wrong, less than a quarter where
+/// these stay in their place. Coordinates finite and within +-1e6 px. `distances` is scratch memory. O(pairs),
+/// allocates only while it grows.
 template <typename Scalar>
 [[nodiscard]] bool image_motion(const PointSpan<Scalar, 2>& prev, const PointSpan<non_deduced<Scalar>, 2>& cur,
                                 std::vector<non_deduced<Scalar>>& distances, Matrix3<non_deduced<Scalar>>& motion) {

@@ -70,8 +70,9 @@ template <typename Scalar, typename Covariance>
   return motion;
 }
 
-/// The motion in the next time_s of a camera that keeps its velocity but for an acceleration, the standard deviation of
-/// each coordinate of which is given; how it turns may change at will. Both times above 0.
+/// The motion in the next time_s of a camera that keeps its velocity, as its own axes see it, but for an acceleration,
+/// the standard deviation of each coordinate of which is given; how it turns may change at will. What keeps its
+/// velocity in the world errs by more than that from 3 rad/s on. Both times above 0.
 template <typename Scalar>
 [[nodiscard]] UncertainMotion<Scalar> predicted_motion(const TimedMotion<Scalar>& last, non_deduced<Scalar> time_s,
                                                        non_deduced<Scalar> acceleration_m_s2) noexcept {

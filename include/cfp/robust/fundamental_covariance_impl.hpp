@@ -11,6 +11,20 @@
 namespace cfp::detail {
 inline namespace CFP_ISA {
 
+// By how much a covariance by the weighted sum of squares is too large, in the mean, where weights are no information,
+// the inverse variances of the pairs: sum of w^2 s^4 d^2 over that of w s^4 d^2, s the root of the loss's weight at d.
+[[nodiscard]] inline double weight_in_covariance(const PairArrays& pairs, span<const double> distances_sq,
+                                                 double scale) noexcept {
+  double with_squares = 0, with_weights = 0;
+  for (std::size_t i = 0; i < pairs.size; ++i) {
+    const double w = pairs.row(score_weight)[i], root = scale / (scale + distances_sq[i]), share = root * root;
+    if (!is_finite(distances_sq[i])) continue;
+    with_weights += w * share * share * distances_sq[i];
+    with_squares += w * w * share * share * distances_sq[i];
+  }
+  return with_weights > 0 ? with_squares / with_weights : 1;
+}
+
 // The covariance of F in pixels, of unit norm: F, of scaled pixels, was fitted to pairs of this variance under a loss
 // of this many variances. Zero where they do not tell it.
 template <typename T>

@@ -173,8 +173,9 @@ template <typename Scalar>
 [[nodiscard]] FundamentalCovariance fundamental_covariance(const FundamentalResult<Scalar>& result,
                                                            const FundamentalRansacWorkspace& workspace) noexcept {
   if (!result.found()) return FundamentalCovariance::Zero();
-  return detail::covariance_in_pixels(workspace.pairs, workspace.F, workspace.noise_variance,
-                                      detail::FundamentalSearch<double>::final_scale);
+  constexpr double loss = detail::FundamentalSearch<double>::final_scale;
+  return detail::weight_in_covariance(workspace.pairs, workspace.distances_sq, loss * workspace.noise_variance) *
+         detail::covariance_in_pixels(workspace.pairs, workspace.F, workspace.noise_variance, loss);
 }
 
 }  // namespace CFP_ISA
