@@ -127,13 +127,18 @@ TEST_CASE("Without a frame before, and without matches, stage 1 stands", "[frame
   fine = host.probability.fine({scene.T_cur_prev, 300}, {}, host.m);
   CHECK(fine.report.stage == Stage::coarse);
   CHECK(fine.report.unmatched_foreground == fine.report.foreground);
-  std::vector<double> known;
-  for (std::size_t i = 0; i < host.m.size(); ++i) known.push_back(host.probability.static_probability(i, -1));
-  host.probability.reset();
-  for (std::size_t i = 0; i < host.m.size(); ++i)  // the frame's keypoints still make map points
-    CHECK(host.probability.static_probability(i, -1) == known[i]);
-  host.probability.coarse(host.current());
-  CHECK(host.probability.state().previous_boxes.empty());
+  for (const bool matched : {false, true}) {
+    if (matched) fine = host.probability.fine({scene.T_cur_prev, 300}, scene.match, host.m);
+    CHECK((fine.report.stage == Stage::fine) == matched);
+    std::vector<double> known;
+    for (std::size_t i = 0; i < host.m.size(); ++i) known.push_back(host.probability.static_probability(i, -1));
+    host.probability.reset();
+    for (std::size_t i = 0; i < host.m.size(); ++i)  // the frame's keypoints still make map points
+      CHECK(host.probability.static_probability(i, -1) == known[i]);
+    host.probability.coarse(host.current());
+    CHECK(host.probability.state().previous_boxes.empty());
+    if (!matched) host.probability.coarse(host.current());
+  }
   CHECK(host.probability.fine({scene.T_cur_prev, 300}, scene.match).report.stage == Stage::coarse);
 }
 

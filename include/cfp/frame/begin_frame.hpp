@@ -69,9 +69,12 @@ void begin_frame(const Frame<Scalar>& frame, FrameState<Scalar>& state) {
   }
   state.weight = state.static_probability;
   detail::reserve_scratch((std::max)(n, frame.flow.current.size()), state.scratch);
+  if (!state.previous.known) {
+    state.boxes.clear();
+    state.report = {};
+  }
   std::swap(state.previous_boxes, state.boxes);
   state.boxes.clear();
-  if (!state.previous.known) state.previous_boxes.clear();
   state.objects.clear();
   FrameReport report;
   report.frames_without_detections = state.report.frames_without_detections;

@@ -27,11 +27,10 @@ inline namespace CFP_ISA {
 template <typename Scalar>
 [[nodiscard]] Scalar flow_sigma(span<Scalar> distances, int coordinates, int parameters,
                                 const CameraMotionOptions& options) noexcept {
-  const auto told =
-      coordinates * static_cast<int>(std::count_if(distances.begin(), distances.end(), has_distance<Scalar>));
-  const Scalar free = std::sqrt(Scalar(told) / Scalar((std::max)(told - parameters, 1)));
-  return std::clamp(free * robust_sigma(distances, coordinates), Scalar(options.min_sigma_px),
-                    Scalar(options.max_sigma_px));
+  const span<Scalar> kept = distances.subspan(0, copy_distances(span<const Scalar>(distances), distances));
+  const auto told = static_cast<Scalar>(kept.size()) * static_cast<Scalar>(coordinates);
+  const Scalar free = std::sqrt(told / (std::max)(told - static_cast<Scalar>(parameters), Scalar(1)));
+  return std::clamp(free * robust_sigma(kept, coordinates), Scalar(options.min_sigma_px), Scalar(options.max_sigma_px));
 }
 
 /// The pairs that tell, those with a point in workspace.points, and what can be had of them.
@@ -80,11 +79,11 @@ struct PairsWithDepth {
   [[nodiscard]] CameraMotion<Scalar> refine(Scalar sigma_px, const PoseOptions& rounds, SE3<double>& T) const {
     const SE3<Scalar> so_far = T.template cast<Scalar>();
     workspace.sigmas.clear();
-    workspace.depth_share = 0;
+    Scalar depth_share = 0;  // of what they add to the variances of the pixels, the mean
     for (std::size_t i = 0; i < workspace.points.size(); ++i) {
       const Scalar of_pixel = pixel_sigma_of(i, sigma_px), of_depth = tells(i) ? depth_variance_of(i, so_far) : 0;
       workspace.sigmas.push_back(std::sqrt(of_pixel * of_pixel + of_depth));
-      workspace.depth_share += of_depth / (of_pixel * of_pixel * static_cast<Scalar>(workspace.taken));
+      depth_share += of_depth / (of_pixel * of_pixel);
     }
     PoseObservations<Scalar> observations;
     observations.points = workspace.points;
@@ -102,13 +101,13 @@ struct PairsWithDepth {
     motion.T_cur_prev = T.template cast<Scalar>();
     motion.covariance = covariance.template cast<Scalar>();
     motion.sigma_px = noise_under(T, sigma_px);
-    return motion;
+    return depth_share > Scalar(0.1) * static_cast<Scalar>(workspace.taken) ? settle(motion) : motion;
   }
 
-  /// Two Gauss-Newton steps from a refined motion where the errors of the depths show, over a tenth of the variances:
-  /// they lie along the line alone, and not in both coordinates as refine_pose has to take them.
+  /// Two Gauss-Newton steps from a refined motion, with the errors of the depths along the line alone and not in both
+  /// coordinates, as refine_pose has to take them.
   [[nodiscard]] CameraMotion<Scalar> settle(CameraMotion<Scalar> motion) const {
-    for (int step = 0; motion.known && workspace.depth_share > Scalar(0.1) && step < 2; ++step) {
+    for (int step = 0; step < 2; ++step) {
       NormalEquations<6> sums;
       double weight = 0, agreeing = 0;
       MotionResidual<Scalar> pair;
@@ -127,7 +126,7 @@ struct PairsWithDepth {
       const SE3<double> T =
           se3_exp(Vector6<double>(-covariance.lazyProduct(sums.g))) * motion.T_cur_prev.template cast<double>();
       motion.T_cur_prev = T.template cast<Scalar>();
-      motion.covariance = (covariance * (weight / agreeing)).template cast<Scalar>();
+      motion.covariance = (covariance * (weight / agreeing)).template cast<Scalar>();  // H counts by the loss's weights
       motion.sigma_px = noise_under(T, motion.sigma_px);
     }
     return motion;
@@ -197,13 +196,13 @@ template <typename Scalar>
   const CameraMotion<Scalar> first = pairs.refine(Scalar(options.max_sigma_px), options.pose, T);
   const Scalar noise_px = first.known ? first.sigma_px : Scalar(options.max_sigma_px);
   if (!(noise_px > Scalar(options.search_above_px)) || !pairs.search(noise_px, T))
-    return first.known ? pairs.settle(pairs.refine(noise_px, options.pose, T)) : first;
+    return first.known ? pairs.refine(noise_px, options.pose, T) : first;
   // A wide loss would lose what was found again to what moves: a tight one first. The usual one errs less, and counts
   // unless the pairs agree to it less, by more than chance (cfp_camera_motion_study, cfp_object_motion_study).
   const Scalar found_px = pairs.noise_under(T, noise_px);
   const CameraMotion<Scalar> tight = pairs.refine(found_px, detail::last_round(options.pose, 1.0 / 3), T);
   if (!tight.known) return tight;
-  const CameraMotion<Scalar> usual = pairs.settle(pairs.refine(tight.sigma_px, detail::last_round(options.pose, 1), T));
+  const CameraMotion<Scalar> usual = pairs.refine(tight.sigma_px, detail::last_round(options.pose, 1), T);
   return usual.known && usual.sigma_px <= tight.sigma_px * (1 + 20 / static_cast<Scalar>(workspace.taken)) ? usual
                                                                                                            : tight;
 }

@@ -48,8 +48,7 @@ template <typename Scalar>
 struct CameraMotionWorkspace {
   std::vector<std::array<Scalar, 3>> points;  // of the pairs, in the previous camera; NaN: takes no part
   std::size_t taken = 0;                      // of them
-  Scalar near_m{};       // a point nearer than that tells no more of the translation than one there
-  Scalar depth_share{};  // what the errors of the depths add to the variances of the pixels, in the mean, of these
+  Scalar near_m{};  // a point nearer than that tells no more of the translation than one there
   detail::PointGrid<Scalar> grid;
   std::vector<Scalar> sigmas, distances;
   PoseWorkspace<Scalar> pose;

@@ -78,7 +78,7 @@ template <typename Scalar>
   }
   workspace.taken -= left_out.size();
   SE3<double> T = se3_exp(step) * motion.T_cur_prev.template cast<double>();
-  const CameraMotion<Scalar> rest = pairs.settle(pairs.refine(motion.sigma_px, detail::last_round(options.pose, 1), T));
+  const CameraMotion<Scalar> rest = pairs.refine(motion.sigma_px, detail::last_round(options.pose, 1), T);
   if (rest.known && !detail::err_together(pairs, rest)) return rest;
   workspace.taken += left_out.size();
   for (const auto& point : left_out) workspace.points[point.index][0] = point.x;

@@ -100,7 +100,6 @@ class StaticProbability {
   void reset() noexcept {
     tracker_.reset();
     state_.previous.known = state_.current.known = false;
-    state_.report = {};
   }
 
   [[nodiscard]] const Camera& camera() const noexcept { return camera_; }

@@ -92,7 +92,8 @@ template <typename Camera, typename Scalar>
     out.r += out.along * (z * z * (mean - inverse));
   } else {
     const Scalar spread = out.sigma_z / sigma_px;
-    out.sigma_z *= std::sqrt(2 + spread * spread * out.along.squaredNorm());  // W as that of r's square
+    // r has lost a factor 1 + s^2, s = spread |along|, to the depth: W along the line is its square.
+    out.sigma_z *= std::sqrt(2 + spread * spread * out.along.squaredNorm());
   }
   return true;
 }
