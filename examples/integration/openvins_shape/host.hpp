@@ -8,11 +8,11 @@
 #include <functional>
 #include <iterator>
 #include <map>
-#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <Eigen/QR>
 
 #include "cfp/geometry/camera.hpp"
@@ -99,7 +99,10 @@ class UpdaterMSCKF {
   // Returns how many features were used.
   std::size_t update(State& state, const std::vector<Feature>& features,
                      const std::function<double(std::size_t featid)>& weight) const {
-    std::vector<std::pair<Eigen::MatrixXd, Eigen::VectorXd>> used;
+    const Eigen::Index size = state._Cov.rows();
+    Eigen::MatrixXd HtH = Eigen::MatrixXd::Zero(size, size);
+    Eigen::VectorXd Htr = Eigen::VectorXd::Zero(size);
+    std::size_t used = 0;
     for (const Feature& feature : features) {
       const double w = weight(feature.featid);
       Eigen::MatrixXd H;
@@ -107,31 +110,24 @@ class UpdaterMSCKF {
       if (w < 0.5 || !linearize(state, feature, H, r)) continue;  // cfp: below one half it is left out
       const Eigen::MatrixXd S = H * state._Cov * H.transpose() + noise(r.size());
       if (r.dot(S.ldlt().solve(r)) > chi_squared_95(double(r.size()))) continue;
-      used.push_back({std::sqrt(w) * H, std::sqrt(w) * r});  // cfp: its weight
+      HtH += w * H.transpose() * H;  // cfp: its weight
+      Htr += w * H.transpose() * r;
+      ++used;
     }
-    if (used.empty()) return 0;
-    Eigen::Index rows = 0;
-    for (const auto& feature : used) rows += feature.second.size();
-    Eigen::MatrixXd H(rows, state._Cov.rows());
-    Eigen::VectorXd r(rows);
-    rows = 0;
-    for (const auto& [H_of, r_of] : used) {
-      H.middleRows(rows, r_of.size()) = H_of;
-      r.segment(rows, r_of.size()) = r_of;
-      rows += r_of.size();
-    }
-    const Eigen::MatrixXd PHt = state._Cov * H.transpose();
-    const Eigen::LDLT<Eigen::MatrixXd> S(H * PHt + noise(rows));
-    const Eigen::VectorXd dx = PHt * S.solve(r);
-    state._Cov -= (PHt * S.solve(PHt.transpose())).eval();
+    if (used == 0) return 0;
+    // The update by all features at once, compressed to the size of the state.
+    const double variance = sigma_px_ * sigma_px_;
+    const Eigen::MatrixXd kept = Eigen::MatrixXd::Identity(size, size) + state._Cov * HtH / variance;
+    state._Cov = kept.partialPivLu().solve(state._Cov).eval();
     state._Cov = (0.5 * (state._Cov + state._Cov.transpose())).eval();
+    const Eigen::VectorXd dx = state._Cov * Htr / variance;
     Eigen::Index at = 0;
     for (auto& [time, clone] : state._clones) {
       clone.R_GtoC = cfp::so3_exp(Eigen::Vector3d(-dx.segment<3>(at))) * clone.R_GtoC;
       clone.p_CinG += dx.segment<3>(at + 3);
       at += 6;
     }
-    return used.size();
+    return used;
   }
 
  private:

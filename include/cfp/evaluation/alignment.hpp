@@ -30,7 +30,8 @@ struct Similarity {
   Matrix3<double> rotation = Matrix3<double>::Identity();
   Vector3<double> translation = Vector3<double>::Zero();
 
-  [[nodiscard]] CFP_INLINE Vector3<double> operator*(const Vector3<double>& point) const noexcept {
+  template <typename Derived>
+  [[nodiscard]] CFP_INLINE Vector3<double> operator*(const Eigen::MatrixBase<Derived>& point) const noexcept {
     return scale * (rotation * point) + translation;
   }
 };

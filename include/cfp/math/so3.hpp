@@ -50,7 +50,7 @@ template <typename Scalar = double>
 }
 
 template <typename Derived, typename = typename Derived::PlainObject>
-[[nodiscard]] auto so3_exp(const Eigen::MatrixBase<Derived>& w) noexcept {
+[[nodiscard]] Matrix3<typename Derived::Scalar> so3_exp(const Eigen::MatrixBase<Derived>& w) noexcept {
   return so3_exp(Vector3<typename Derived::Scalar>(w));
 }
 

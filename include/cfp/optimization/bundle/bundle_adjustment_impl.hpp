@@ -170,7 +170,7 @@ template <typename Camera, typename Scalar>
 void write_squared_errors(const BundleProblem<Camera, Scalar>& problem, BundleIndex& index,
                           span<double> squared_errors) noexcept {
   CFP_ASSERT(squared_errors.size() == problem.observations.pose.size());
-  read_poses(problem.poses, index);
+  read_poses(problem, index);
   for (std::size_t i = 0; i < squared_errors.size(); ++i) {
     BundleMeasurement m;
     const bool valid = read_measurement(problem, i, m) && index.is_rigid[to_index(m.pose)] != 0;

@@ -85,7 +85,9 @@ template <typename Camera, typename Scalar>
 }
 
 /// The caller's poses as the solver has them, identity where one is no rigid motion.
-inline void read_poses(span<const SE3<double>> poses, BundleIndex& index) {
+template <typename Camera, typename Scalar>
+void read_poses(const BundleProblem<Camera, Scalar>& problem, BundleIndex& index) {
+  const span<const SE3<double>> poses = problem.poses;
   index.caller_poses.assign(poses.size(), {Matrix3<double>::Identity(), Vector3<double>::Zero()});
   index.is_rigid.assign(poses.size(), char(0));
   for (std::size_t k = 0; k < poses.size(); ++k) {
@@ -123,7 +125,7 @@ void select_observations(const BundleProblem<Camera, Scalar>& problem, BundleInd
   index.kept.clear();
   index.pose_number.assign(problem.poses.size(), -1);
   index.point_number.assign(problem.points.size(), -1);
-  read_poses(problem.poses, index);
+  read_poses(problem, index);
   for (std::size_t i = 0; i < n; ++i) {
     BundleMeasurement m;
     if (!read_measurement(problem, i, m)) {
