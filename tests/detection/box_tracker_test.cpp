@@ -286,6 +286,11 @@ TEST_CASE("Between the runs of a slow detector boxes are carried on, however rar
       }
       INFO("every " << n << "th frame");
       CHECK(carried == 5 * std::min(n - 1, std::max(6, max_idle)));
+      // One miss is one, however many frames it stands for.
+      const bool compensated = n <= std::max(6, max_idle);
+      CHECK(tracker.track({}, 1.0 / 30).boxes.size() == (compensated ? 1 : 0));
+      for (int k = 1; k < n; ++k) tracker.coast(1.0 / 30);
+      CHECK(tracker.track(Detections{{{10, 10, 90, 200}, 0, 1}}, 1.0 / 30).boxes[0].id == (compensated ? 1 : 2));
     }
   }
 }
@@ -389,8 +394,9 @@ TEST_CASE("A hundred thousand frames: ids grow, ages and memory stay bounded", "
   std::vector<cfp::Detection<float>> detections;
   std::int64_t newest = 0;
   std::size_t allocations = 0, most_boxes = 0;
-  std::vector<int> age_of_id;
+  std::vector<int> age_of_id, misses_of_id;
   age_of_id.reserve(2000000);
+  misses_of_id.reserve(2000000);
   for (int k = 0; k < 100000; ++k) {
     detections.clear();
     for (const auto& d : scene(noise, 5, k)) {
@@ -414,12 +420,16 @@ TEST_CASE("A hundred thousand frames: ids grow, ages and memory stay bounded", "
         REQUIRE(box.age <= 6);  // a newcomer, or one that waited for its second detection while the detector rested
         newest = box.id;
       }
-      if (age_of_id.size() <= static_cast<std::size_t>(box.id))
+      if (age_of_id.size() <= static_cast<std::size_t>(box.id)) {
         age_of_id.resize(static_cast<std::size_t>(box.id) + 1, -1);
+        misses_of_id.resize(static_cast<std::size_t>(box.id) + 1, 0);
+      }
+      int& misses = misses_of_id[static_cast<std::size_t>(box.id)];
+      misses = box.missed == 0 ? 0 : misses + (coasts ? 0 : 1);
       int& age = age_of_id[static_cast<std::size_t>(box.id)];
       REQUIRE((box.age > age || (box.age == 0 && box.detection >= 0)));  // or it started anew
       age = box.age;
-      REQUIRE((box.missed >= 0 && box.missed <= (coasts ? 30 : 6) && cfp::is_proper(box.box)));
+      REQUIRE((box.missed >= 0 && box.missed <= 30 && misses <= 6 && cfp::is_proper(box.box)));
     }
   }
   CHECK(allocations < 10);  // a rare new maximum of tracks at once, not one per frame

@@ -340,6 +340,9 @@ TEST_CASE("What was found against somebody near is not lost to him again where t
 }
 
 TEST_CASE("A wrong depth among neighbours that agree bends no motion", "[frame][camera_motion]") {
+  // A far pair: beside the image, or at the rim of a fisheye. It is nobody's neighbour, and no measure of near.
+  const bool one_far = GENERATE(false, true);
+  CAPTURE(one_far);
   cfp::Random random(31, "lone depths");
   cfp::CameraMotionWorkspace<double> workspace;
   std::vector<double> errors_m, normalized, all_errors_m;
@@ -361,6 +364,7 @@ TEST_CASE("A wrong depth among neighbours that agree bends no motion", "[frame][
       f.depths.push_back(random.uniform() < 0.15 ? random.uniform(0.5, 8) : z);
       f.outside.push_back(1);
     }
+    if (one_far) f.previous[7] = f.current[7] = {1e5, 1e5};
     const cfp::CameraMotion<double> found =
         cfp::estimate_camera_motion<double>(f.pairs(), f.outside, camera, {}, workspace);
     REQUIRE(found.known);

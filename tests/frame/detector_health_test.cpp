@@ -95,6 +95,11 @@ TEST_CASE("Boxes equal to the last bit are stuck; nothing is not", "[health]") {
   const Boxes same{{{200, 100, 300, 400}, 0, 0.9F}};
   for (int k = 0; k < 3; ++k) CHECK(detector.gives(same) == DetectorStatus::ok);
   for (int k = 0; k < 10; ++k) CHECK(detector.gives(same) == DetectorStatus::stuck);
+  Boxes whole_pixels = same;  // of somebody who sits still
+  for (int k = 0; k < 10; ++k) {
+    whole_pixels[0].score -= 0.01F;
+    CHECK(detector.gives(whole_pixels) == DetectorStatus::ok);
+  }
   CHECK(detector.walks() == DetectorStatus::ok);
   detector.health.reset();
   for (int k = 0; k < 10; ++k) CHECK(detector.gives({}) == DetectorStatus::ok);

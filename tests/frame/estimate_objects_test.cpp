@@ -464,8 +464,8 @@ int called_moving(const char* name, bool with_depths, const Fill& fill, const cf
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     cfp::Random random(seed, name);
     DynamicScene<double> scene;
-    fill(scene, random);
     scene.boxes = {{250, 100, 390, 440}};
+    fill(scene, random);
     FrameRun<double> run(scene);
     cfp::Frame<double> frame = run.frame();
     if (with_depths) frame.flow.previous_depths = scene.depths;
@@ -539,6 +539,36 @@ TEST_CASE("What the rows of a rolling shutter err by hides nobody and moves nobo
   CHECK(called(0, 0) <= 4);
   CHECK(called(1.5, 0) <= 6);
   CHECK(called(1.5, 0.003) >= 95);  // 0.8 px
+}
+
+TEST_CASE("What a lens bends more than it is told hides nobody and moves nobody", "[frame]") {
+  const auto called = [](double k1, double person_motion_m) {
+    return called_moving("lens", true, [&](DynamicScene<double>& scene, cfp::Random& random) {
+      scene.boxes = {{60, 100, 200, 440}};
+      for (int k = 0; k < 3; ++k) scene.T_cur_prev.translation[k] = 0.03 * random.normal();
+      const cfp::Vector3<double> turn(random.normal(), random.normal(), random.normal());
+      scene.T_cur_prev.rotation = cfp::so3_exp(0.01 * turn);
+      const auto bend = [&](std::array<double, 2>& pixel) {
+        const cfp::Vector2<double> middle(scene.camera.cx, scene.camera.cy), at(pixel[0], pixel[1]);
+        const double r_sq = (at - middle).squaredNorm() / (scene.camera.fx * scene.camera.fx);
+        const cfp::Vector2<double> bent = middle + (1 + k1 * r_sq) * (at - middle);
+        pixel = {bent.x(), bent.y()};
+      };
+      const auto add = [&](double x, double y, double z, double shift) {
+        add_pair(scene, {x, y}, z, shift, 0.2, random);
+        bend(scene.previous_keypoints.back());
+        bend(scene.keypoints.back());
+      };
+      for (int k = 0; k < 400; ++k) add(random.uniform(20, 620), random.uniform(20, 460), random.uniform(2.5, 5), 0);
+      for (int k = 0; k < 60; ++k)
+        add(random.uniform(80, 180), random.uniform(120, 420), random.uniform(1.95, 2.05), person_motion_m);
+    });
+  };
+  for (const double k1 : {0.0, 0.03, -0.03, 0.1}) {
+    CAPTURE(k1);
+    CHECK(called(k1, 0) <= 6);
+    CHECK(called(k1, 0.012) >= 90);  // 3 px
+  }
 }
 
 TEST_CASE("What moves slowly beside all boxes makes nobody move who stands", "[frame]") {

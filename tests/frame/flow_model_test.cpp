@@ -139,6 +139,57 @@ TEST_CASE("What neighbours err by together is measured, and the motion is as unc
   }
 }
 
+TEST_CASE("What neighbours err by together is measured under F, too, and a pair far beside the others hides it nowhere",
+          "[frame]") {
+  constexpr double noise = 0.2, shared = 0.4;
+  constexpr int seeds = 40;
+  for (const bool with_depths : {false, true}) {
+    for (const bool one_far : {false, true}) {
+      CAPTURE(with_depths, one_far);
+      double mean_sq = 0;
+      int measured = 0;
+      for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+        cfp::Random random(seed, "shared error of F");
+        const cfp::SE3<double> T = motion(0.15, 0.02);
+        Room room(T, noise, seed);
+        std::array<cfp::Vector2<double>, 12> of_part;
+        for (cfp::Vector2<double>& error : of_part) {
+          error.x() = shared * random.normal();
+          error.y() = shared * random.normal();
+        }
+        std::vector<double> depths;
+        for (std::size_t i = 0; i < room.previous.size(); ++i) {
+          cfp::Vector3<double> ray;
+          cfp::Vector2<double> q;
+          REQUIRE(room.camera.unproject({room.previous[i][0], room.previous[i][1]}, ray));
+          depths.push_back(random.uniform(1.5, 4));
+          REQUIRE(room.camera.project(T * cfp::Vector3<double>(depths[i] * ray), q));
+          const double part = std::floor(room.previous[i][0] / 160) + 4 * std::floor(room.previous[i][1] / 160);
+          q += of_part[static_cast<std::size_t>(part)];
+          q.x() += noise * random.normal();
+          q.y() += noise * random.normal();
+          room.current[i] = {q.x(), q.y()};
+        }
+        if (one_far) room.previous[7] = room.current[7] = {4000, 240};
+        if (!with_depths) depths.clear();
+        cfp::FlowModelWorkspace<double> workspace;
+        cfp::FlowModelOptions options;
+        options.motion.shared_depth_ratio = 0;
+        options.motion.distance.depth_noise = {0, 0, 0};
+        const auto model = cfp::estimate_flow_model<double>({room.previous, room.current, depths}, room.outside,
+                                                            room.camera, options, workspace);
+        if ((model.kind == cfp::FlowModelKind::motion) != with_depths) continue;
+        if (!with_depths && model.kind != cfp::FlowModelKind::fundamental) continue;
+        mean_sq += model.shared_error_px * model.shared_error_px;
+        ++measured;
+      }
+      CHECK(measured >= seeds / 2);
+      CHECK(std::sqrt(mean_sq / measured) > (one_far ? 0.55 : 0.85) * shared);
+      CHECK(std::sqrt(mean_sq / measured) < 1.2 * shared);
+    }
+  }
+}
+
 TEST_CASE("Depths that are too few for a motion do not enter one without scale", "[frame]") {
   const Room room(motion(0, 0.02), 0.2, 7);
   cfp::FlowModelWorkspace<double> workspace;

@@ -364,6 +364,20 @@ TEST_CASE("What came from nowhere has no weight once the constraints were asked"
   run.fine(options);
   CHECK(weight_of(cfp::KeypointLabel::foreground) == 0);
   CHECK(weight_of(cfp::KeypointLabel::background) > 0.9);
+
+  // A fine stage without constraints, by choice or for want of a pose, leaves the weights of the coarse one.
+  for (const bool enabled : {false, true}) {
+    FrameRun<double> unasked(make_dynamic_scene<double>({}, 78));
+    cfp::FrameOptions without = options;
+    without.fine.enabled = enabled;
+    unasked.coarse(without);
+    unasked.state.boxes[0].associated = false;
+    cfp::weigh_keypoints(unasked.m, without, unasked.state);
+    const std::vector<double> coarse = unasked.state.weight;
+    if (enabled) unasked.pose.T_cur_prev.translation[0] = std::numeric_limits<double>::quiet_NaN();
+    CHECK(unasked.fine(without).constrained == 0);
+    CHECK(unasked.state.weight == coarse);
+  }
 }
 
 TEST_CASE("What a host asks of a K and of a weight", "[frame]") {

@@ -28,11 +28,11 @@ class BoxTracker {
   }
 
   /// The next frame, dt_s seconds after the one before (0 for the first). Every detection that counts is output, from
-  /// its first frame on; a track with at least confirm_hits detections is compensated for up to max_coast frames; one
-  /// with fewer ends with the first miss. A detection that no track takes by its overlap, but that is within
-  /// restart_gate of one without a detection, starts that track anew, with its id. image_motion, when given, maps
-  /// pixels of the frame before to this one (see `warp_box`) and is applied to the predictions: hand it over when the
-  /// camera turns fast.
+  /// its first frame on; a track with at least confirm_hits detections is compensated for up to max_coast such frames
+  /// in a row, those between on which the detector did not run apart; one with fewer ends with the first miss. A
+  /// detection that no track takes by its overlap, but that is within restart_gate of one without a detection, starts
+  /// that track anew, with its id. image_motion, when given, maps pixels of the frame before to this one (see
+  /// `warp_box`) and is applied to the predictions: hand it over when the camera turns fast.
   BoxTrackerResult<Scalar> track(span<const Detection<Scalar>> detections, Scalar dt_s,
                                  const Matrix3<Scalar>* image_motion = nullptr) {
     BoxTrackerResult<Scalar> result = advance(dt_s, image_motion);
@@ -66,8 +66,8 @@ class BoxTracker {
   // The box is the predicted one, until a detection replaces it.
   struct Track : TrackedBox<Scalar> {
     BoxFilter<Scalar> filter;
-    int hits = 0;
-    bool shown = false;  // in the output of the frame before
+    int hits = 0, misses = 0;  // misses: in a row, of frames on which the detector ran
+    bool shown = false;        // in the output of the frame before
   };
   struct Candidate : Detection<Scalar> {
     int index = -1;
@@ -120,7 +120,7 @@ class BoxTracker {
     track.box = candidate.box;
     track.score = candidate.score;
     track.detection = candidate.index;
-    track.missed = 0;
+    track.missed = track.misses = 0;
     track.hits = next_count(track.hits);
   }
 
@@ -176,11 +176,12 @@ class BoxTracker {
   void output(BoxTrackerResult<Scalar>& result, bool detector_ran) {
     output_.clear();
     std::size_t kept = 0;
-    const int longest = detector_ran ? options_.max_coast : (std::max)(options_.max_coast, options_.max_idle);
+    const int longest = (std::max)(options_.max_coast, options_.max_idle);
     for (Track& track : tracks_) {
+      if (detector_ran && track.compensated()) track.misses = next_count(track.misses);
       const bool shown = track.missed <= longest;
-      const bool trusted =
-          shown && track.hits >= options_.confirm_hits && track.missed <= options_.coast_per_hit * track.hits;
+      const bool trusted = shown && track.hits >= options_.confirm_hits && track.misses <= options_.max_coast &&
+                           track.misses <= options_.coast_per_hit * track.hits;
       if (track.compensated() && ((detector_ran && !trusted) || !clip_to_image(track.box))) continue;
       if (shown) {
         track.associated = track.shown;

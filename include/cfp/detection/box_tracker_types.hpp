@@ -47,7 +47,7 @@ struct BoxTrackerOptions {
   /// detections below extend a track but start none (and are not output when they extend none)
   double birth_threshold = -1e300;
   int confirm_hits = 2;  ///< detections before a missed one may be compensated, >= 1
-  int max_coast = 6;     ///< missed frames in a row that are compensated, >= 0 (the paper's figure shows six)
+  int max_coast = 6;     ///< misses in a row that are compensated, >= 0 (the paper's figure shows six)
   /// the same while the detector does not run, for tracks of one detection, too; counts where it is more than
   /// max_coast, >= 0. Longer a track goes on without a box, until the detector runs (cfp_posterior_study)
   int max_idle = 30;

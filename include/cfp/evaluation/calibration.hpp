@@ -23,7 +23,8 @@ struct AucResult {
   Status status = Status::not_enough_data;  ///< degenerate: only one of the classes; auc is 0.5 and the rest valid
 };
 
-/// One row of the reliability table. Bin b holds probabilities in [b / n, (b + 1) / n), the last one 1 as well.
+/// One row of the reliability table. Bin b holds probabilities in [b / n, (b + 1) / n), but for rounding, the last one
+/// 1 as well.
 struct ReliabilityBin {
   std::size_t count = 0;
   double mean_probability = 0;  ///< 0 for an empty bin

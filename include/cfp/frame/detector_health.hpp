@@ -17,7 +17,7 @@ namespace cfp {
 struct DetectorHealthOptions {
   int silent_after = 3;         ///< frames in a row without a box, after boxes that did not leave the view; >= 1
   int believed_after = 90;      ///< frames of silence after which there is nothing to be seen, >= silent_after
-  int stuck_after = 3;          ///< repetitions of the same boxes to the last bit, >= 1
+  int stuck_after = 3;          ///< repetitions of the same boxes and scores to the last bit, >= 1
   int confirmed_after = 10;     ///< frames with a box before its absence is silence; false boxes are shorter; >= 1
   double border_share = 0.03;   ///< of the width: a box so near to the left or right border, and
   double leaving_share = 0.15;  ///< narrower than this share of it, is of somebody who leaves; both in [0, 0.5]
@@ -54,7 +54,7 @@ inline namespace CFP_ISA {
   return {};
 }
 
-/// Whether the box of a detection is none, or has most of the image in it.
+/// Whether the box of a detection is none, or has most of the image in it, or its score is no number.
 template <typename Scalar>
 [[nodiscard]] bool is_absurd(const Detection<Scalar>& detection, const DetectorHealthOptions& options) noexcept {
   if (!is_proper(detection.box) || !(detection.score == detection.score)) return true;
@@ -109,7 +109,8 @@ class DetectorHealth {
  private:
   [[nodiscard]] bool repeats(span<const Detection<Scalar>> now) const noexcept {
     const auto same = [](const Detection<Scalar>& a, const Detection<Scalar>& b) {
-      return a.box.x1 == b.box.x1 && a.box.y1 == b.box.y1 && a.box.x2 == b.box.x2 && a.box.y2 == b.box.y2;
+      return a.box.x1 == b.box.x1 && a.box.y1 == b.box.y1 && a.box.x2 == b.box.x2 && a.box.y2 == b.box.y2 &&
+             a.score == b.score;
     };
     return !now.empty() && std::equal(now.begin(), now.end(), last_.begin(), last_.end(), same);
   }

@@ -98,10 +98,9 @@ template <typename Scalar>
   CameraMotion<Scalar> motion = estimate_camera_motion(flow, outside, camera, options.motion, workspace);
   if (!motion.known) return {};
   motion = leave_out_moving_parts(motion, flow, camera, options.motion, workspace);
-  const bool straightened =
-      !given && straighten(camera, options.motion, workspace, state.scratch.straight, flow, motion);
-  const SharedError shared =
-      shared_error<Scalar>({flow, camera, options.motion, workspace}, motion, straightened ? 9 : 6);
+  const int parameters =
+      given ? 6 : straighten(camera, options.motion, workspace, true, state.scratch.straight, flow, motion);
+  const SharedError shared = shared_error<Scalar>({flow, camera, options.motion, workspace}, motion, parameters);
   FlowModel<Scalar> model = model_of(motion, remember_shared_error(shared, state));
   const double time_s = elapsed_s(state), acceleration = options.camera_acceleration_m_s2;
   const TimedMotion<double>& last = state.previous.motion;
@@ -121,9 +120,10 @@ template <typename Scalar>
                                                      FrameState<Scalar>& state) {
   FlowModelWorkspace<Scalar>& workspace = state.scratch.flow;
   const auto take_out = [&](FlowPairs<Scalar>& pairs, CameraMotion<Scalar>& motion) {
-    const bool taken = straighten(camera, options.motion, workspace.motion, state.scratch.straight, pairs, motion);
+    const int parameters =
+        straighten(camera, options.motion, workspace.motion, false, state.scratch.straight, pairs, motion);
     flow.current = pairs.current;
-    return taken ? 8 : 6;
+    return parameters;
   };
   return estimate_without_depths(flow, span<const char>(state.scratch.outside), camera, options, workspace, take_out);
 }

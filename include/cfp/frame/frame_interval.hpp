@@ -17,7 +17,8 @@ class FrameInterval {
   /// 0.2 s: over less, a velocity may be believed. A time that does not grow is no gap, and is not learnt, but for
   /// the second of two in a row that grow: the one before them was wrong, or the clock was set. The usual interval
   /// follows, by a fifth a frame: within some ten frames of a change by a few times, so that a recording that
-  /// becomes slower has no gap after each of its frames.
+  /// becomes slower has no gap after each of its frames. It begins at the first interval, or at 0.2 s if that is
+  /// longer: a recording of one frame a second has four gaps, then none.
   bool is_gap(double time_s) noexcept {
     const double dt = time_s - last_s_;
     const bool known = is_finite(last_s_);

@@ -36,7 +36,7 @@ struct ImagePart {
   }
 };
 
-/// 4 x 4 parts of the extent of a grid's points. For local use: alignment depends on flags.
+/// 4 x 4 parts of a grid. For local use: alignment depends on flags.
 struct ImageParts {
   static constexpr std::size_t side = 4;
   std::array<ImagePart, side * side> parts;

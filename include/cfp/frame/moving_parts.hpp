@@ -37,7 +37,7 @@ template <typename Scalar>
 /// by together, over a tenth of the noise.
 template <typename Scalar>
 [[nodiscard]] bool err_together(const PairsWithDepth<Scalar>& pairs, const CameraMotion<Scalar>& motion) noexcept {
-  SmoothErrorFit<Scalar> smooth{pairs, motion.T_cur_prev.template cast<double>()};
+  SmoothErrorFit<Scalar> smooth{pairs, motion.T_cur_prev.template cast<double>(), false};
   if (smooth.step(motion.sigma_px) && smooth.stands_out()) return true;
   const double most_px = 0.1 * static_cast<double>(motion.sigma_px);
   return shared_error(pairs, motion, 6).error_sq > most_px * most_px;

@@ -50,7 +50,7 @@ template <typename Scalar>
 [[nodiscard]] std::size_t leave_out_lone_depths(const PointSpan<Scalar, 2>& pixels, Scalar ratio,
                                                 span<std::array<Scalar, 3>> points, PointGrid<Scalar>& grid) {
   const auto takes_part = [&](std::size_t i) { return is_finite(points[i][0]); };
-  fill_grid(pixels, takes_part, Scalar(0), grid);  // the reach follows from their extent
+  fill_grid(pixels, takes_part, Scalar(0), grid, true);  // the reach follows from the extent of the cells
   const std::size_t taken = grid.points.size();
   Scalar nearest = std::numeric_limits<Scalar>::infinity(), farthest = 0;
   for (const auto& point : grid.points) {

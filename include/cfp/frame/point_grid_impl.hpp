@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <numeric>
@@ -11,6 +12,7 @@
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/core/types.hpp"
+#include "cfp/math/order_statistic.hpp"
 
 namespace cfp::detail {
 
@@ -21,13 +23,14 @@ struct PointGrid {
     Scalar x, y;
     std::uint32_t index;  // in what the grid was made of
   };
-  std::vector<Point> points;         // by cell, row by row; of one cell by index
-  std::vector<Point> unsorted;       // while the grid is filled; free afterwards
-  std::vector<std::uint32_t> first;  // of each cell
-  Scalar left = 0, top = 0, width = 0, height = 0, reach = 0;
+  std::vector<Point> points;                                   // by cell, row by row; of one cell by index
+  std::vector<Point> unsorted;                                 // while the grid is filled; free afterwards
+  std::vector<std::uint32_t> first;                            // of each cell
+  std::array<Scalar, 2> low = {}, high = {};                   // of the points
+  Scalar left = 0, top = 0, width = 0, height = 0, reach = 0;  // of the cells, but for what the outermost hold beyond
   Scalar columns_per_px = 0, rows_per_px = 0;
 
-  static constexpr std::size_t side = 32;  // columns, and rows, over the extent of the points
+  static constexpr std::size_t side = 32;  // columns, and rows
 };
 
 inline namespace CFP_ISA {
@@ -39,9 +42,11 @@ template <typename Scalar>
   return static_cast<std::uint32_t>((std::min)((std::max)(Scalar(0), offset * cells_per_px), last));
 }
 
-/// Puts those of the points for which `keep(index)` holds, all finite, into cells. Later `reach` is how near is near.
+/// Puts those of the points for which `keep(index)` holds, all finite, into cells over the extent of all of them or,
+/// `over_most`, of most. Later `reach` is how near is near.
 template <typename Scalar, typename Keep>
-void fill_grid(const PointSpan<Scalar, 2>& points, const Keep& keep, Scalar reach, PointGrid<Scalar>& grid) {
+void fill_grid(const PointSpan<Scalar, 2>& points, const Keep& keep, Scalar reach, PointGrid<Scalar>& grid,
+               bool over_most = false) {
   const std::size_t most = points.size();
   grid.points.reserve(most), grid.unsorted.reserve(most);
   grid.unsorted.clear();
@@ -53,8 +58,13 @@ void fill_grid(const PointSpan<Scalar, 2>& points, const Keep& keep, Scalar reac
     low = low.cwiseMin(points[i]), high = high.cwiseMax(points[i]);
   }
   constexpr std::size_t side = PointGrid<Scalar>::side;
-  const Vector2<Scalar> size = high - low;
-  grid.left = low.x(), grid.top = low.y(), grid.width = size.x(), grid.height = size.y(), grid.reach = reach;
+  grid.low = {low.x(), low.y()}, grid.high = {high.x(), high.y()};
+  std::array<Scalar, 2> x = {low.x(), high.x()}, y = {low.y(), high.y()};
+  if (over_most) {
+    x = extent_of_most<Scalar>(grid.unsorted.size(), [&](std::size_t i) { return grid.unsorted[i].x; });
+    y = extent_of_most<Scalar>(grid.unsorted.size(), [&](std::size_t i) { return grid.unsorted[i].y; });
+  }
+  grid.left = x[0], grid.top = y[0], grid.width = x[1] - x[0], grid.height = y[1] - y[0], grid.reach = reach;
   grid.columns_per_px = Scalar(side) / grid.width, grid.rows_per_px = Scalar(side) / grid.height;
   const auto cell = [&](const auto& p) {
     return cell_at(p.y - grid.top, grid.rows_per_px) * side + cell_at(p.x - grid.left, grid.columns_per_px);
@@ -71,8 +81,8 @@ void fill_grid(const PointSpan<Scalar, 2>& points, const Keep& keep, Scalar reac
 template <typename Scalar, typename Visit>
 CFP_INLINE void visit_near(const PointGrid<Scalar>& grid, Scalar x, Scalar y, const Visit& visit) {
   const Scalar from_left = x - grid.left, from_top = y - grid.top;
-  if (!(from_left >= -grid.reach && from_left - grid.width <= grid.reach && from_top >= -grid.reach &&
-        from_top - grid.height <= grid.reach))
+  if (!(x >= grid.low[0] - grid.reach && x <= grid.high[0] + grid.reach && y >= grid.low[1] - grid.reach &&
+        y <= grid.high[1] + grid.reach))
     return;
   const auto column = [&](Scalar offset) { return cell_at(from_left + offset, grid.columns_per_px); };
   const auto row = [&](Scalar offset) { return cell_at(from_top + offset, grid.rows_per_px); };

@@ -58,43 +58,42 @@ struct ResidualPart {
 };
 
 /// The error that pairs share under what was fitted to them: `tells(i)`, whether pair i was, `residual(i, out)`, its
-/// residual, false without one. In each of 4 x 3 parts of what they cover the mean of n residuals has the variance
-/// sigma^2 / n + e^2 per coordinate; e is had from the upper quartile of the parts, as what errs may be a part of the
-/// image, and what moves there may be another. So many parameters were fitted to the two coordinates of all n parts:
-/// e^2 is n / (n - parameters / 2) times what is left of it, and n times at most. Not known of fewer than four parts
-/// with five pairs that agree.
+/// residual, false without one. In each of 4 x 3 parts of what most of them cover the mean of n residuals has the
+/// variance sigma^2 / n + e^2 per coordinate; e is had from the upper quartile of the parts, as what errs may be a part
+/// of the image, and what moves there may be another. To n parts, each of which tells two coordinates, or one where a
+/// depth may be anything, so many parameters were fitted: e^2 is n / (n - parameters / coordinates) times what is left
+/// of it, and n times at most. Not known of fewer than four parts with five pairs that agree.
 template <typename Scalar, typename Tells, typename Residual>
 [[nodiscard]] SharedError shared_error(const FlowPairs<Scalar>& flow, Scalar sigma_px, int parameters, Tells&& tells,
                                        Residual&& residual) noexcept {
   constexpr std::size_t columns = 4, rows = 3, fewest_parts = 4;
   constexpr double fewest_pairs = 5, upper_quartile = 1.386;  // of half a chi-squared with two degrees of freedom
-  const Scalar huge = std::numeric_limits<Scalar>::infinity();
-  Vector2<Scalar> low(huge, huge), high = -low;
-  for (std::size_t i = 0; i < flow.previous.size(); ++i) {
-    const Vector2<Scalar> at = flow.previous[i];
-    if (tells(i)) low = low.cwiseMin(at), high = high.cwiseMax(at);
-  }
-  const auto cell = [](Scalar at, Scalar size, std::size_t cells) {
-    const Scalar share = at / size * static_cast<Scalar>(cells);
-    return share >= Scalar(1) ? (std::min)(static_cast<std::size_t>(share), cells - 1) : 0;
+  const auto extent = [&](int axis) {
+    return extent_of_most<Scalar>(flow.previous.size(), [&](std::size_t i) {
+      return tells(i) ? flow.previous(i, axis) : std::numeric_limits<Scalar>::quiet_NaN();
+    });
+  };
+  const std::array<Scalar, 2> x = extent(0), y = extent(1);
+  const auto cell = [](Scalar at, const std::array<Scalar, 2>& over, std::size_t cells) {
+    const Scalar share = (at - over[0]) / (over[1] - over[0]) * static_cast<Scalar>(cells);
+    return share >= Scalar(1) ? static_cast<std::size_t>((std::min)(share, static_cast<Scalar>(cells - 1))) : 0;
   };
   std::array<ResidualPart, columns * rows> parts;
   SharedResidual pair;
   for (std::size_t i = 0; i < flow.previous.size(); ++i) {
     if (!tells(i) || !residual(i, pair)) continue;
-    const Vector2<Scalar> at = flow.previous[i] - low, size = high - low;
-    parts[cell(at[1], size[1], rows) * columns + cell(at[0], size[0], columns)].add(pair);
+    parts[cell(flow.previous(i, 1), y, rows) * columns + cell(flow.previous(i, 0), x, columns)].add(pair);
   }
 
   std::array<double, columns * rows> error_sq;  // in squares of the noise
   std::size_t n = 0;
-  double told_by = 0;
+  double told_by = 0, across = 0, along = 0;
   for (const ResidualPart& part : parts) {
     if (part.agreeing < fewest_pairs) continue;
     error_sq[n++] = (part.sum.squaredNorm() / (part.variance * upper_quartile) - 1) / part.pairs();
-    told_by += part.pairs();
+    told_by += part.pairs(), across += part.across, along += part.along;
   }
-  const double told = static_cast<double>(n), free = (std::max)(told - 0.5 * parameters, 1.0);
+  const double told = static_cast<double>(n), free = (std::max)(told - parameters * across / (across + along), 1.0);
   SharedError shared;
   if (n > 0) shared.pairs = told_by / told;
   shared.known = n >= fewest_parts;

@@ -19,15 +19,22 @@
 namespace cfp::detail {
 inline namespace CFP_ISA {
 
-/// What a smooth error adds to a pixel, by its coefficients: along both axes from the middle of the image, along one of
-/// them more than the other, along a diagonal. What shifts or turns the image is the camera's motion.
+/// What a smooth error adds to the current pixel of a pair, by its coefficients: along both axes from the middle of the
+/// image, along one of them more than the other, along a diagonal, px; and what a lens bends more than it is told to,
+/// k1, here more than in the frame before. What shifts or turns the image is the camera's motion.
 template <typename Scalar>
-[[nodiscard]] Matrix23<double> smooth_error_at(const Vector2<Scalar>& pixel,
-                                               const PinholeCamera<Scalar>& camera) noexcept {
-  const double x = static_cast<double>((pixel.x() - camera.cx) / camera.fx),
-               y = static_cast<double>((pixel.y() - camera.cy) / camera.fy);
-  Matrix23<double> terms;
-  terms << x, x, y, y, -y, x;
+[[nodiscard]] Eigen::Matrix<double, 2, 4> smooth_error_of(const Vector2<Scalar>& previous,
+                                                          const Vector2<Scalar>& current,
+                                                          const PinholeCamera<Scalar>& camera) noexcept {
+  const auto place = [&](const Vector2<Scalar>& pixel) {
+    return Vector2<double>(static_cast<double>((pixel.x() - camera.cx) / camera.fx),
+                           static_cast<double>((pixel.y() - camera.cy) / camera.fy));
+  };
+  const Vector2<double> before = place(previous), at = place(current),
+                        bent = at * at.squaredNorm() - before * before.squaredNorm();
+  Eigen::Matrix<double, 2, 4> terms;
+  terms << at.x(), at.x(), at.y(), static_cast<double>(camera.fx) * bent.x(),  //
+      at.y(), -at.y(), at.x(), static_cast<double>(camera.fy) * bent.y();
   return terms;
 }
 
@@ -37,34 +44,49 @@ template <typename Scalar>
 struct SmoothErrorFit {
   const PairsWithDepth<Scalar>& pairs;
   SE3<double> T_cur_prev;
-  Vector3<double> coefficients = Vector3<double>::Zero();                            // px
-  Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Identity();  // of the motion and of them
+  bool lens;  // whether its term may be among them: after a step, whether it is more than chance, one in a thousand
+  int parameters = 0;
+  Vector4<double> coefficients = Vector4<double>::Zero();
+  Eigen::Matrix<double, 10, 10> covariance = Eigen::Matrix<double, 10, 10>::Identity();  // of the motion and of them
 
   /// A Gauss-Newton step of a robust fit at a noise; false where the pairs do not tell all of it.
   [[nodiscard]] bool step(Scalar sigma_px) noexcept {
     const SE3<Scalar> T = T_cur_prev.cast<Scalar>();
-    NormalEquations<9> sums;
+    NormalEquations<10> sums;
     MotionResidual<Scalar> pair;
     for (std::size_t i = 0; i < pairs.flow.current.size(); ++i) {
       if (!pairs.tells(i) || !pairs.residual_of(i, T, pair)) continue;
       const auto sigma = static_cast<double>(pairs.pixel_sigma_of(i, sigma_px));
-      const Matrix23<double> error = smooth_error_at<Scalar>(pairs.flow.current[i], pairs.camera);
-      Eigen::Matrix<double, 2, 9> M;
+      const Eigen::Matrix<double, 2, 4> error = smooth_error_of<Scalar>(
+          pairs.flow.previous[i], pairs.flow.current[i] - pair.r, pairs.camera);  // without its noise
+      Eigen::Matrix<double, 2, 10> M;
       M << pair.M().template cast<double>(), error;
       const Vector2<double> r = pair.r.template cast<double>() - error.lazyProduct(coefficients);
-      add_pair<9>(M / sigma, r / sigma, (pair.along * pair.sigma_z).template cast<double>() / sigma,
-                  Eigen::Matrix<double, 9, 1>::Zero(), sums);
+      add_pair<10>(M / sigma, r / sigma, (pair.along * pair.sigma_z).template cast<double>() / sigma,
+                   Eigen::Matrix<double, 10, 1>::Zero(), sums);
     }
-    constexpr double as_good_as_one = 3e-4;
-    if (!invert_normal_equations<9>(sums.H, as_good_as_one, covariance)) {
+    constexpr double as_good_as_one = 3e-4, none = 1e9;
+    parameters = 10;
+    const auto solves = [&] { return invert_normal_equations<10>(sums.H, as_good_as_one, covariance); };
+    const auto leave_out = [&](int unknown) {
+      sums.H(unknown, unknown) += none;
+      --parameters;
+    };
+    const auto lens_is_chance = [&] {
+      const double k1 = coefficients[3] - covariance.row(9).dot(sums.g);
+      return k1 * k1 < 10.8 * covariance(9, 9);
+    };
+    lens = lens && solves() && !lens_is_chance();
+    if (!lens) leave_out(9);
+    if (!solves()) {
       // Before a bare wall, or where all depths count as one, what errs from the middle of the image is the way
       // forward: there is no such error then.
-      sums.H(6, 6) += 1e9;
-      if (!invert_normal_equations<9>(sums.H, as_good_as_one, covariance)) return false;
+      leave_out(6);
+      if (!solves()) return false;
     }
-    const Eigen::Matrix<double, 9, 1> change = -covariance.lazyProduct(sums.g);
+    const Eigen::Matrix<double, 10, 1> change = -covariance.lazyProduct(sums.g);
     T_cur_prev = se3_exp(Vector6<double>(change.template head<6>())) * T_cur_prev;
-    coefficients += change.template tail<3>();
+    coefficients += change.template tail<4>();
     return true;
   }
 
@@ -72,32 +94,37 @@ struct SmoothErrorFit {
   void straighten(span<std::array<Scalar, 2>> out) const noexcept {
     for (std::size_t i = 0; i < out.size(); ++i) {
       const Vector2<Scalar> pixel = pairs.flow.current[i];
-      const Vector2<double> error = smooth_error_at<Scalar>(pixel, pairs.camera).lazyProduct(coefficients);
+      const Vector2<double> error =
+          smooth_error_of<Scalar>(pairs.flow.previous[i], pixel, pairs.camera).lazyProduct(coefficients);
       out[i] = {pixel.x() - static_cast<Scalar>(error.x()), pixel.y() - static_cast<Scalar>(error.y())};
     }
   }
 
-  /// Whether the error is more than chance: chi-squared of three, one in a thousand.
+  /// Whether the error is more than chance, of pairs that err alone: that of the lens is, or chi-squared of three, one
+  /// in a thousand.
   [[nodiscard]] bool stands_out() const noexcept {
     Vector3<double> weighed;
-    return solve_normal_equations<3>(Matrix3<double>(covariance.template bottomRightCorner<3, 3>()), -coefficients, 0,
-                                     1e-14, weighed) &&
-           coefficients.dot(weighed) > 16.3;
+    const Vector3<double> others = coefficients.template head<3>();
+    return lens || (solve_normal_equations<3>(Matrix3<double>(covariance.template block<3, 3>(6, 6)), -others, 0, 1e-14,
+                                              weighed) &&
+                    others.dot(weighed) > 16.3);
   }
 };
 
 /// Takes the smooth error of the pairs out of their current pixels, which then are in `straight`, and of their motion:
 /// after estimate_camera_motion. The rows of a rolling shutter see turns that differ, a lens or a focal length that is
-/// not quite as told bends what moves: no rigid motion explains that, and whatever it displaces rests. False, and
-/// nothing changed, where the pairs show none.
+/// not quite as told bends what moves: no rigid motion explains that, and whatever it displaces rests. Returns how many
+/// parameters were fitted to the pairs; 6, those of the motion, and nothing changed, where they show none. Not by the
+/// lens where no depths are known: what it bends is hardly told from a room that is no plane.
 template <typename Scalar>
-[[nodiscard]] bool straighten(const PinholeCamera<Scalar>& camera, const CameraMotionOptions& options,
-                              CameraMotionWorkspace<Scalar>& workspace, std::vector<std::array<Scalar, 2>>& straight,
-                              FlowPairs<Scalar>& flow, CameraMotion<Scalar>& motion) {
+[[nodiscard]] int straighten(const PinholeCamera<Scalar>& camera, const CameraMotionOptions& options,
+                             CameraMotionWorkspace<Scalar>& workspace, bool by_lens,
+                             std::vector<std::array<Scalar, 2>>& straight, FlowPairs<Scalar>& flow,
+                             CameraMotion<Scalar>& motion) {
   const PairsWithDepth<Scalar> bent{flow, camera, options, workspace};
-  SmoothErrorFit<Scalar> fit{bent, motion.T_cur_prev.template cast<double>()};
+  SmoothErrorFit<Scalar> fit{bent, motion.T_cur_prev.template cast<double>(), by_lens};
   straight.resize(flow.current.size());
-  if (!fit.step(motion.sigma_px) || !fit.stands_out() || !fit.step(motion.sigma_px)) return false;
+  if (!fit.step(motion.sigma_px) || !fit.stands_out() || !fit.step(motion.sigma_px)) return 6;
   fit.straighten(span<std::array<Scalar, 2>>(straight));
   const FlowPairs<Scalar> rest{flow.previous, PointSpan<Scalar, 2>(straight), flow.previous_depths,
                                flow.relative_sigmas};
@@ -107,7 +134,7 @@ template <typename Scalar>
   motion.T_cur_prev = fit.T_cur_prev.template cast<Scalar>();
   motion.covariance = shrunk * shrunk * fit.covariance.template topLeftCorner<6, 6>().template cast<Scalar>();
   motion.sigma_px = sigma_px;
-  return true;
+  return fit.parameters;
 }
 
 }  // namespace CFP_ISA

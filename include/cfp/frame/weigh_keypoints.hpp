@@ -88,10 +88,11 @@ template <typename Scalar>
       map_point_probability >= Scalar(0) ? Scalar(map_point_probability) : unknown_map_point(i, options, state);
   if (state.label[i] == KeypointLabel::invalid) return Scalar(0);
   if (state.box[i] == no_box && !is_unreported(i, state)) return clamp_probability(m);
-  if (state.report.stage == Stage::fine && came_from_nowhere(i, state)) return Scalar(0);
+  const bool asked = state.report.constrained > 0;
+  if (asked && came_from_nowhere(i, state)) return Scalar(0);
   const Scalar e = (std::min)(first_stage_evidence(i, options, state), Scalar(0.5));
   const Scalar k = keypoint_evidence(state.static_probability[i], e, is_on_object(i, state));
-  return posterior_probability(state.report.constrained > 0 ? k : Scalar(0.5), e, m, options.map_point);
+  return posterior_probability(asked ? k : Scalar(0.5), e, m, options.map_point);
 }
 
 /// Whether the printed weights leave the observation out because K and M are too far apart. In the coarse stage K is
