@@ -30,6 +30,30 @@ struct Room {
     }
     outside.assign(previous.size(), 1);
   }
+  /// Moves the current pixels to where points at other depths, which it returns, are seen; those in one of so many
+  /// columns and rows of the image err by `shared` together, beside the noise.
+  std::vector<double> err_by_parts(const cfp::SE3<double>& T, std::array<int, 2> columns_and_rows, double shared,
+                                   double noise_px, cfp::Random& random) {
+    const auto [columns, rows] = columns_and_rows;
+    std::vector<cfp::Vector2<double>> of_part(static_cast<std::size_t>(columns * rows));
+    for (cfp::Vector2<double>& error : of_part) {
+      error.x() = shared * random.normal();
+      error.y() = shared * random.normal();
+    }
+    std::vector<double> depths;
+    for (std::size_t i = 0; i < previous.size(); ++i) {
+      cfp::Vector3<double> ray;
+      cfp::Vector2<double> q;
+      REQUIRE(camera.unproject({previous[i][0], previous[i][1]}, ray));
+      depths.push_back(random.uniform(1.5, 4));
+      REQUIRE(camera.project(T * cfp::Vector3<double>(depths[i] * ray), q));
+      const double part =
+          std::floor(previous[i][0] / 640 * columns) + columns * std::floor(previous[i][1] / 480 * rows);
+      q += of_part[static_cast<std::size_t>(part)];
+      current[i] = {q.x() + noise_px * random.normal(), q.y() + noise_px * random.normal()};
+    }
+    return depths;
+  }
   [[nodiscard]] cfp::FlowModel<double> model(const cfp::FlowModelOptions& options = {}) const {
     cfp::FlowModelWorkspace<double> workspace;
     return cfp::estimate_flow_model<double>({previous, current, {}}, outside, camera, options, workspace);
@@ -93,7 +117,7 @@ TEST_CASE("Before a wall the motion is known up to scale, and how well", "[frame
 }
 
 TEST_CASE("What neighbours err by together is measured, and the motion is as uncertain as it makes it", "[frame]") {
-  constexpr double noise = 0.2, columns = 5, rows = 4;
+  constexpr double noise = 0.2;
   constexpr int seeds = 60;
   for (const double shared : {0.0, 0.1, 0.3}) {
     CAPTURE(shared);
@@ -102,23 +126,7 @@ TEST_CASE("What neighbours err by together is measured, and the motion is as unc
       cfp::Random random(seed, "shared error");
       const cfp::SE3<double> T = motion(0.02, 0.02);
       Room room(T, noise, seed);
-      std::array<cfp::Vector2<double>, static_cast<std::size_t>(columns * rows)> of_part;
-      for (cfp::Vector2<double>& error : of_part) {
-        error.x() = shared * random.normal();
-        error.y() = shared * random.normal();
-      }
-      std::vector<double> depths;
-      for (std::size_t i = 0; i < room.previous.size(); ++i) {
-        cfp::Vector3<double> ray;
-        cfp::Vector2<double> q;
-        REQUIRE(room.camera.unproject({room.previous[i][0], room.previous[i][1]}, ray));
-        depths.push_back(random.uniform(1.5, 4));
-        REQUIRE(room.camera.project(T * cfp::Vector3<double>(depths[i] * ray), q));
-        const double part =
-            std::floor(room.previous[i][0] / 640 * columns) + columns * std::floor(room.previous[i][1] / 480 * rows);
-        q += of_part[static_cast<std::size_t>(part)];
-        room.current[i] = {q.x() + noise * random.normal(), q.y() + noise * random.normal()};
-      }
+      const std::vector<double> depths = room.err_by_parts(T, {5, 4}, shared, noise, random);
       cfp::FlowModelWorkspace<double> workspace;
       cfp::FlowModelOptions options;
       options.motion.shared_depth_ratio = 0;
@@ -152,24 +160,7 @@ TEST_CASE("What neighbours err by together is measured under F, too, and a pair 
         cfp::Random random(seed, "shared error of F");
         const cfp::SE3<double> T = motion(0.15, 0.02);
         Room room(T, noise, seed);
-        std::array<cfp::Vector2<double>, 12> of_part;
-        for (cfp::Vector2<double>& error : of_part) {
-          error.x() = shared * random.normal();
-          error.y() = shared * random.normal();
-        }
-        std::vector<double> depths;
-        for (std::size_t i = 0; i < room.previous.size(); ++i) {
-          cfp::Vector3<double> ray;
-          cfp::Vector2<double> q;
-          REQUIRE(room.camera.unproject({room.previous[i][0], room.previous[i][1]}, ray));
-          depths.push_back(random.uniform(1.5, 4));
-          REQUIRE(room.camera.project(T * cfp::Vector3<double>(depths[i] * ray), q));
-          const double part = std::floor(room.previous[i][0] / 160) + 4 * std::floor(room.previous[i][1] / 160);
-          q += of_part[static_cast<std::size_t>(part)];
-          q.x() += noise * random.normal();
-          q.y() += noise * random.normal();
-          room.current[i] = {q.x(), q.y()};
-        }
+        std::vector<double> depths = room.err_by_parts(T, {4, 3}, shared, noise, random);
         if (one_far) room.previous[7] = room.current[7] = {4000, 240};
         if (!with_depths) depths.clear();
         cfp::FlowModelWorkspace<double> workspace;
