@@ -67,24 +67,30 @@ struct SmoothErrorFit {
     }
     constexpr double as_good_as_one = 3e-4, none = 1e9;
     parameters = 10;
-    const auto solves = [&] { return invert_normal_equations<10>(sums.H, as_good_as_one, covariance); };
+    Eigen::Matrix<double, 10, 1> change;
+    const auto solves = [&] {
+      if (!invert_normal_equations<10>(sums.H, as_good_as_one, covariance)) return false;
+      change = -covariance.lazyProduct(sums.g);
+      return true;
+    };
     const auto leave_out = [&](int unknown) {
       sums.H(unknown, unknown) += none;
       --parameters;
     };
     const auto lens_is_chance = [&] {
-      const double k1 = coefficients[3] - covariance.row(9).dot(sums.g);
+      const double k1 = coefficients[3] + change[9];
       return k1 * k1 < 10.8 * covariance(9, 9);
     };
     lens = lens && solves() && !lens_is_chance();
-    if (!lens) leave_out(9);
-    if (!solves()) {
-      // Before a bare wall, or where all depths count as one, what errs from the middle of the image is the way
-      // forward: there is no such error then.
-      leave_out(6);
-      if (!solves()) return false;
+    if (!lens) {
+      leave_out(9);
+      if (!solves()) {
+        // Before a bare wall, or where all depths count as one, what errs from the middle of the image is the way
+        // forward: there is no such error then.
+        leave_out(6);
+        if (!solves()) return false;
+      }
     }
-    const Eigen::Matrix<double, 10, 1> change = -covariance.lazyProduct(sums.g);
     T_cur_prev = se3_exp(Vector6<double>(change.template head<6>())) * T_cur_prev;
     coefficients += change.template tail<4>();
     return true;
