@@ -6,6 +6,7 @@
 #include "../../examples/slam/loop/pose.hpp"
 #include "cfp/core/random.hpp"
 #include "support/catch.hpp"
+#include "support/engines.hpp"
 
 using namespace cfp_slam;
 

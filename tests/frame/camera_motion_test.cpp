@@ -12,6 +12,7 @@
 #include "cfp/core/random.hpp"
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
+#include "support/engines.hpp"
 #include "support/moving_flow.hpp"
 
 namespace {

@@ -10,6 +10,7 @@
 #include "cfp/geometry/kannala_brandt_camera.hpp"
 #include "cfp/geometry/radial_tangential_camera.hpp"
 #include "support/catch.hpp"
+#include "support/engines.hpp"
 #include "support/frame_runs.hpp"
 
 using cfp_test::DynamicScene;

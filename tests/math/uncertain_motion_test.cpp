@@ -1,9 +1,11 @@
 #include "cfp/math/uncertain_motion.hpp"
 
+#include <limits>
+
 #include "cfp/core/random.hpp"
 #include "cfp/math/so3.hpp"
 #include "support/catch.hpp"
-#include "support/moving_flow.hpp"
+#include "support/random_pose.hpp"
 
 namespace {
 

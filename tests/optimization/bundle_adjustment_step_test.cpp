@@ -56,9 +56,8 @@ struct DenseSystem {
   Eigen::VectorXd g;
 };
 
-template <typename Loss>
-DenseSystem dense_system(const cfp_test::BaScene& scene, const cfp::BundleWorkspace& work, const Loss& mono,
-                         const Loss& stereo) {
+DenseSystem dense_system(const cfp_test::BaScene& scene, const cfp::BundleWorkspace& work,
+                         const cfp::BundleOptions& options) {
   const auto& index = work.index;
   const int poses = static_cast<int>(index.free_poses), points = static_cast<int>(index.points),
             n = 6 * poses + 3 * points;
@@ -82,7 +81,8 @@ DenseSystem dense_system(const cfp_test::BaScene& scene, const cfp::BundleWorksp
           (residual(scene, i, pose, up) - residual(scene, i, pose, down)) / (2 * h);
     }
     const double inv_sigma_sq = 1 / (scene.sigma[i] * scene.sigma[i]);
-    const Loss& loss = has_third(scene, i) ? stereo : mono;
+    const double delta = std::sqrt(has_third(scene, i) ? options.chi2_stereo : options.chi2_mono);
+    const cfp::NamedLoss<double> loss{options.loss, delta};
     const double omega = scene.weights[i] * inv_sigma_sq * loss.first(r.squaredNorm() * inv_sigma_sq);
     system.H += omega * J.transpose() * J;
     system.g += omega * J.transpose() * r;
@@ -93,8 +93,8 @@ DenseSystem dense_system(const cfp_test::BaScene& scene, const cfp::BundleWorksp
   return system;
 }
 
-template <template <typename> class Loss, typename Camera>
-void check_step(double delta, double stereo_share, const Camera& camera, bool few_points = false,
+template <typename Camera>
+void check_step(cfp::LossType loss, double delta, double stereo_share, const Camera& camera, bool few_points = false,
                 bool gives_depths = false) {
   cfp_test::BaSceneOptions options;
   options.poses = few_points ? 30 : 5;
@@ -109,9 +109,9 @@ void check_step(double delta, double stereo_share, const Camera& camera, bool fe
   const cfp::BundleProblem<Camera> problem{
       pinhole.poses,        pinhole.points,      cfp::span<const Camera>(&camera, 1),
       pinhole.observations, pinhole.fixed_poses, pinhole.baseline_fx};
-  using Packet = cfp::simd::Packet<double>;
-  const Loss<double> mono{delta}, stereo{1.2 * delta};
-  const Loss<Packet> mono_packet{delta}, stereo_packet{1.2 * delta};
+  cfp::BundleOptions bundle_options;
+  bundle_options.loss = loss;
+  bundle_options.chi2_mono = delta * delta, bundle_options.chi2_stereo = 1.44 * delta * delta;
   cfp::BundleWorkspace work;
   cfp::BundleResult result;
   cfp::SingleThread executor;
@@ -119,11 +119,11 @@ void check_step(double delta, double stereo_share, const Camera& camera, bool fe
   cfp::detail::prepare(problem, work, result);
   REQUIRE(result.used == scene.pose.size());
   REQUIRE(work.index.eliminate_poses == few_points);
-  cfp::detail::BundleLeastSquares<cfp::BundleProblem<Camera>, Loss<Packet>, cfp::SingleThread> least_squares{
-      problem, mono_packet, stereo_packet, work, executor};
+  cfp::detail::BundleLeastSquares<cfp::BundleProblem<Camera>, cfp::SingleThread> least_squares{problem, bundle_options,
+                                                                                               work, executor};
   REQUIRE(cfp::is_finite(least_squares.linearize()));
 
-  const DenseSystem system = dense_system(scene, work, mono, stereo);
+  const DenseSystem system = dense_system(scene, work, bundle_options);
   const int poses = 6 * static_cast<int>(work.index.free_poses);
   for (int k = 0; k < static_cast<int>(work.index.free_poses); ++k) {
     const double* actual = work.linear.poses.data() + 42 * k;
@@ -154,11 +154,11 @@ TEST_CASE("A step solves the damped normal equations of numerically differentiat
   const cfp::PinholeCamera<double> camera = cfp_test::BaScene{}.camera;
   for (const double stereo_share : {0.0, 0.5, 1.0}) {
     CAPTURE(stereo_share);
-    check_step<cfp::Trivial>(2.5, stereo_share, camera);
-    check_step<cfp::Huber>(2.5, stereo_share, camera);
-    check_step<cfp::Cauchy>(2.5, stereo_share, camera);
-    check_step<cfp::GemanMcClure>(20, stereo_share, camera);
-    check_step<cfp::Truncated>(30, stereo_share, camera);
+    check_step(cfp::LossType::trivial, 2.5, stereo_share, camera);
+    check_step(cfp::LossType::huber, 2.5, stereo_share, camera);
+    check_step(cfp::LossType::cauchy, 2.5, stereo_share, camera);
+    check_step(cfp::LossType::geman_mcclure, 20, stereo_share, camera);
+    check_step(cfp::LossType::truncated, 30, stereo_share, camera);
   }
 }
 
@@ -166,20 +166,20 @@ TEST_CASE("With few points the poses are eliminated: the same step", "[optimizat
   const cfp::PinholeCamera<double> camera = cfp_test::BaScene{}.camera;
   for (const double stereo_share : {0.0, 0.5, 1.0}) {
     CAPTURE(stereo_share);
-    check_step<cfp::Huber>(2.5, stereo_share, camera, true);
+    check_step(cfp::LossType::huber, 2.5, stereo_share, camera, true);
   }
 }
 
 TEST_CASE("A depth is a disparity: the same step", "[optimization][bundle_adjustment]") {
   const cfp::PinholeCamera<double> camera = cfp_test::BaScene{}.camera;
   for (const bool few_points : {false, true}) {
-    check_step<cfp::Huber>(2.5, 0.5, camera, few_points, true);
-    check_step<cfp::Trivial>(2.5, 1.0, AnyCamera{camera}, few_points, true);
+    check_step(cfp::LossType::huber, 2.5, 0.5, camera, few_points, true);
+    check_step(cfp::LossType::trivial, 2.5, 1.0, AnyCamera{camera}, few_points, true);
   }
 }
 
 TEST_CASE("A camera the library does not know gives the pinhole camera's step", "[optimization][bundle_adjustment]") {
-  check_step<cfp::Huber>(2.5, 0.5, AnyCamera{cfp_test::BaScene{}.camera});
+  check_step(cfp::LossType::huber, 2.5, 0.5, AnyCamera{cfp_test::BaScene{}.camera});
 }
 
 TEST_CASE("At the truth without noise the gradient is zero and nothing moves", "[optimization][bundle_adjustment]") {

@@ -38,9 +38,8 @@ double cost_of(const cfp_test::BaScene& scene, const cfp::BundleOptions& options
     const bool stereo = scene.u_right[i] > 0;
     double square = (pixel - scene.pixels[i]).squaredNorm();
     if (stereo) square += std::pow(pixel.x() - scene.baseline_fx / p.z() - scene.u_right[i], 2);
-    cost += scene.weights[i] *
-            cfp::with_loss(options.loss, std::sqrt(stereo ? options.chi2_stereo : options.chi2_mono),
-                           [&](const auto& loss) { return loss.value(square / (scene.sigma[i] * scene.sigma[i])); });
+    const cfp::NamedLoss<double> loss{options.loss, std::sqrt(stereo ? options.chi2_stereo : options.chi2_mono)};
+    cost += scene.weights[i] * loss.value(square / (scene.sigma[i] * scene.sigma[i]));
   }
   return cost;
 }

@@ -10,25 +10,12 @@ namespace {
 constexpr cfp::LossType all_types[] = {cfp::LossType::trivial, cfp::LossType::huber, cfp::LossType::cauchy,
                                        cfp::LossType::geman_mcclure, cfp::LossType::truncated};
 
-/// The loss of that name.
-template <typename Scalar>
-struct NamedLoss {
-  cfp::LossType type;
-  Scalar delta;
-  Scalar value(Scalar s) const {
-    return cfp::with_loss(type, delta, [&](const auto& loss) { return loss.value(s); });
-  }
-  Scalar first(Scalar s) const {
-    return cfp::with_loss(type, delta, [&](const auto& loss) { return loss.first(s); });
-  }
-};
-
 }  // namespace
 
 TEST_CASE("Losses: the derivative equals the central differences of the value", "[optimization]") {
   for (const cfp::LossType type : all_types) {
     for (const double delta : {0.3, 1.0, 2.4476519, 20.0}) {
-      const NamedLoss<double> loss{type, delta};
+      const cfp::NamedLoss<double> loss{type, delta};
       for (const double ratio :
            {1e-3, 0.1, 0.5, 0.97, 1.03, 2.0, 17.0, 1e3}) {  // of s to delta^2; the corner itself is left out
         const double s = ratio * delta * delta;
@@ -44,7 +31,7 @@ TEMPLATE_TEST_CASE("Losses: least squares at 0, concave, derivative in [0, 1], f
                    double) {
   using Scalar = TestType;
   for (const cfp::LossType type : all_types) {
-    const NamedLoss<Scalar> loss{type, Scalar(1.5)};
+    const cfp::NamedLoss<Scalar> loss{type, Scalar(1.5)};
     CAPTURE(static_cast<int>(type));
     CHECK(loss.value(Scalar(0)) == Scalar(0));
     CHECK(loss.first(Scalar(0)) == Scalar(1));
@@ -95,7 +82,7 @@ TEMPLATE_TEST_CASE("Losses: a packet of residuals gives the scalar results", "[o
         loss.value(P::load(s)).store(value);
         loss.first(P::load(s)).store(first);
       });
-      const NamedLoss<Scalar> loss{type, Scalar(2.5)};
+      const cfp::NamedLoss<Scalar> loss{type, Scalar(2.5)};
       for (int i = 0; i < lanes; ++i) {
         const Scalar epsilon = 8 * std::numeric_limits<Scalar>::epsilon();
         REQUIRE(value[i] == Approx(loss.value(s[i])).epsilon(epsilon));
@@ -109,7 +96,7 @@ TEST_CASE("Losses: a weight outside equals one inside when the scale goes with i
   for (const cfp::LossType type : all_types) {
     for (const double w : {0.01, 0.3, 1.0}) {
       for (const double s : {0.0, 0.5, 3.0, 7.0, 400.0}) {
-        const NamedLoss<double> outside{type, 1.7}, inside{type, 1.7 * std::sqrt(w)};
+        const cfp::NamedLoss<double> outside{type, 1.7}, inside{type, 1.7 * std::sqrt(w)};
         CHECK(w * outside.value(s) == Approx(inside.value(w * s)).epsilon(1e-12));
       }
     }

@@ -12,7 +12,7 @@
 #include "support/catch.hpp"
 #include "support/engines.hpp"
 #include "support/numeric_gradient.hpp"
-#include "support/random_direction.hpp"
+#include "support/random_pose.hpp"
 
 using cfp::PinholeCamera;
 using cfp::pnp_ransac;

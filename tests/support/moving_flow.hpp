@@ -10,16 +10,11 @@
 #include "cfp/core/random.hpp"
 #include "cfp/frame/camera_motion.hpp"
 #include "cfp/frame/moving_parts.hpp"
+#include "support/random_pose.hpp"
 
 namespace cfp_test {
 
 inline constexpr cfp::PinholeCamera<double> flow_camera{535.4, 539.2, 320.1, 247.6};
-
-inline cfp::SE3<double> random_motion(double translation_m, double rotation_rad, cfp::Random& random) {
-  cfp::Vector6<double> xi;
-  for (int i = 0; i < 6; ++i) xi[i] = (i < 3 ? translation_m : rotation_rad) * random.normal();
-  return cfp::se3_exp(xi);
-}
 
 /// The squared distance of a motion from the true one in the measure of its covariance: six degrees of freedom.
 inline double normalized_error_sq(const cfp::UncertainMotion<double>& found, const cfp::SE3<double>& T_cur_prev) {

@@ -11,7 +11,7 @@
 #include "cfp/geometry/camera.hpp"
 #include "cfp/math/se3.hpp"
 #include "cfp/optimization/pose/pose_refinement.hpp"
-#include "support/random_direction.hpp"
+#include "support/random_pose.hpp"
 
 namespace cfp_test {
 

@@ -12,7 +12,7 @@
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/point_pairs.hpp"
 #include "cfp/math/se3.hpp"
-#include "support/random_direction.hpp"
+#include "support/random_pose.hpp"
 
 namespace cfp_test {
 

@@ -105,6 +105,20 @@ auto with_loss(LossType type, const Scalar& delta, Work&& work) {
   return work(Trivial<Scalar>{delta});
 }
 
+/// The loss of that name and scale, asked at every call: where what surrounds the call costs more than the question.
+template <typename Scalar>
+struct NamedLoss {
+  LossType type = LossType::trivial;
+  Scalar delta = Scalar(1);
+
+  [[nodiscard]] Scalar value(const Scalar& s) const noexcept {
+    return with_loss<Scalar>(type, delta, [&](const auto& loss) { return loss.value(s); });
+  }
+  [[nodiscard]] Scalar first(const Scalar& s) const noexcept {
+    return with_loss<Scalar>(type, delta, [&](const auto& loss) { return loss.first(s); });
+  }
+};
+
 [[nodiscard]] constexpr bool is_loss(LossType type) noexcept { return type <= LossType::truncated; }
 
 }  // namespace CFP_ISA

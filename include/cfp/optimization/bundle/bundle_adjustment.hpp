@@ -13,7 +13,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <type_traits>
 
 #include "cfp/optimization/bundle/bundle_adjustment_impl.hpp"
@@ -55,13 +54,9 @@ template <typename Camera, typename Scalar, typename Executor = SingleThread>
   detail::build_index(problem, workspace.index, result);
   detail::prepare(problem, workspace, result);
   if (result.used > 0) {
-    with_loss<simd::Packet<double>>(options.loss, std::sqrt(options.chi2_mono), [&](auto mono) {
-      auto stereo = mono;
-      stereo.delta = std::sqrt(options.chi2_stereo);
-      detail::BundleLeastSquares<BundleProblem<Camera, Scalar>, decltype(mono), std::remove_reference_t<Executor>>
-          least_squares{problem, mono, stereo, workspace, executor};
-      static_cast<LeastSquaresResult&>(result) = minimize_least_squares(least_squares, options.levenberg_marquardt);
-    });
+    detail::BundleLeastSquares<BundleProblem<Camera, Scalar>, std::remove_reference_t<Executor>> least_squares{
+        problem, options, workspace, executor};
+    static_cast<LeastSquaresResult&>(result) = minimize_least_squares(least_squares, options.levenberg_marquardt);
     if (!is_solved(result.status)) result.accepted = 0, result.final_cost = result.initial_cost;
     if (result.accepted > 0) detail::write_back(problem, workspace);
   } else if (result.behind > 0) {

@@ -93,13 +93,12 @@ void move(const BundleIndex& index, const State& state, const BundleSchur& schur
 }
 
 /// Bundle adjustment as minimize_least_squares wants it.
-template <typename Problem, typename Loss, typename Executor>
+template <typename Problem, typename Executor>
 struct BundleLeastSquares {
   // Below so many observations a phase is over before another thread has woken up.
   static constexpr std::size_t worth_sharing = 4000;
   const Problem& problem;
-  const Loss& mono;
-  const Loss& stereo;
+  const BundleOptions& options;
   BundleWorkspace& workspace;
   Executor& executor;
 
@@ -133,7 +132,7 @@ struct BundleLeastSquares {
     const BundleIndex& index = workspace.index;
     run([&](int part) {
       for (std::size_t k = index.pose_part[to_index(part)]; k < index.pose_part[to_index(part) + 1]; ++k)
-        linearize_pose(problem, index, k, mono, stereo, state, linear);
+        linearize_pose(problem, index, k, options, state, linear);
     });
     linearize_points(index, linear);
     double cost = 0;

@@ -9,12 +9,14 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "cfp/core/types.hpp"
 #include "cfp/math/matrix3.hpp"
 #include "cfp/optimization/bundle/bundle_chunk_impl.hpp"
 #include "cfp/optimization/bundle/bundle_index_impl.hpp"
+#include "cfp/optimization/robust_loss.hpp"
 #include "cfp/simd/packet.hpp"
 
 namespace cfp::detail {
@@ -148,15 +150,16 @@ inline void store_pose(const BundlePoseSums& sums, double* target) noexcept {
 
 /// All observations of pose k, the mono ones first: fills their slots, the pose's cost and, unless it is fixed, its
 /// normal equations.
-template <typename Camera, typename Scalar, typename Loss>
+template <typename Camera, typename Scalar>
 void linearize_pose(const BundleProblem<Camera, Scalar>& problem, const BundleIndex& index, std::size_t k,
-                    const Loss& mono, const Loss& stereo, const BundleState& state, BundleLinearization& out) noexcept {
+                    const BundleOptions& options, const BundleState& state, BundleLinearization& out) noexcept {
   const Camera& camera = camera_of(problem.cameras, index.caller_pose[k]);
   const BundlePose& pose = state.poses[k];
   const bool is_free = k < index.free_poses;
   BundleChunk chunk;
   BundlePoseSums sums = {};
   double cost[2] = {};
+  const double deltas[2] = {std::sqrt(options.chi2_mono), std::sqrt(options.chi2_stereo)};
   for (const std::size_t kind : {0U, 1U}) {  // pixels; pixels with a third row
     const std::size_t end = index.range_begin[2 * k + kind + 1];
     for (std::size_t first = index.range_begin[2 * k + kind]; first < end; first += BundleChunk::size) {
@@ -169,9 +172,11 @@ void linearize_pose(const BundleProblem<Camera, Scalar>& problem, const BundleIn
         chunk.weight[i] = i < count ? m.weight : 0, chunk.information[i] = m.information;
       }
       project_chunk(camera, pose, padded, chunk);
-      cost[kind] += kind == 0 ? weigh_chunk<false>(padded, 0, 0, mono, pose.rotation, chunk)
-                              : weigh_chunk<true>(padded, problem.baseline_fx, third_has_u(problem), stereo,
-                                                  pose.rotation, chunk);
+      cost[kind] += with_loss<simd::Packet<double>>(options.loss, deltas[kind], [&](const auto& loss) {
+        return kind == 0
+                   ? weigh_chunk<false>(padded, 0, 0, loss, pose.rotation, chunk)
+                   : weigh_chunk<true>(padded, problem.baseline_fx, third_has_u(problem), loss, pose.rotation, chunk);
+      });
       for (int i = 0; i < count; ++i) {
         double* const slot =
             out.slots.data() + BundleLinearization::slot_doubles * index.observations[first + to_index(i)].slot;

@@ -19,6 +19,7 @@
 #include "cfp/math/normal_equations.hpp"
 #include "cfp/math/se3.hpp"
 #include "cfp/optimization/pose/pose_columns_impl.hpp"
+#include "cfp/optimization/robust_loss.hpp"
 #include "cfp/simd/packet.hpp"
 
 namespace cfp::detail {
@@ -139,9 +140,9 @@ void add_observations(const PoseColumns<Scalar>& columns, std::size_t begin, std
 }
 
 /// Any camera of geometry/camera.hpp, point by point in double.
-template <bool stereo, typename Scalar, typename Loss, typename Camera>
+template <bool stereo, typename Scalar, typename Camera>
 void add_observations(const PoseColumns<Scalar>& columns, std::size_t begin, std::size_t end, const Camera& camera,
-                      const SE3<double>& T, const Loss& loss, PoseSystem& system) noexcept {
+                      const SE3<double>& T, const NamedLoss<double>& loss, PoseSystem& system) noexcept {
   using C = typename Camera::ScalarType;
   constexpr int rows = stereo ? 3 : 2;
   for (std::size_t i = begin; i < end; ++i) {

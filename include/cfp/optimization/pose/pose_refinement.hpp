@@ -35,7 +35,6 @@ template <typename Camera>
 /// What the loop minimises: the pose relative to the start position, so that float serves wherever the origin is.
 template <typename Scalar, typename Camera>
 struct PoseModel {
-  using Number = std::conditional_t<is_pinhole<Camera>, simd::Packet<Scalar>, double>;
   const Camera& camera;
   const PoseOptions& options;
   PoseColumns<Scalar> columns;  // errors are those at last_pose
@@ -48,9 +47,13 @@ struct PoseModel {
     PoseSystem system;
     for_each_kind(columns, options, [&](std::size_t begin, std::size_t end, double chi2, auto stereo) {
       const double delta = round.scale * std::sqrt(chi2);
-      with_loss<Number>(round.loss, static_cast<simd::scalar_of<Number>>(delta), [&](const auto& loss) {
+      const auto add = [&](const auto& loss) {
         add_observations<decltype(stereo)::value>(columns, begin, end, camera, T, loss, system);
-      });
+      };
+      if constexpr (is_pinhole<Camera>)
+        with_loss<simd::Packet<Scalar>>(round.loss, static_cast<Scalar>(delta), add);
+      else
+        add(NamedLoss<double>{round.loss, delta});
     });
     equations = system.equations;
     influence = system.influence;
