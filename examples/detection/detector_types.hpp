@@ -22,6 +22,12 @@ class Detector {
   // into classes(). Throws std::runtime_error that names the detector and what is wrong.
   virtual Detections detect(const cv::Mat& bgr, double time_s) = 0;
 
+  // What is wrong when none of its boxes was of use so far; else empty.
+  [[nodiscard]] virtual std::string complaint() const {
+    if (classes_.empty() || class_of("person") >= 0) return {};
+    return name_ + ": no class 'person': nothing that it finds can move";
+  }
+
   [[nodiscard]] const std::vector<std::string>& classes() const { return classes_; }
   [[nodiscard]] const std::string& name() const { return name_; }
 

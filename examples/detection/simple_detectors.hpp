@@ -44,6 +44,7 @@ class FileDetector final : public Detector {
     auto nearest = after;
     if (after != frames_.begin() && (after == frames_.end() || distance(after[-1]) <= distance(*after))) --nearest;
     if (nearest == frames_.end() || !(distance(*nearest) <= 0.005)) return detections;
+    matched_ = true;
     for (const cfp::Detection<double>& d : nearest->detections) {
       const auto box = cfp::clip(d.box, double(bgr.cols), double(bgr.rows));
       const cfp::Box<float> rounded{float(box.x1), float(box.y1), float(box.x2), float(box.y2)};
@@ -53,9 +54,15 @@ class FileDetector final : public Detector {
     return detections;
   }
 
+  [[nodiscard]] std::string complaint() const override {
+    if (frames_.empty() || matched_) return Detector::complaint();
+    return name_ + ": no image is within 5 ms of any of its " + std::to_string(frames_.size()) + " time stamps";
+  }
+
  private:
   DetectorOptions options_;
   std::vector<DetectionFrame> frames_;
+  bool matched_ = false;  // an image had one of the frames
 };
 
 // Histograms of oriented gradients with the linear support vector machine that OpenCV carries: upright, wholly visible

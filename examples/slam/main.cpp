@@ -51,7 +51,8 @@ void add_common_options(CLI::App& run, Arguments& a) {
 void add_run_options(CLI::App& run, Arguments& a) {
   run.add_option("--out", a.out, "folder for everything that is written");
   run.add_option("--variant", a.variants, cfp_examples::all_variants + ", or all; several with commas")->delimiter(',');
-  run.add_option("--seeds", a.seeds, "runs of each variant, with so many seeds from --seed on");
+  run.add_option("--seeds", a.seeds, "runs of each variant, with so many seeds from --seed on")
+      ->check(CLI::Range(1, 1000000));
   run.add_flag("--decisions", a.settings.decisions,
                "writes why each keypoint of each frame has its weight (100 kB each)");
   run.add_flag("--resume", a.resume, "leaves out runs that are there, whole and with the same settings");

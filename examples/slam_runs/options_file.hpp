@@ -30,7 +30,7 @@ void for_each_option(Options& o, const Visit& visit) {
   visit("features.room_share", o.features.room_share);
   visit("probability.object_threshold", p.object_threshold);
   visit("probability.min_creation_probability", p.min_creation_probability);
-  visit("probability.min_inlier_weight", p.min_inlier_weight);
+  visit("probability.health.min_inlier_weight", p.health.min_inlier_weight);
   visit("probability.tracker.min_score", p.tracker.min_score);
   visit("probability.tracker.birth_threshold", p.tracker.birth_threshold);
   visit("probability.coarse.flow_radius_px", p.coarse.flow_radius_px);

@@ -104,7 +104,8 @@ inline std::string run_into(const std::filesystem::path& folder, const cfp_examp
   std::filesystem::create_directories(folder);
   for (const char* old : {"run.txt", "decisions.txt"}) std::filesystem::remove(folder / old);
   RunWriter writer(folder, progress, settings.decisions);
-  const RunResult result = run_slam(sequence, detector, options_of(settings, threads), writer);
+  const Options options = options_of(settings, threads);
+  const RunResult result = run_slam(sequence, detector, options, writer);
   writer.close();
   {
     std::ofstream out = open_text(folder / "trajectory.txt", "timestamp tx ty tz qx qy qz qw");
@@ -117,7 +118,11 @@ inline std::string run_into(const std::filesystem::path& folder, const cfp_examp
   }
   cfp_examples::write_text(folder / "run.txt", settings.text() + "keyframes " + std::to_string(result.keyframes) +
                                                    "\nmap_points " + std::to_string(result.map_points) + '\n');
-  return text_of(writer.said());
+  std::string text = text_of(writer.said());
+  const auto add = [&](const std::string& what) { text += (text.empty() || what.empty() ? "" : "; ") + what; };
+  if (result.trajectory.empty()) add("no frame has a pose");
+  if (cfp::variant_options(options.variant, options.probability).use_boxes) add(detector.complaint());
+  return text;
 }
 
 }  // namespace cfp_slam

@@ -14,6 +14,7 @@
 #include <functional>
 #include <locale>
 #include <map>
+#include <regex>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -51,19 +52,30 @@ inline std::ofstream open_text(const std::filesystem::path& file, const char* co
   return out;
 }
 
-// What the notes of frames said, without their numbers, and in how many frames.
-using Said = std::map<std::string, int>;
+// What the notes of frames said, without their numbers, and in how many frames; of a file's lines the first in full.
+struct Times {
+  int count = 0;
+  std::string first;
+};
+using Said = std::map<std::string, Times>;
 inline void listen(const FrameRecord& record, Said& said) {
   for (std::size_t from = 0; from < record.note.size();) {
     const std::size_t to = std::min(record.note.find("; ", from), record.note.size());
     const std::string note = record.note.substr(from, to - from);
-    ++said[note.substr(0, note.find(": "))];
+    static const std::regex line(":[0-9]+: ");
+    std::smatch at;
+    const bool of_file = std::regex_search(note, at, line);
+    Times& times = said[of_file ? at.prefix().str() : note.substr(0, note.find(": "))];
+    if (++times.count == 1 && of_file) times.first = note;
     from = to + 2;
   }
 }
 inline std::string text_of(const Said& said) {
   std::string text;
-  for (const auto& [what, times] : said) text += (text.empty() ? "" : "; ") + std::to_string(times) + "x " + what;
+  for (const auto& [what, times] : said) {
+    text += (text.empty() ? "" : "; ") + std::to_string(times.count) + "x " + what;
+    if (!times.first.empty()) text += " (" + times.first + ")";
+  }
   return text;
 }
 

@@ -151,7 +151,7 @@
   CFP_LAYOUT(cfp::ObjectMemory, known)                                   \
   CFP_LAYOUT(cfp::FlowModelWorkspace<float>, ransac)                     \
   CFP_LAYOUT(cfp::FlowModelWorkspace<double>, ransac)                    \
-  CFP_LAYOUT(cfp::HealthOptions, min_effective_points)                   \
+  CFP_LAYOUT(cfp::HealthOptions, min_inlier_weight)                      \
   CFP_LAYOUT(cfp::FrameHealth, fallback)                                 \
   CFP_LAYOUT(cfp::ObjectClass, non_rigid)                                \
   CFP_LAYOUT(cfp::FlowPairs<float>, relative_sigmas) \
@@ -167,7 +167,7 @@
   CFP_LAYOUT(cfp::CoarseOptions, foreground) \
   CFP_LAYOUT(cfp::UnreportedOptions, max_parallax) \
   CFP_LAYOUT(cfp::FineOptions, matching) \
-  CFP_LAYOUT(cfp::FrameOptions, min_inlier_weight) \
+  CFP_LAYOUT(cfp::FrameOptions, min_creation_probability) \
   CFP_LAYOUT(cfp::ConstraintReport, confidence) \
   CFP_LAYOUT(cfp::FrameReport, health) \
   CFP_LAYOUT(cfp::ConstraintExplanation, confidence) \

@@ -54,7 +54,7 @@ TEST_CASE("The defaults of the flow and of objects", "[core]") {
 TEST_CASE("The defaults of constraints, map points and frames", "[core]") {
   const cfp::FrameOptions o;
   CHECK((o.use_boxes && o.classes.size() == 1 && o.classes[0].class_id == 0 && o.classes[0].non_rigid));
-  CHECK((o.object_threshold == 0.9 && o.min_creation_probability == 0.3 && o.min_inlier_weight == 0.1));
+  CHECK((o.object_threshold == 0.9 && o.min_creation_probability == 0.3 && o.health.min_inlier_weight == 0.1));
   CHECK((o.fine.enabled && o.fine.min_pose_inliers == 10 && o.fine.min_translation_m == 0.005 &&
          o.fine.least_speed_m_s == 0.5));
   const cfp::ConstraintOptions& c = o.fine.constraint;

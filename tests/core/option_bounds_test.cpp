@@ -149,7 +149,7 @@ TEST_CASE("The ends of the ranges of a frame's options", "[core]") {
       CFP_FIELD(O, map_point.foreground_prior, inside),
       CFP_FIELD(O, map_point.background_prior, inside),
       CFP_FIELD(O, min_creation_probability, share),
-      CFP_FIELD(O, min_inlier_weight, below_one),
+      CFP_FIELD(O, health.min_inlier_weight, below_one),
       CFP_FIELD(O, health.min_effective_points, not_negative),
       CFP_FIELD(O, coarse.flow.margin, not_negative),
       CFP_FIELD(O, coarse.flow.camera_acceleration_m_s2, not_negative),

@@ -131,7 +131,7 @@ TEST_CASE("Every option of a frame is refused by its full, unique name", "[core]
       {"fine.matching.max_distance", [](auto& o) { o.fine.matching.max_distance = -1; }},
       {"fine.matching.max_ratio", [&](auto& o) { o.fine.matching.max_ratio = nan; }},
       {"min_creation_probability", [&](auto& o) { o.min_creation_probability = nan; }},
-      {"min_inlier_weight", [&](auto& o) { o.min_inlier_weight = nan; }},
+      {"health.min_inlier_weight", [&](auto& o) { o.health.min_inlier_weight = nan; }},
       {"health.min_effective_points", [&](auto& o) { o.health.min_effective_points = nan; }},
   };
   CHECK(!invalid_field(cfp::FrameOptions{}));

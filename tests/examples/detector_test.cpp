@@ -66,6 +66,24 @@ TEST_CASE("Boxes of a text file come by time stamp, clipped to the image", "[det
   CHECK(detector->detect(cv::Mat(), 3).empty());
 }
 
+TEST_CASE("A file of boxes of which none is of use says why", "[detector]") {
+  const cfp_test::TemporaryFolder folder;
+  const cv::Mat image(480, 640, CV_8UC3);
+  const auto complaint = [&](const std::string& text, double time) {
+    const auto detector = make_detector(folder.write("d.txt", text));
+    (void)detector->detect(image, time);
+    return detector->complaint();
+  };
+  CHECK(complaint("1.0 person 0.9 1 5 50 70\n", 1).empty());
+  CHECK(complaint("# the detector saw nothing\n", 1).empty());
+  CHECK(complaint("1.0 person 0.9 1 5 50 70\n2.0 person 0.9 1 5 50 70\n", 1.012)
+            .find("d.txt: no image is within 5 ms "
+                  "of any of its 2 time stamps") != std::string::npos);
+  CHECK(complaint("1.0 Person 0.9 1 5 50 70\n", 1).find("d.txt: no class 'person'") != std::string::npos);
+  CHECK(make_detector("none")->complaint().empty());
+  CHECK(make_detector("hog")->complaint().empty());
+}
+
 TEST_CASE("What cannot be used as a detector is refused by name", "[detector]") {
   const cfp_test::TemporaryFolder folder;
   const auto refused = [](const std::string& spec, const std::string& word) {

@@ -199,3 +199,15 @@ TEST_CASE("A full disk is an error that names the file, and no file is half of w
   CHECK_FALSE(std::filesystem::exists(run_folder(folder.path / "out", settings_of(folder.path / "recording"))));
 }
 #endif
+
+TEST_CASE("What frames said is summed up without its numbers, of a file's lines the first in full", "[slam]") {
+  Said said;
+  FrameRecord record;
+  for (const char* note : {"gap before this frame: 0.5 s", "a/rgb.txt:7: no depth image near its time; lost, jump: 3",
+                           "gap before this frame: 0.7 s; a/rgb.txt:9: 8.png: not there"}) {
+    record.note = note;
+    listen(record, said);
+  }
+  CHECK(text_of(said) ==
+        "2x a/rgb.txt (a/rgb.txt:7: no depth image near its time); 2x gap before this frame; 1x lost, jump");
+}

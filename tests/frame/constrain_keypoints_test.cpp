@@ -148,6 +148,23 @@ TEST_CASE("Too little translation leaves the projection constraint alone", "[fra
   CHECK(again.fine(any_translation).epipolar.status == cfp::Status::ok);
 }
 
+TEST_CASE("With one camera that hardly moves, what rests is told by epipolar lines, but not as printed", "[frame]") {
+  DynamicSceneOptions scene;
+  scene.translation_m = 0.002;
+  for (const cfp::WeightRule rule : {cfp::WeightRule::posterior, cfp::WeightRule::product}) {
+    cfp::FrameOptions options;
+    options.map_point.weight = rule;
+    FineRun<double> run(make_dynamic_scene<double>(scene, 12));
+    run.scene.previous_depths.clear();
+    const cfp::FrameReport result = run.fine(options);
+    const bool asked = rule == cfp::WeightRule::posterior;
+    CHECK(result.projection.status == cfp::Status::not_enough_data);
+    CHECK(result.epipolar.status == (asked ? cfp::Status::ok : cfp::Status::degenerate));
+    CHECK((result.constrained > 100) == asked);
+    if (asked) CHECK(ranked_rightly(run) >= 0.9);
+  }
+}
+
 TEST_CASE("Whose steps would not show earns no weight by standing still, who is near does", "[frame]") {
   cfp_test::FarWalkerOptions walker;
   walker.rate_hz = 60, walker.points = 6, walker.across_m_s = 0.6;

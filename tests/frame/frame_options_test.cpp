@@ -32,7 +32,7 @@ TEST_CASE("Frame options outside their range are named by their whole path", "[f
   CHECK(named([](auto& o) { o.tracker.max_coast = -1; }) == "tracker.max_coast");
   CHECK(named([](auto& o) { o.map_point.rate = 0; }) == "map_point.rate");
   CHECK(named([](auto& o) { o.health.min_effective_points = -1; }) == "health.min_effective_points");
-  CHECK(named([](auto& o) { o.min_inlier_weight = 1; }) == "min_inlier_weight");
+  CHECK(named([](auto& o) { o.health.min_inlier_weight = 1; }) == "health.min_inlier_weight");
   CHECK(named([](auto& o) { o.min_creation_probability = -0.1; }) == "min_creation_probability");
   CHECK(named([](auto& o) { o.classes.clear(); }) == "classes");
   CHECK(named([](auto& o) { o.classes.push_back({2, false, 1.0}); }) == "classes.prior");

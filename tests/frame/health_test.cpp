@@ -64,6 +64,21 @@ TEST_CASE("The fallback raises the background first and everything only when tha
   CHECK(off.weight[20] == 0);
 }
 
+TEST_CASE("Weights that are all near 0 carry no pose, alike as they are", "[pipeline]") {
+  for (const std::size_t surer : {std::size_t(0), std::size_t(6)}) {
+    Frame frame;
+    frame.add(620, KeypointLabel::foreground, 0.002).add(surer, KeypointLabel::outside, 0.9);
+    const cfp::FrameHealth health = frame.apply();
+    CHECK_THAT(health.effective_points, WithinAbs(double(surer), 1e-9));
+    CHECK(health.fallback == WeightFallback::all);
+    CHECK(frame.weight[0] == 1);
+  }
+  Frame frame;  // as many that carry are left as they are, whatever is beside them
+  frame.add(620, KeypointLabel::foreground, 0.002).add(12, KeypointLabel::outside, 0.9);
+  CHECK(frame.apply().fallback == WeightFallback::none);
+  CHECK(frame.weight[0] == 0.002);
+}
+
 TEST_CASE("Health of hostile and empty frames is finite", "[pipeline]") {
   Frame frame;
   frame.add(3, KeypointLabel::foreground, std::numeric_limits<double>::quiet_NaN())

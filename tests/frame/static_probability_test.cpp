@@ -265,8 +265,8 @@ TEST_CASE("An object index per keypoint tells what is on an object; what it leav
 
 TEST_CASE("A box without a mask is as any box, and what a mask leaves out of a person is told by the flow", "[frame]") {
   const DynamicScene<double> scene = make_dynamic_scene<double>({}, 38);
-  Host boxes(scene), nothing(scene), half(scene);
-  for (Host* host : {&boxes, &nothing, &half}) host->probability.coarse(host->previous());
+  Host boxes(scene), nothing(scene);
+  for (Host* host : {&boxes, &nothing}) host->probability.coarse(host->previous());
   boxes.probability.coarse(boxes.current());
   cfp::Frame<double> frame = nothing.current();
   const std::vector<std::int32_t> none(scene.keypoints.size(), cfp::no_object);
@@ -275,21 +275,68 @@ TEST_CASE("A box without a mask is as any box, and what a mask leaves out of a p
   CHECK(nothing.probability.state().label == boxes.probability.state().label);
   CHECK(nothing.probability.state().weight == boxes.probability.state().weight);
 
+  // Whatever is said of them that is no object of ours: nothing, a detection that is not there, a bag, a skipped box.
   std::vector<std::int32_t> object = object_index(scene);
-  for (std::size_t i = 1; i < object.size(); i += 2) object[i] = cfp::no_object;
-  frame = half.current();
-  frame.object_of_keypoint = object;
-  half.probability.coarse(frame);
-  double left_out = 0, weight = 0;
-  for (std::size_t i = 1; i < object.size(); i += 2) {
-    if (!scene.is_person[i]) continue;
-    ++left_out;
-    weight += half.probability.weight(i, 0.98);
-    CHECK(half.probability.state().label[i] == KeypointLabel::background);
-    CHECK(half.probability.state().flow_probability[i] >= 0);
+  for (const std::int32_t named : {cfp::no_object, 254, 2, 3}) {
+    CAPTURE(named);
+    for (std::size_t i = 1; i < object.size(); i += 2) object[i] = named;
+    Host half(scene);
+    half.probability.coarse(half.previous());
+    half.detections.push_back({{200, 100, 300, 300}, 24, 0.8});
+    half.detections.push_back({{200, 100, 300, 300}, 0, std::numeric_limits<double>::quiet_NaN()});
+    frame = half.current();
+    frame.object_of_keypoint = object;
+    half.probability.coarse(frame);
+    double left_out = 0, weight = 0;
+    for (std::size_t i = 1; i < object.size(); i += 2) {
+      if (!scene.is_person[i]) continue;
+      ++left_out;
+      weight += half.probability.weight(i, 0.98);
+      CHECK(half.probability.state().label[i] == KeypointLabel::background);
+      CHECK(half.probability.state().flow_probability[i] >= 0);
+    }
+    CHECK(left_out > 50);
+    CHECK(weight < 0.8 * left_out);
   }
-  CHECK(left_out > 50);
-  CHECK(weight < 0.8 * left_out);
+}
+
+TEST_CASE("A second box on somebody at rest takes nothing from the one that he has, whatever its class", "[frame]") {
+  cfp_test::DynamicSceneOptions at_rest;
+  at_rest.person_motion_m = 0;
+  const DynamicScene<double> scene = make_dynamic_scene<double>(at_rest, 33);
+  cfp::FrameOptions options;
+  options.classes = {{0, true}, {1, true}};
+  const auto weights_with = [&](bool depths, int class_id, bool first) {
+    Host host(scene, options);
+    for (int k = 0; k < 4; ++k) host.both();  // his box remembers that he rests
+    host.probability.coarse(host.previous());
+    cfp::Box<double> wider = scene.boxes[0];
+    wider.x1 -= 3, wider.y2 += 3;
+    const cfp::Detection<double> second{wider, class_id, 0.8};
+    if (class_id >= 0) host.detections.insert(first ? host.detections.begin() : host.detections.end(), second);
+    cfp::Frame<double> frame = host.current();
+    if (!depths) frame.depths = {};
+    host.probability.coarse(frame);
+    CHECK(host.probability.state().boxes.size() == (class_id >= 0 ? 3 : 2));
+    return copy(host.probability.fine({scene.T_cur_prev, 300}, scene.match, host.m).weight);
+  };
+  for (const bool depths : {true, false}) {
+    const std::vector<double> alone = weights_with(depths, -1, false);
+    for (const int class_id : {0, 1}) {
+      for (const bool first : {true, false}) {
+        CAPTURE(depths, class_id, first);
+        const std::vector<double> weight = weights_with(depths, class_id, first);
+        int on_him = 0;
+        for (std::size_t i = 0; i < weight.size(); ++i) {
+          if (!scene.is_person[i] || !cfp::contains(scene.boxes[0], scene.keypoints[i][0], scene.keypoints[i][1]))
+            continue;
+          CHECK_THAT(weight[i], WithinAbs(alone[i], 0.05));
+          on_him += alone[i] > 0.5 ? 1 : 0;
+        }
+        CHECK(on_him > 50);
+      }
+    }
+  }
 }
 
 TEST_CASE("A mask whose labels name no detection is told, and its box is one without a mask", "[frame]") {

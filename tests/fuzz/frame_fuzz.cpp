@@ -53,7 +53,7 @@ std::vector<float> run(FuzzInput in, const Camera& camera) {
     cfp_fuzz::disturb(in, options,
                       {&options.object_threshold,
                        &options.min_creation_probability,
-                       &options.min_inlier_weight,
+                       &options.health.min_inlier_weight,
                        &options.coarse.flow_radius_px,
                        &options.coarse.flow_depth_radius_px,
                        &options.coarse.unreported.radius_px,

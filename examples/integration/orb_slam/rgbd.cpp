@@ -63,7 +63,6 @@ void run(const char* vocabulary, const char* folder, const std::string& trajecto
   const bool plain = variant == cfp::Variant::plain;
   cfp::FrameOptions options = cfp::variant_options(
       variant, cfp_integration::StaticWeightsOptions(detector.class_of("person"), camera.width, camera.height));
-  if (mono) options.fine.min_translation_m = 0;  // the map's unit is no metre
   if (!plain) slam.UseStaticWeights(options);
 
   std::vector<double> milliseconds;

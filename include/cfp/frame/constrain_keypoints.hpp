@@ -110,7 +110,9 @@ template <typename Scalar, typename Camera>
                          PointSpan<Scalar, 2>(state.current.keypoints), pose.T_cur_prev.template cast<Scalar>(), camera,
                          span<Scalar>(scratch.projection));
   fitted.projection = fit_to_static(scratch.projection, map_point_probability, options, state);
-  const bool moved = pose.T_cur_prev.translation.norm() > options.fine.min_translation_m;
+  const bool alone =
+      fitted.projection.status == Status::not_enough_data && options.map_point.weight == WeightRule::posterior;
+  const bool moved = pose.T_cur_prev.translation.norm() > (alone ? 0 : options.fine.min_translation_m);
   if (moved) {
     pose_epipolar_distances(pose.T_cur_prev, camera, state);
     fitted.epipolar = fit_to_static(scratch.epipolar, map_point_probability, options, state);
@@ -154,7 +156,8 @@ void gather_evidence(std::size_t i, const FrameConstraints<Scalar>& constraints,
 inline namespace CFP_ISA {
 
 /// Sets K of every keypoint in a box. In order: the distances d^T (reprojection_distances) and d^F
-/// (epipolar_distances under F = K^-T [t]x R K^-1 with the camera matrix K, skipped for |t| <= t_Th) of all matches; a
+/// (epipolar_distances under F = K^-T [t]x R K^-1 with the camera matrix K, skipped for |t| <= t_Th: see
+/// FineOptions::min_translation_m) of all matches; a
 /// sigmoid for each from the keypoints outside all boxes; second_stage_probability for those inside. M is that of
 /// before this frame, negative where there is no map point; empty for a host that keeps none. With
 /// WeightRule::posterior a keypoint that neither constraint judges, for want of a match, a depth or a translation, gets

@@ -45,7 +45,8 @@ struct Frame {
   /// the object then comes from it, not from depths. A detection that it never names, and a compensated box, are as
   /// without.
   span<const std::int32_t> object_of_keypoint;
-  LabelImage labels;           ///< the same as an image: label v belongs to detection v - 1
+  /// The same as an image, and then for the flow pairs, too: label v belongs to detection v - 1.
+  LabelImage labels;
   DescriptorSpan descriptors;  ///< binary, one per keypoint: `fine` then matches what lies in boxes by itself
   span<const Scalar> map_point_probability;  ///< M per keypoint if matches are known by now, negative: no map point
   /// The camera's motion since frame k-1, if the host knows it by now, and its standard deviations in metres and

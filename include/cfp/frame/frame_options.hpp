@@ -73,7 +73,9 @@ struct CoarseOptions {
 struct FineOptions {
   bool enabled = true;           ///< false: K of the coarse stage is final (W/O-KSP, Only-YOLO)
   double min_pose_inliers = 10;  ///< Th_BA: least inliers a pose may rest on (ORB-SLAM2's 10), >= 0
-  /// t_Th in metres: |t| at or below it skips the epipolar constraint, >= 0. No source in the paper.
+  /// t_Th in metres: |t| at or below it skips the epipolar constraint, >= 0. No source in the paper. With
+  /// WeightRule::posterior only beside a projection constraint: where that has nothing to say, as with one camera, the
+  /// other is asked of any motion, since what stands is near every line.
   double min_translation_m = 0.005;
   /// WeightRule::posterior: how slow those may be who count as moving. Where depths tell that somebody of this speed
   /// goes less than D_Th from one image to the next, K says as much less (second_stage_evidence): far away and at
@@ -93,7 +95,6 @@ struct FrameOptions {
   MapPointOptions map_point;
   HealthOptions health;
   double min_creation_probability = 0.3;  ///< keypoints of which less is known should make no map point, in [0, 1]
-  double min_inlier_weight = 0.1;         ///< inliers of at most this weight should not count for the pose, in [0, 1)
 };
 
 /// The systems of the paper's Table IV, and plain SLAM.
@@ -145,7 +146,6 @@ inline namespace CFP_ISA {
   }
   if (!detail::inside_unit_interval(o.object_threshold)) return "object_threshold";
   if (!(o.min_creation_probability >= 0 && o.min_creation_probability <= 1)) return "min_creation_probability";
-  if (!(o.min_inlier_weight >= 0 && o.min_inlier_weight < 1)) return "min_inlier_weight";
   if (const OptionPath field = nested("tracker", invalid_field(o.tracker))) return field;
   if (const OptionPath field = nested("coarse", invalid_field(o.coarse))) return field;
   if (const OptionPath field = nested("fine", invalid_field(o.fine))) return field;

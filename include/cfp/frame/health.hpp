@@ -12,6 +12,8 @@ namespace cfp {
 struct HealthOptions {
   /// fewer effective observations than this are no base for a pose (ORB-SLAM2's 10), >= 0; 0: no fallback
   double min_effective_points = 10;
+  /// weights of at most this carry no pose, alike as they may be: inliers of such should not count as any, in [0, 1)
+  double min_inlier_weight = 0.1;
 };
 
 enum class WeightFallback : std::uint8_t {
@@ -23,7 +25,7 @@ enum class WeightFallback : std::uint8_t {
 struct FrameHealth {
   std::size_t observations = 0;  ///< keypoints with a map point
   double weight = 0;             ///< sum of their weights
-  double effective_points = 0;   ///< (sum w)^2 / sum w^2: the number of equal weights that carry as much
+  double effective_points = 0;   ///< (sum w)^2 / sum w^2 over those that carry: as much as so many equal weights
   double box_share = 0;          ///< share of the weight that lies inside boxes, in [0, 1]
   WeightFallback fallback = WeightFallback::none;
 };
@@ -32,6 +34,7 @@ inline namespace CFP_ISA {
 
 [[nodiscard]] inline OptionPath invalid_field(const HealthOptions& o) noexcept {
   if (!detail::non_negative(o.min_effective_points)) return "min_effective_points";
+  if (!(o.min_inlier_weight >= 0 && o.min_inlier_weight < 1)) return "min_inlier_weight";
   return {};
 }
 
@@ -39,23 +42,20 @@ inline namespace CFP_ISA {
 /// clamped.
 template <typename Scalar>
 [[nodiscard]] FrameHealth frame_health(span<const KeypointLabel> label, span<const Scalar> map_point_probability,
-                                       span<const Scalar> weight) noexcept {
+                                       span<const Scalar> weight, const HealthOptions& options) noexcept {
   CFP_ASSERT(label.size() == weight.size() && map_point_probability.size() == weight.size());
   FrameHealth health;
-  double squares = 0, in_boxes = 0;
+  double carried = 0, squares = 0, in_boxes = 0;
   for (std::size_t i = 0; i < weight.size(); ++i) {
     if (!(map_point_probability[i] >= Scalar(0))) continue;
     const double w = static_cast<double>(clamp_probability(weight[i]));
     ++health.observations;
     health.weight += w;
-    squares += w * w;
+    if (w > options.min_inlier_weight) carried += w, squares += w * w;
     in_boxes += label[i] == KeypointLabel::outside ? 0.0 : w;
   }
-  // Weights whose squares underflow carry nothing.
-  if (squares > 0) {
-    health.effective_points = health.weight * health.weight / squares;
-    health.box_share = clamp_probability(in_boxes / health.weight);
-  }
+  if (squares > 0) health.effective_points = carried * carried / squares;  // their squares may underflow
+  if (health.weight > 0) health.box_share = clamp_probability(in_boxes / health.weight);
   return health;
 }
 
@@ -72,7 +72,7 @@ template <typename Scalar>
 template <typename Scalar>
 FrameHealth apply_fallback(span<const KeypointLabel> label, span<const Scalar> map_point_probability,
                            span<Scalar> weight, const HealthOptions& options) noexcept {
-  FrameHealth health = frame_health(label, map_point_probability, span<const Scalar>(weight));
+  FrameHealth health = frame_health(label, map_point_probability, span<const Scalar>(weight), options);
   double effective_points = health.effective_points;
   for (const WeightFallback fallback : {WeightFallback::background, WeightFallback::all}) {
     if (health.observations == 0 || effective_points >= options.min_effective_points) break;
@@ -80,7 +80,7 @@ FrameHealth apply_fallback(span<const KeypointLabel> label, span<const Scalar> m
     for (std::size_t i = 0; i < weight.size(); ++i) {
       if (map_point_probability[i] >= Scalar(0) && is_raised(label[i], fallback)) weight[i] = Scalar(1);
     }
-    effective_points = frame_health(label, map_point_probability, span<const Scalar>(weight)).effective_points;
+    effective_points = frame_health(label, map_point_probability, span<const Scalar>(weight), options).effective_points;
   }
   return health;
 }

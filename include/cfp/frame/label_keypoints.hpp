@@ -46,6 +46,10 @@ void score_flow_at_keypoints(const Frame<Scalar>& frame, const FrameOptions& opt
 }
 
 /// Gives the members of box b, foreground where scratch.mask marks them, to its object: see label_keypoints.
+///
+/// Not in the paper, and not by its weights: what is also foreground of an object that was there before is that
+/// object's and not a new one's. A detector that gives somebody two boxes now and then would else take his observations
+/// away (came_from_nowhere).
 template <typename Scalar>
 void label_members(std::size_t b, const FrameOptions& options, FrameState<Scalar>& state) noexcept {
   const FrameScratch<Scalar>& scratch = state.scratch;
@@ -53,13 +57,17 @@ void label_members(std::size_t b, const FrameOptions& options, FrameState<Scalar
   const Scalar o = static_cast<Scalar>(state.objects[b].static_probability);
   const Scalar k_foreground = first_stage_probability(o, true, threshold);
   const Scalar k_background = options.coarse.soft_background ? first_stage_probability(o, false, threshold) : Scalar(1);
+  const bool was_there = state.boxes[b].associated;
   for (std::size_t j = 0; j < scratch.members.size(); ++j) {
     const std::size_t i = static_cast<std::size_t>(scratch.members[j]);
     const bool foreground = scratch.mask[j] != 0;
+    const bool one_is_new = options.map_point.weight == WeightRule::posterior && foreground &&
+                            state.label[i] == KeypointLabel::foreground &&
+                            state.boxes[static_cast<std::size_t>(state.box[i])].associated != was_there;
     const Scalar k = foreground ? k_foreground : k_background;
     const bool lower = k < state.static_probability[i] ||
                        (k == state.static_probability[i] && foreground && state.label[i] == KeypointLabel::background);
-    if (state.box[i] != no_box && !lower) continue;
+    if (state.box[i] != no_box && !(one_is_new ? was_there : lower)) continue;
     state.static_probability[i] = k;
     state.label[i] = foreground ? KeypointLabel::foreground : KeypointLabel::background;
     state.box[i] = static_cast<std::int32_t>(b);
@@ -75,12 +83,16 @@ template <typename Scalar>
   return frame.object_of_keypoint.empty() ? label_at(frame.labels, x, y) - 1 : frame.object_of_keypoint[i];
 }
 
-/// Adds what lies in the box of an object and on no mask to scratch.members, as its background.
+/// Adds what lies in the box of an object and on no object's mask to scratch.members, as its background: what a
+/// detection covers that is no object, of another class or skipped, may be part of this one (a bag on a back).
 template <typename Scalar, typename DetectionAt>
 void take_what_masks_leave_out(const Box<Scalar>& box, const DetectionAt& detection_at, FrameState<Scalar>& state) {
   for (std::size_t i = 0; i < state.size(); ++i) {
     const auto& [x, y] = state.current.keypoints[i];
-    if (!contains(box, x, y) || detection_at(i) >= 0) continue;
+    if (!contains(box, x, y)) continue;
+    const std::int32_t detection = detection_at(i);
+    const auto is_its_own = [&](const TrackedBox<Scalar>& b) { return b.detection == detection; };
+    if (detection >= 0 && std::any_of(state.boxes.begin(), state.boxes.end(), is_its_own)) continue;
     state.scratch.members.push_back(static_cast<std::int32_t>(i));
     state.scratch.mask.push_back(char(0));
   }
@@ -110,11 +122,11 @@ inline namespace CFP_ISA {
 
 /// Sets K, label and box of every keypoint from state.boxes and state.objects. A keypoint on several objects takes the
 /// smallest of their K, and that box decides for it from then on (ties: foreground before background, then the lower
-/// index). Keypoints on no object keep K = 1. What a mask or object_of_keypoint gives an object is its foreground;
-/// depth then only tells where it stands, and what lies in its box and on no mask is background: masks leave out hands
-/// and feet, which the flow at their place tells (cfp_posterior_study). In a box for which nothing is named depth
-/// decides. O(keypoints x boxes), and flow pairs near each keypoint. Outside of boxes the flow is asked as
-/// UnreportedOptions say.
+/// index; by WeightRule::posterior a new object takes nothing from one that was there before). Keypoints on no object
+/// keep K = 1. What a mask or object_of_keypoint gives an object is its foreground; depth then only tells where it
+/// stands, and what lies in its box and on no object's mask is background: masks leave out hands and feet, which the
+/// flow at their place tells (cfp_posterior_study). In a box for which nothing is named depth decides. O(keypoints x
+/// boxes), and flow pairs near each keypoint. Outside of boxes the flow is asked as UnreportedOptions say.
 template <typename Scalar>
 void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   CFP_ASSERT(state.objects.size() == state.boxes.size());
