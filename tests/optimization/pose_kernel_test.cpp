@@ -107,7 +107,7 @@ TEMPLATE_TEST_CASE("Pose kernel: H and g equal those of numeric Jacobians, pixel
       cfp::detail::add_observations<s>(columns, 0, lanes, camera, T, cfp::Trivial<P>{}, packet);
       CHECK(static_cast<double>(columns.error[0]) == Approx(information * r.squaredNorm()).epsilon(20 * tolerance));
       fill(false);
-      cfp::detail::add_observations<s>(columns, 0, 1, cfp_test::PlainCamera{camera}, T, cfp::Trivial<double>{},
+      cfp::detail::add_observations<s>(columns, 0, 1, cfp_test::PlainCamera{camera}, T, cfp::NamedLoss<double>{},
                                        general);
       check(packet);
       check(general);
