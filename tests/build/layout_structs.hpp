@@ -101,6 +101,8 @@
   CFP_LAYOUT(cfp::GemanMcClure<double>, delta)                           \
   CFP_LAYOUT(cfp::Truncated<float>, delta)                               \
   CFP_LAYOUT(cfp::Truncated<double>, delta)                              \
+  CFP_LAYOUT(cfp::NamedLoss<float>, delta)                               \
+  CFP_LAYOUT(cfp::NamedLoss<double>, delta)                              \
   CFP_LAYOUT(cfp::PoseRound, scale)                                      \
   CFP_LAYOUT(cfp::PoseOptions, inliers_only)                      \
   CFP_LAYOUT(cfp::PoseObservations<float>, baseline_fx)                  \
