@@ -14,7 +14,6 @@
 #include <functional>
 #include <locale>
 #include <map>
-#include <regex>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -62,10 +61,10 @@ inline void listen(const FrameRecord& record, Said& said) {
   for (std::size_t from = 0; from < record.note.size();) {
     const std::size_t to = std::min(record.note.find("; ", from), record.note.size());
     const std::string note = record.note.substr(from, to - from);
-    static const std::regex line(":[0-9]+: ");
-    std::smatch at;
-    const bool of_file = std::regex_search(note, at, line);
-    Times& times = said[of_file ? at.prefix().str() : note.substr(0, note.find(": "))];
+    const std::string what = note.substr(0, note.find(": "));
+    const std::string file = what.substr(0, what.find_last_not_of("0123456789") + 1);  // with its colon, of file:line
+    const bool of_file = file.size() < what.size() && !file.empty() && file.back() == ':';
+    Times& times = said[of_file ? file.substr(0, file.size() - 1) : what];
     if (++times.count == 1 && of_file) times.first = note;
     from = to + 2;
   }

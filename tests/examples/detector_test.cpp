@@ -77,8 +77,7 @@ TEST_CASE("A file of boxes of which none is of use says why", "[detector]") {
   CHECK(complaint("1.0 person 0.9 1 5 50 70\n", 1).empty());
   CHECK(complaint("# the detector saw nothing\n", 1).empty());
   CHECK(complaint("1.0 person 0.9 1 5 50 70\n2.0 person 0.9 1 5 50 70\n", 1.012)
-            .find("d.txt: no image is within 5 ms "
-                  "of any of its 2 time stamps") != std::string::npos);
+            .find("d.txt: no image is within 5 ms of any of its 2 time stamps") != std::string::npos);
   CHECK(complaint("1.0 Person 0.9 1 5 50 70\n", 1).find("d.txt: no class 'person'") != std::string::npos);
   CHECK(make_detector("none")->complaint().empty());
   CHECK(make_detector("hog")->complaint().empty());

@@ -204,10 +204,10 @@ TEST_CASE("What frames said is summed up without its numbers, of a file's lines 
   Said said;
   FrameRecord record;
   for (const char* note : {"gap before this frame: 0.5 s", "a/rgb.txt:7: no depth image near its time; lost, jump: 3",
-                           "gap before this frame: 0.7 s; a/rgb.txt:9: 8.png: not there"}) {
+                           "gap before this frame: 0.7 s; a/rgb.txt:9: 8.png: not there", "7: seven"}) {
     record.note = note;
     listen(record, said);
   }
   CHECK(text_of(said) ==
-        "2x a/rgb.txt (a/rgb.txt:7: no depth image near its time); 2x gap before this frame; 1x lost, jump");
+        "1x 7; 2x a/rgb.txt (a/rgb.txt:7: no depth image near its time); 2x gap before this frame; 1x lost, jump");
 }

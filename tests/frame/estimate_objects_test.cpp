@@ -10,7 +10,6 @@
 #include "cfp/geometry/kannala_brandt_camera.hpp"
 #include "cfp/geometry/radial_tangential_camera.hpp"
 #include "support/catch.hpp"
-#include "support/engines.hpp"
 #include "support/frame_runs.hpp"
 
 using cfp_test::DynamicScene;

@@ -38,6 +38,11 @@ inline namespace CFP_ISA {
   return {};
 }
 
+/// Whether a weight carries a pose.
+[[nodiscard]] constexpr bool carries_pose(double weight, const HealthOptions& options) noexcept {
+  return weight > options.min_inlier_weight;
+}
+
 /// The figures of one frame. Observations are the keypoints with M >= 0 (a map point); weights outside [0, 1] are
 /// clamped.
 template <typename Scalar>
@@ -51,7 +56,7 @@ template <typename Scalar>
     const double w = static_cast<double>(clamp_probability(weight[i]));
     ++health.observations;
     health.weight += w;
-    if (w > options.min_inlier_weight) carried += w, squares += w * w;
+    if (carries_pose(w, options)) carried += w, squares += w * w;
     in_boxes += label[i] == KeypointLabel::outside ? 0.0 : w;
   }
   if (squares > 0) health.effective_points = carried * carried / squares;  // their squares may underflow

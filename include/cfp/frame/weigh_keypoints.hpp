@@ -200,7 +200,7 @@ template <typename Scalar>
 /// Whether an inlier of this weight should count when a host asks how many its pose rests on (mnMatchesInliers).
 template <typename Scalar>
 [[nodiscard]] bool counts_as_inlier(Scalar weight, const FrameOptions& options) noexcept {
-  return static_cast<double>(weight) > options.health.min_inlier_weight;
+  return carries_pose(static_cast<double>(weight), options.health);
 }
 
 }  // namespace CFP_ISA
