@@ -17,8 +17,9 @@
   CFP_LAYOUT(cfp::DbscanWorkspace<double>, labels)                       \
   CFP_LAYOUT(cfp::ForegroundInput<float>, depth_noise)                   \
   CFP_LAYOUT(cfp::ForegroundInput<double>, depth_noise)             \
-  CFP_LAYOUT(cfp::ObjectDepth<float>, depth_m)                           \
-  CFP_LAYOUT(cfp::ObjectDepth<double>, depth_m)                          \
+  CFP_LAYOUT(cfp::OfTrack<float>, value)                                 \
+  CFP_LAYOUT(cfp::OfTrack<double>, value)                                \
+  CFP_LAYOUT(cfp::OfTrack<cfp::ObjectMemory>, value)                     \
   CFP_LAYOUT(cfp::ForegroundOptions, min_points)                         \
   CFP_LAYOUT(cfp::ForegroundResult, dbscan)                              \
   CFP_LAYOUT(cfp::ForegroundWorkspace<float>, odds)                      \

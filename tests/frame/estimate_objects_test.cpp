@@ -372,7 +372,7 @@ TEST_CASE("Where a mask spills over the silhouette, the depth of the wall does n
       // Of the keypoints the mask alone tells; depth tells where the object stands.
       CHECK(report.foreground == 180);
       CHECK(report.background == 0);
-      CHECK(cfp::object_depth(run.state.current, run.state.boxes[0].id) == Approx(1.5).margin(0.05));
+      CHECK(cfp::of_track(run.state.current.object_depths, run.state.boxes[0].id) == Approx(1.5).margin(0.05));
     }
   }
 }

@@ -91,7 +91,7 @@ struct FrameRun {
 
   DynamicScene<Scalar> scene;
   std::vector<Scalar> m;
-  std::vector<cfp::ObjectDepth<Scalar>> previous_object_depths;  // of the boxes in the frame before
+  std::vector<cfp::OfTrack<Scalar>> previous_object_depths;  // of the boxes in the frame before
   cfp::PoseEstimate pose;
   cfp::FrameState<Scalar> state;
 };

@@ -76,7 +76,7 @@ class FrameFlow {
     mPeople.clear();
     for (const auto& box : last.boxes) {
       mBoxes.push_back(box.box);
-      mPeople.push_back({box.box, cfp::object_depth(last.current, box.id)});
+      mPeople.push_back({box.box, cfp::of_track(last.current.object_depths, box.id)});
     }
     cfp_examples::room_mask(gray.size(), mLastDepth, 1, mPeople, mRoom);
     mTracker.track(gray, mLastKeys, mBoxes, mRoom);

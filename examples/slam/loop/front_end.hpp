@@ -77,7 +77,7 @@ class FrontEnd {
     last_people_.clear();
     for (const auto& box : state.boxes) {
       last_boxes_.push_back(box.box);
-      last_people_.push_back({box.box, cfp::object_depth(state.current, box.id)});
+      last_people_.push_back({box.box, cfp::of_track(state.current.object_depths, box.id)});
     }
   }
 

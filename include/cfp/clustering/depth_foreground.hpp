@@ -131,16 +131,6 @@ template <typename Scalar>
   return best;
 }
 
-// Up to the end of the cluster of the lowest mean depth, which is the first; nothing without one.
-template <typename Scalar>
-[[nodiscard]] DepthRange first_cluster(span<const Scalar> depths, const DbscanOptions& parameters,
-                                       DbscanWorkspace<Scalar>& workspace) {
-  std::vector<int>& labels = workspace.labels;
-  labels.resize(depths.size());
-  dbscan_sorted(depths, parameters, workspace, labels);
-  return {0, static_cast<std::size_t>(labels.rend() - std::find(labels.rbegin(), labels.rend(), 0))};
-}
-
 }  // namespace CFP_ISA
 }  // namespace detail
 
@@ -175,7 +165,10 @@ ForegroundResult depth_foreground(const ForegroundInput<non_deduced<Scalar>>& in
       range = detail::person_range<Scalar>(in, sorted, options, workspace.odds);
     } else {
       result.dbscan = adaptive_options(depths, options.adaptive, workspace);
-      range = detail::first_cluster(depths, result.dbscan, workspace);
+      workspace.labels.resize(n);
+      dbscan_sorted(depths, result.dbscan, workspace, workspace.labels);
+      const auto after_first = std::find(workspace.labels.rbegin(), workspace.labels.rend(), 0).base();
+      range = {0, static_cast<std::size_t>(after_first - workspace.labels.begin())};
     }
     result.status = range.last > range.first ? ForegroundStatus::ok : ForegroundStatus::no_cluster;
     if (range.last <= range.first) range = {0, n};

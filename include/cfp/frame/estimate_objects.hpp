@@ -198,9 +198,7 @@ void remember_objects(const FrameOptions& options, FrameState<Scalar>& state) {
   next.clear();
   const double dt = detail::elapsed_s(state);
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
-    const auto of_box =
-        std::find_if(known.begin(), known.end(), [&](const auto& m) { return m.first == state.boxes[b].id; });
-    ObjectMemory memory = of_box != known.end() && state.previous.known ? of_box->second : ObjectMemory{};
+    ObjectMemory memory = state.previous.known ? of_track(known, state.boxes[b].id) : ObjectMemory{};
     const bool unknown = state.objects[b].status != Status::ok;
     state.objects[b] = remember_object(state.objects[b], dt, options.object_threshold, options.coarse.memory, memory);
     if (unknown && state.objects[b].status == Status::ok) --state.report.unknown_objects;

@@ -115,7 +115,7 @@ template <typename Scalar>
     e.flow_sigma_px = state.report.flow_sigma_px;
     if (foreground || options.coarse.soft_background)
       e.coarse_probability = static_cast<double>(first_stage_probability(o, foreground, threshold));
-    if (state.report.stage == Stage::fine && state.report.constrained > 0) {
+    if (state.report.constrained > 0) {
       const SecondStageKeypoint<Scalar>& known = state.evidence[i];
       e.stage = Stage::fine;
       e.rule = second_stage_rule(known, threshold);

@@ -55,21 +55,6 @@ template <typename Scalar>
   return model;
 }
 
-/// The same of a motion up to scale, of pairs at the depth of the room, 1: how far each of them is beside it is no
-/// error. So many parameters were fitted to them.
-template <typename Scalar>
-[[nodiscard]] FlowModel<Scalar> model_up_to_scale(const CameraMotion<Scalar>& motion,
-                                                  const PairsWithDepth<Scalar>& pairs, RansacStatus no_fundamental,
-                                                  int parameters) {
-  CameraMotionOptions any_depth = pairs.options;
-  any_depth.distance.depth_noise = {1, 0, 0};
-  FlowModel<Scalar> model = model_of(
-      motion, shared_error<Scalar>({pairs.flow, pairs.camera, any_depth, pairs.workspace}, motion, parameters));
-  model.kind = FlowModelKind::motion_up_to_scale;
-  model.status = no_fundamental;
-  return model;
-}
-
 /// F as a model, with the noise of the pairs marked in `outside` if enough of them have a distance.
 template <typename Scalar>
 [[nodiscard]] FlowModel<Scalar> fundamental_model(const Matrix3<Scalar>& F, RansacStatus status, FlowSupport support,
@@ -130,7 +115,13 @@ FlowModel<Scalar> estimate_without_depths(const FlowPairs<Scalar>& flow, span<co
   CameraMotion<Scalar> motion = estimate_camera_motion(pairs, outside, camera, options.motion, workspace.motion);
   if (!motion.known) return model;
   const int parameters = straighten(pairs, motion);
-  return model_up_to_scale<Scalar>(motion, {pairs, camera, options.motion, workspace.motion}, model.status, parameters);
+  CameraMotionOptions any_depth = options.motion;
+  any_depth.distance.depth_noise = {1, 0, 0};  // how far a pair is beside the room's depth, 1, is no error
+  FlowModel<Scalar> up_to_scale =
+      model_of(motion, shared_error<Scalar>({pairs, camera, any_depth, workspace.motion}, motion, parameters));
+  up_to_scale.kind = FlowModelKind::motion_up_to_scale;
+  up_to_scale.status = model.status;
+  return up_to_scale;
 }
 
 }  // namespace CFP_ISA

@@ -65,11 +65,11 @@ struct FrameReport {
   FrameHealth health;          ///< of the weights, fallback included
 };
 
-/// Where the foreground of a tracked box stood.
-template <typename Scalar>
-struct ObjectDepth {
+/// What is known of the object of a track.
+template <typename T>
+struct OfTrack {
   std::int64_t id = 0;  ///< of the track
-  Scalar depth_m{};     ///< median, see ForegroundResult
+  T value{};
 };
 
 /// What the next frame has to know of a frame.
@@ -78,12 +78,12 @@ struct FrameMemory {
   bool known = false;  ///< false: there was no such frame
   double timestamp_s = 0;
   std::vector<std::array<Scalar, 2>> keypoints;
-  std::vector<Scalar> depths;                      ///< empty: none
-  std::vector<ObjectDepth<Scalar>> object_depths;  ///< of the boxes that the depths could separate
-  std::vector<std::uint8_t> descriptors;           ///< one after the other; empty: none
-  std::size_t descriptor_bytes = 0;                ///< of each
-  TimedMotion<double> motion;                      ///< of the camera until then, by the flow's depths
-  std::optional<double> shared_error_sq;           ///< px^2: what pairs with depth erred by together until then, mean
+  std::vector<Scalar> depths;                  ///< empty: none
+  std::vector<OfTrack<Scalar>> object_depths;  ///< where the foregrounds stood that the depths could separate: median
+  std::vector<std::uint8_t> descriptors;       ///< one after the other; empty: none
+  std::size_t descriptor_bytes = 0;            ///< of each
+  TimedMotion<double> motion;                  ///< of the camera until then, by the flow's depths
+  std::optional<double> shared_error_sq;       ///< px^2: what pairs with depth erred by together until then, mean
 
   [[nodiscard]] DescriptorSpan descriptor_view() const noexcept {
     return {descriptors.data(), descriptors.empty() ? 0 : keypoints.size(), descriptor_bytes, descriptor_bytes};
@@ -114,20 +114,20 @@ struct FrameScratch {
   std::vector<std::int32_t> members;
   std::vector<char> mask, outside;
   std::vector<detail::PairLabel> pair_label;  // per box and flow pair
-  std::vector<std::pair<std::int64_t, ObjectMemory>> memories;
+  std::vector<OfTrack<ObjectMemory>> memories;
 };
 
 /// Reused from frame to frame: after the largest frame has been seen, the steps allocate nothing.
 template <typename Scalar>
 struct FrameState {
   FrameMemory<Scalar> previous, current;
-  std::vector<TrackedBox<Scalar>> boxes;                        ///< of objects that can move: detected and compensated
-  std::vector<TrackedBox<Scalar>> previous_boxes;               ///< the same of the frame before
-  std::optional<Matrix3<Scalar>> image_motion;                  ///< that moved the predicted boxes; not set: none
-  std::vector<ObjectProbability> objects;                       ///< O, one per box
-  std::vector<std::pair<std::int64_t, ObjectMemory>> memories;  ///< of the objects, by the id of their boxes
-  std::vector<KeypointLabel> label;                             ///< per keypoint
-  std::vector<std::int32_t> box;                                ///< per keypoint: the box that decides its K, or no_box
+  std::vector<TrackedBox<Scalar>> boxes;              ///< of objects that can move: detected and compensated
+  std::vector<TrackedBox<Scalar>> previous_boxes;     ///< the same of the frame before
+  std::optional<Matrix3<Scalar>> image_motion;        ///< that moved the predicted boxes; not set: none
+  std::vector<ObjectProbability> objects;             ///< O, one per box
+  std::vector<OfTrack<ObjectMemory>> memories;        ///< of the objects
+  std::vector<KeypointLabel> label;                   ///< per keypoint
+  std::vector<std::int32_t> box;                      ///< per keypoint: the box that decides its K, or no_box
   std::vector<std::int32_t> match;                    ///< per keypoint: index in the frame before, or no_match
   std::vector<SecondStageKeypoint<Scalar>> evidence;  ///< per keypoint in a box: what the fine stage knew of it
   std::vector<Scalar> flow_depths;                    ///< per flow pair: in the frame before, m; empty: none
@@ -176,12 +176,11 @@ template <typename Scalar>
 
 inline namespace CFP_ISA {
 
-/// Where the object of a track stood in a frame, m; 0: unknown.
-template <typename Scalar>
-[[nodiscard]] Scalar object_depth(const FrameMemory<Scalar>& frame, std::int64_t id) noexcept {
-  const auto& objects = frame.object_depths;
-  const auto found = std::find_if(objects.begin(), objects.end(), [id](const auto& o) { return o.id == id; });
-  return found == objects.end() ? Scalar(0) : found->depth_m;
+/// What is known of a track: T{}, of a depth 0, if nothing is.
+template <typename T>
+[[nodiscard]] T of_track(const std::vector<OfTrack<T>>& known, std::int64_t id) noexcept {
+  const auto found = std::find_if(known.begin(), known.end(), [id](const auto& object) { return object.id == id; });
+  return found == known.end() ? T{} : found->value;
 }
 
 }  // namespace CFP_ISA

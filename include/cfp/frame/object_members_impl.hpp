@@ -54,7 +54,7 @@ ObjectMembers find_members(const TrackedBox<Scalar>& box, const PointSpan<Scalar
   }
   ForegroundInput<Scalar> in{scratch.depths, scratch.points, box.box};
   in.depth_noise = options.coarse.flow.motion.distance.depth_noise;
-  if (state.previous.known) in.previous_depth_m = object_depth(state.previous, box.id);
+  if (state.previous.known) in.previous_depth_m = of_track(state.previous.object_depths, box.id);
   return {by_mask, depth_foreground(in, options.coarse.foreground, scratch.foreground, scratch.mask)};
 }
 
