@@ -69,43 +69,6 @@ struct RelativeErrorResult : TrajectoryErrorResult {
   DeltaUnit unit = DeltaUnit::seconds;
 };
 
-namespace detail {
-inline namespace CFP_ISA {
-
-/// The estimated poses in order of time, each with the true one nearest in time; none without a truth.
-template <typename Truth, typename Estimate>
-[[nodiscard]] std::vector<TimeMatch> nearest_in_time(const Truth& truth, const std::vector<std::size_t>& truth_order,
-                                                     const Estimate& estimate, double offset_s) {
-  std::vector<TimeMatch> matches;
-  if (truth_order.empty()) return matches;
-  const auto truth_stamp = [&](std::size_t i) { return truth[truth_order[i]].time_s; };
-  for (const std::size_t i : time_order(estimate)) {
-    const std::size_t nearest = closest_index(truth_order.size(), estimate[i].time_s + offset_s, truth_stamp);
-    matches.push_back({truth_order[nearest], i});
-  }
-  return matches;
-}
-
-/// Of the matches, the one whose estimated pose is nearest to `delta` after that of match i.
-template <typename Estimate>
-[[nodiscard]] std::size_t match_after(std::size_t i, const std::vector<TimeMatch>& matches, const Estimate& estimate,
-                                      const RelativeErrorOptions& options) {
-  const std::size_t n = matches.size();
-  const auto stamp = [&](std::size_t k) { return estimate[matches[k].second].time_s; };
-  if (options.unit == DeltaUnit::seconds) return closest_index(n, stamp(i) + options.delta, stamp);
-  const auto number = [](std::size_t k) { return static_cast<double>(k); };
-  return closest_index(n, number(i) + options.delta, number);
-}
-
-/// The motion from pose j to pose i as frame j sees it.
-template <typename Trajectory>
-[[nodiscard]] SE3<double> relative_pose(const Trajectory& trajectory, std::size_t j, std::size_t i) {
-  return double_pose(trajectory[j]).inverse() * double_pose(trajectory[i]);
-}
-
-}  // namespace CFP_ISA
-}  // namespace detail
-
 inline namespace CFP_ISA {
 
 [[nodiscard]] inline OptionPath invalid_field(const AbsoluteErrorOptions& options) noexcept {
@@ -188,19 +151,32 @@ template <typename Truth, typename Estimate>
     return result;
   }
   const std::vector<std::size_t> truth_order = time_order(truth);
-  const std::vector<TimeMatch> matches = detail::nearest_in_time(truth, truth_order, estimate, options.offset_s);
+  std::vector<TimeMatch> matches;  // the estimated poses in order of time, each with the true one nearest in time
+  const auto true_stamp = [&](std::size_t k) { return truth[truth_order[k]].time_s; };
+  for (const std::size_t i : time_order(estimate)) {
+    if (truth_order.empty()) break;
+    const std::size_t k = detail::closest_index(truth_order.size(), estimate[i].time_s + options.offset_s, true_stamp);
+    matches.push_back({truth_order[k], i});
+  }
   const std::size_t n = matches.size();
   const double max_difference_s = 2 * detail::median_interval(truth, truth_order);
   const auto has_truth = [&](const TimeMatch& match) {
     return std::abs(truth[match.first].time_s - (estimate[match.second].time_s + options.offset_s)) <= max_difference_s;
   };
+  const auto place = [&](std::size_t k) {
+    return options.unit == DeltaUnit::seconds ? estimate[matches[k].second].time_s : static_cast<double>(k);
+  };
+  // The motion from one pose to another as the first one's frame sees it.
+  const auto motion = [](const auto& trajectory, std::size_t from, std::size_t to) {
+    return detail::double_pose(trajectory[from]).inverse() * detail::double_pose(trajectory[to]);
+  };
   std::vector<char> used(n);
   for (std::size_t i = 0; i < n; ++i) {
-    const std::size_t j = detail::match_after(i, matches, estimate, options);
+    const std::size_t j = detail::closest_index(n, place(i) + options.delta, place);
     if (j + 1 == n || !has_truth(matches[i]) || !has_truth(matches[j])) continue;
-    SE3<double> P = detail::relative_pose(estimate, matches[j].second, matches[i].second);
+    SE3<double> P = motion(estimate, matches[j].second, matches[i].second);
     P.translation *= options.scale;
-    const SE3<double> E = P.inverse() * detail::relative_pose(truth, matches[j].first, matches[i].first);
+    const SE3<double> E = P.inverse() * motion(truth, matches[j].first, matches[i].first);
     used[i] = used[j] = 1;
     detail::add_error(matches[i].second, E.translation, E.rotation, result.errors);
   }
