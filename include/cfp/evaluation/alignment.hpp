@@ -37,9 +37,8 @@ struct Similarity {
 };
 
 struct AlignmentResult {
-  Similarity S_to_from;     ///< maps the points `from` onto `to`
-  std::size_t used = 0;     ///< pairs with finite coordinates
-  std::size_t skipped = 0;  ///< pairs without
+  Similarity S_to_from;  ///< maps the points `from` onto `to`
+  std::size_t used = 0;  ///< pairs with finite coordinates; the others are left out
   Status status = Status::not_enough_data;
 };
 
@@ -74,7 +73,6 @@ template <typename From, typename To>
     if (result.used++ == 0) first[0] = a, first[1] = b;
     largest = (std::max)({largest, a.cwiseAbs().maxCoeff(), b.cwiseAbs().maxCoeff()});
   });
-  result.skipped = from.size() - result.used;
   if (result.used == 0) return result;
 
   // A common unit keeps a rigid motion rigid; the product with 1/unit would overflow for a subnormal unit, so divide.
