@@ -12,48 +12,6 @@
 
 namespace cfp {
 
-namespace detail {
-inline namespace CFP_ISA {
-
-/// p -> turn p + shift, a pixel being x + iy.
-struct ImageSimilarity {
-  std::complex<double> turn = 1, shift = 0;
-
-  [[nodiscard]] double distance_sq(const std::complex<double>& prev, const std::complex<double>& cur) const noexcept {
-    return std::norm(turn * prev + shift - cur);
-  }
-};
-
-template <typename Scalar>
-[[nodiscard]] std::complex<double> complex_pixel(const PointSpan<Scalar, 2>& points, std::size_t i) noexcept {
-  return {static_cast<double>(points(i, 0)), static_cast<double>(points(i, 1))};
-}
-
-/// Fits anew, by Geman-McClure's weights of the distances so far. False where all that counts is at one place.
-template <typename Scalar>
-[[nodiscard]] bool refit(const PointSpan<Scalar, 2>& prev, const PointSpan<Scalar, 2>& cur, double scale_sq,
-                         ImageSimilarity& fit) noexcept {
-  double count = 0, square = 0;
-  std::complex<double> from = 0, to = 0, product = 0;
-  for (std::size_t i = 0; i < prev.size(); ++i) {
-    const std::complex<double> p = complex_pixel(prev, i), q = complex_pixel(cur, i);
-    const double share = scale_sq / (scale_sq + fit.distance_sq(p, q)), weight = share * share;
-    count += weight;
-    from += weight * p;
-    to += weight * q;
-    square += weight * std::norm(p);
-    product += weight * q * std::conj(p);
-  }
-  const double spread = square - std::norm(from) / count;
-  if (!(spread > 1e-9 * square)) return false;
-  fit.turn = (product - to * std::conj(from) / count) / spread;
-  fit.shift = (to - fit.turn * from) / count;
-  return true;
-}
-
-}  // namespace CFP_ISA
-}  // namespace detail
-
 inline namespace CFP_ISA {
 
 /// Sets `motion` to what moves pixels of the frame before to this one, for `warp_box`: a similarity, since a camera
@@ -73,21 +31,40 @@ template <typename Scalar>
   constexpr int passes = 4;
   const std::size_t n = prev.size();
   if (n < 12) return false;
-  detail::ImageSimilarity fit;
+  using Complex = std::complex<double>;  // a pixel x + iy, which goes to turn (x + iy) + shift
+  const auto pixel = [](const PointSpan<Scalar, 2>& points, std::size_t i) {
+    return Complex(static_cast<double>(points(i, 0)), static_cast<double>(points(i, 1)));
+  };
+  Complex turn = 1, shift = 0;
+  const auto distance_sq = [&](std::size_t i) { return std::norm(turn * pixel(prev, i) + shift - pixel(cur, i)); };
   double moved_sq = 0, left_sq = 0;
   distances.resize(n);
-  for (int pass = 0; pass <= passes; ++pass) {
-    for (std::size_t i = 0; i < n; ++i)
-      distances[i] =
-          static_cast<Scalar>(fit.distance_sq(detail::complex_pixel(prev, i), detail::complex_pixel(cur, i)));
+  for (int pass = 0;; ++pass) {
+    for (std::size_t i = 0; i < n; ++i) distances[i] = static_cast<Scalar>(distance_sq(i));
     left_sq = static_cast<double>(order_statistic(span<Scalar>(distances), n / 2));
     if (pass == 0 && !((moved_sq = left_sq) > 0.25)) return false;
+    if (pass == passes) break;
+    // Fits anew, by Geman-McClure's weights of the distances so far.
     const double scale_sq = 2 * left_sq + 0.1;  // px^2; exact pairs, too, need one
-    if (pass < passes && !detail::refit<Scalar>(prev, cur, scale_sq, fit)) return false;
+    double count = 0, square = 0;
+    Complex from = 0, to = 0, product = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      const Complex p = pixel(prev, i), q = pixel(cur, i);
+      const double share = scale_sq / (scale_sq + distance_sq(i)), weight = share * share;
+      count += weight;
+      from += weight * p;
+      to += weight * q;
+      square += weight * std::norm(p);
+      product += weight * q * std::conj(p);
+    }
+    const double spread = square - std::norm(from) / count;
+    if (!(spread > 1e-9 * square)) return false;  // all that counts is at one place
+    turn = (product - to * std::conj(from) / count) / spread;
+    shift = (to - turn * from) / count;
   }
   const double taken = 1 - 12 * left_sq / moved_sq;
   if (!(taken > 0)) return false;
-  const std::complex<double> turn = 1.0 + taken * (fit.turn - 1.0), shift = taken * fit.shift;
+  turn = 1.0 + taken * (turn - 1.0), shift *= taken;
   motion.setIdentity();
   motion(0, 0) = motion(1, 1) = Scalar(turn.real());
   motion(1, 0) = Scalar(turn.imag());
