@@ -9,31 +9,6 @@
 
 namespace cfp {
 
-namespace detail {
-inline namespace CFP_ISA {
-
-/// Whether 1 + a s + b s^2 + c s^3 > 0 for every s in [0, end].
-template <typename Scalar>
-[[nodiscard]] bool stays_positive(const Scalar& a, const Scalar& b, const Scalar& c, const Scalar& end) noexcept {
-  using std::sqrt;
-  const Scalar zero(0);
-  const auto value = [&](const Scalar& s) { return Scalar(1) + s * (a + s * (b + s * c)); };
-  const auto negative = [&](const Scalar& x) { return x < zero ? x : zero; };
-  // The sum of the negative terms at the end is a lower bound over the interval; it settles all but extreme pixels.
-  if (Scalar(1) + end * (negative(a) + end * (negative(b) + end * negative(c))) > zero) return true;
-  if (!(value(end) > zero)) return false;
-  // Else the minimum may lie inside, where the derivative a + 2 b s + 3 c s^2 vanishes.
-  const Scalar discriminant = b * b - Scalar(3) * a * c;
-  if (!(discriminant >= zero)) return true;
-  const Scalar q =
-      b < zero ? Scalar(sqrt(discriminant) - b) : Scalar(-b - sqrt(discriminant));  // the sum without cancellation
-  const auto fails_at = [&](const Scalar& s) { return s > zero && s < end && !(value(s) > zero); };
-  return !fails_at(q / (Scalar(3) * c)) && !fails_at(a / q);
-}
-
-}  // namespace CFP_ISA
-}  // namespace detail
-
 /// With x, y = X/Z, Y/Z and s = x^2 + y^2:
 ///   x' = x (1 + k1 s + k2 s^2 + k3 s^3) + 2 p1 x y + p2 (s + 2 x^2)
 ///   y' = y (1 + k1 s + k2 s^2 + k3 s^3) + p1 (s + 2 y^2) + 2 p2 x y
@@ -59,6 +34,22 @@ struct RadialTangentialCamera {
   /// them.
   [[nodiscard]] CFP_INLINE PinholeCamera<Scalar> pinhole() const noexcept { return {fx, fy, cx, cy}; }
 
+  /// Whether 1 + 3 k1 t + 5 k2 t^2 + 7 k3 t^3 > 0 for every t in [0, s], s finite.
+  [[nodiscard]] CFP_INLINE bool rises_to(const Scalar& s) const noexcept {
+    using std::sqrt;
+    const Scalar zero(0), a = Scalar(3) * k1, b = Scalar(5) * k2, c = Scalar(7) * k3;
+    const auto negative = [&](const Scalar& x) { return x < zero ? x : zero; };
+    // The sum of the negative terms at the end is a lower bound over the interval; it settles all but extreme pixels.
+    if (Scalar(1) + s * (negative(a) + s * (negative(b) + s * negative(c))) > zero) return true;
+    // Else the end tells, or the minimum inside, where the derivative a + 2 b t + 3 c t^2 vanishes; NaN if nowhere.
+    const Scalar root = sqrt(Scalar(b * b - Scalar(3) * a * c));
+    const Scalar q = b < zero ? Scalar(root - b) : Scalar(-b - root);  // the sum without cancellation
+    for (const Scalar& t : {s, Scalar(q / (Scalar(3) * c)), Scalar(a / q)}) {
+      if (t >= zero && t <= s && !(Scalar(1) + t * (a + t * (b + t * c)) > zero)) return false;
+    }
+    return true;
+  }
+
   /// Distorts the point (x, y) of the plane z = 1; false beyond the fold or when not finite.
   [[nodiscard]] CFP_INLINE bool distort(const Scalar& x, const Scalar& y,
                                         detail::DistortedPoint<Scalar>& d) const noexcept {
@@ -71,8 +62,7 @@ struct RadialTangentialCamera {
     d.xx = radial + x * x * twice_slope + Scalar(2) * p1 * y + Scalar(6) * p2 * x;
     d.xy = x * y * twice_slope + Scalar(2) * p1 * x + Scalar(2) * p2 * y;
     d.yy = radial + y * y * twice_slope + Scalar(6) * p1 * y + Scalar(2) * p2 * x;
-    return is_finite(d.x) && is_finite(d.y) && d.xx * d.yy - d.xy * d.xy > Scalar(0) &&
-           detail::stays_positive(Scalar(Scalar(3) * k1), Scalar(Scalar(5) * k2), Scalar(Scalar(7) * k3), s);
+    return is_finite(d.x) && is_finite(d.y) && d.xx * d.yy - d.xy * d.xy > Scalar(0) && rises_to(s);
   }
 
   /// Projects a point of the camera frame. Returns whether the projection is valid: a finite z >
