@@ -2,7 +2,6 @@
 /// What all pixel distances of cfp share: the value that stands for "no distance", and the noise that they show.
 #pragma once
 
-#include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/math/order_statistic.hpp"
 

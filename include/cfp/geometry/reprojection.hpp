@@ -8,7 +8,6 @@
 
 #include <cmath>
 
-#include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/geometry/distance.hpp"
 #include "cfp/math/se3.hpp"

@@ -12,7 +12,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <type_traits>
 
 #include "cfp/geometry/camera.hpp"
 #include "cfp/optimization/least_squares.hpp"
