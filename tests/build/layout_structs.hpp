@@ -79,7 +79,6 @@
   CFP_LAYOUT(cfp::KannalaBrandtCamera<double>, k4)                       \
   CFP_LAYOUT(cfp::RadialTangentialCamera<float>, k3)                     \
   CFP_LAYOUT(cfp::RadialTangentialCamera<double>, k3)                    \
-  CFP_LAYOUT_OPAQUE(cfp::MinimalSampler<7>)                              \
   CFP_LAYOUT(cfp::RansacOptions, seed)                                   \
   CFP_LAYOUT(cfp::RansacReport, inlier_share)                            \
   CFP_LAYOUT_OPAQUE(cfp::RansacCandidate<cfp::Matrix3<double>>)          \

@@ -8,18 +8,16 @@
 #include "support/allocation_counter.hpp"
 #include "support/catch.hpp"
 
-using cfp::MinimalSampler;
-
 TEST_CASE("Samples are distinct and in range with and without weights", "[robust]") {
   cfp::Random random(1, "sampling");
   for (const bool weighted : {false, true}) {
     for (const std::size_t n : {7U, 8U, 50U}) {
       std::vector<double> weights(weighted ? n : 0), sums;
       for (double& w : weights) w = random.uniform(0.001, 1);
-      MinimalSampler<7> sampler(n, weights, sums);
+      cfp::sum_weights(weights, sums);
       for (int i = 0; i < 500; ++i) {
         std::array<std::uint32_t, 7> sample{};
-        REQUIRE(sampler.draw(random, sample));
+        REQUIRE(cfp::draw_sample(n, sums, random, sample));
         CHECK(std::set<std::uint32_t>(sample.begin(), sample.end()).size() == 7);
         for (const std::uint32_t k : sample) CHECK(k < n);
       }
@@ -30,13 +28,13 @@ TEST_CASE("Samples are distinct and in range with and without weights", "[robust
 TEST_CASE("Weighted draws come in proportion to the weights", "[robust]") {
   const std::vector<double> weights{1, 2, 3, 4, 0.5, 5.5};
   std::vector<double> sums;
-  MinimalSampler<1> sampler(weights.size(), weights, sums);
+  cfp::sum_weights(weights, sums);
   cfp::Random random(2, "sampling");
   std::array<double, 6> counts{};
   constexpr int draws = 200000;
   for (int i = 0; i < draws; ++i) {
     std::array<std::uint32_t, 1> k{};
-    REQUIRE(sampler.draw(random, k));
+    REQUIRE(cfp::draw_sample(weights.size(), sums, random, k));
     counts[k[0]] += 1;
   }
   for (std::size_t i = 0; i < weights.size(); ++i) CHECK_THAT(counts[i] / draws, WithinAbs(weights[i] / 16, 0.004));
@@ -47,9 +45,9 @@ TEST_CASE("Weights of any scale and inequality still give samples", "[robust]") 
   for (const std::vector<double>& weights :
        {std::vector<double>{1e-310, 1e-310, 1e-310}, {1e308, 1e308, 1e308}, {1e308, 1e-308, 1e-308}, {5e-324, 1, 1}}) {
     std::vector<double> sums;
-    MinimalSampler<3> sampler(3, weights, sums);
+    cfp::sum_weights(weights, sums);
     std::array<std::uint32_t, 3> sample{};
-    REQUIRE(sampler.draw(random, sample));
+    REQUIRE(cfp::draw_sample(3, sums, random, sample));
     CHECK(std::set<std::uint32_t>(sample.begin(), sample.end()).size() == 3);
   }
 }
@@ -69,23 +67,22 @@ TEST_CASE("Fewer data than a sample holds give no sample, with and without weigh
   for (const std::vector<double>& weights : {std::vector<double>{}, std::vector<double>{1, 2, 3}}) {
     std::array<std::uint32_t, 7> sample{};
     sample.fill(99);
-    MinimalSampler<7> sampler(3, weights, sums);
-    CHECK_FALSE(sampler.draw(random, sample));
+    cfp::sum_weights(weights, sums);
+    CHECK_FALSE(cfp::draw_sample(3, sums, random, sample));
     CHECK(sample[0] == 99);
-    MinimalSampler<3> whole(3, weights, sums);
     std::array<std::uint32_t, 3> all{};
-    for (int i = 0; i < 10; ++i) CHECK(whole.draw(random, all));
+    for (int i = 0; i < 10; ++i) CHECK(cfp::draw_sample(3, sums, random, all));
   }
 }
 
-TEST_CASE("A sampler of a size that its workspace has seen allocates nothing", "[robust]") {
+TEST_CASE("Sampling from as many data as its memory has seen allocates nothing", "[robust]") {
   const std::vector<double> weights(200, 1.0), none;
   std::vector<double> sums;
   const auto draw = [&](const std::vector<double>& given) {
-    MinimalSampler<7> sampler(200, given, sums);
+    cfp::sum_weights(given, sums);
     cfp::Random random(5);
     std::array<std::uint32_t, 7> sample{};
-    for (int i = 0; i < 100; ++i) (void)sampler.draw(random, sample);
+    for (int i = 0; i < 100; ++i) (void)cfp::draw_sample(200, sums, random, sample);
   };
   draw(weights);
   for (const std::vector<double>* given : {&weights, &none})

@@ -72,49 +72,37 @@ inline namespace CFP_ISA {
   return {};
 }
 
-/// Minimal samples: distinct indices below `size`, uniform or in proportion to weights. Deterministic for a given
-/// generator state.
+/// The sums of the weights, finite and > 0, up to each datum; relative to the largest, as their sum can overflow.
+inline void sum_weights(span<const double> weights, std::vector<double>& sums) {
+  const double largest = weights.empty() ? 1 : *std::max_element(weights.begin(), weights.end());
+  double sum = 0;
+  sums.clear();
+  for (const double weight : weights) sums.push_back(sum += weight / largest);
+}
+
+/// Draws a minimal sample: distinct indices below `size`, in no particular order, each drawn in proportion to the
+/// weights that `sums` are of, uniform where it is empty. Deterministic for a given generator state. False, and
+/// `sample` untouched, when there are fewer data than it holds.
 template <std::size_t Size>
-class MinimalSampler {
- public:
-  using Sample = std::array<std::uint32_t, Size>;
-
-  /// weights: empty (all equally likely) or `size` finite values > 0, in proportion to which each datum is drawn.
-  /// `cumulative` is scratch memory, which has to outlive the sampler. O(size).
-  MinimalSampler(std::size_t size, span<const double> weights, std::vector<double>& cumulative)
-      : sums_(cumulative), size_(static_cast<std::uint32_t>(size)) {
-    CFP_ASSERT(weights.empty() || weights.size() == size);
-    sums_.clear();
-    if (weights.empty()) return;
-    // Relative to the largest: the sum of finite weights can overflow.
-    const double largest = *std::max_element(weights.begin(), weights.end());
-    double sum = 0;
-    for (const double weight : weights) sums_.push_back(sum += weight / largest);
+[[nodiscard]] bool draw_sample(std::size_t size, span<const double> sums, Random& random,
+                               std::array<std::uint32_t, Size>& sample) noexcept {
+  CFP_ASSERT(sums.empty() || sums.size() == size);
+  if (size < Size) return false;
+  const auto n = static_cast<std::uint32_t>(size);
+  const auto draw_weighted = [&] {
+    const double* const found = std::upper_bound(sums.begin(), sums.end(), random.uniform() * sums[size - 1]);
+    return (std::min)(static_cast<std::uint32_t>(found - sums.begin()), n - 1);
+  };
+  for (auto next = sample.begin(); next != sample.end(); ++next) {
+    // Weights so unequal that one datum comes up again and again end in a uniform draw, which cannot repeat for long.
+    constexpr int max_weighted_attempts = 64;
+    int attempt = 0;
+    do {
+      *next = sums.empty() || attempt++ >= max_weighted_attempts ? random.index(n) : draw_weighted();
+    } while (std::find(sample.begin(), next, *next) != next);
   }
-
-  /// One sample, in no particular order. False, and `sample` untouched, when there are fewer than Size data.
-  [[nodiscard]] bool draw(Random& random, Sample& sample) {
-    if (size_ < Size) return false;
-    for (auto next = sample.begin(); next != sample.end(); ++next) {
-      // Weights so unequal that one datum comes up again and again end in a uniform draw, which cannot repeat for long.
-      constexpr int max_weighted_attempts = 64;
-      int attempt = 0;
-      do {
-        *next = sums_.empty() || attempt++ >= max_weighted_attempts ? random.index(size_) : draw_weighted(random);
-      } while (std::find(sample.begin(), next, *next) != next);
-    }
-    return true;
-  }
-
- private:
-  [[nodiscard]] std::uint32_t draw_weighted(Random& random) const {
-    const auto found = std::upper_bound(sums_.begin(), sums_.end(), random.uniform() * sums_.back());
-    return (std::min)(static_cast<std::uint32_t>(found - sums_.begin()), size_ - 1);
-  }
-
-  std::vector<double>& sums_;  // of the weights up to each datum; empty: uniform
-  std::uint32_t size_;
-};
+  return true;
+}
 
 /// Draws needed so that, with the given confidence in (0, 1), one sample of `sample_size` holds inliers only, when each
 /// datum of a sample is one with probability `inlier_share`: log(1 - confidence) / log(1 - share^size), within [1,
@@ -160,7 +148,7 @@ template <typename Problem>
   const span<const double> weights = problem.weights();
   const bool weighted =
       options.sampling == Sampling::weighted && problem.total_weight() < 0.9 * static_cast<double>(weights.size());
-  MinimalSampler<sample_size> sampler(weights.size(), weighted ? weights : span<const double>(), sums);
+  sum_weights(weighted ? weights : span<const double>(), sums);
   RansacSearch<Model> search;
   std::size_t needed = options.max_iterations;
   double best_sample_cost = problem.total_weight();
@@ -186,8 +174,9 @@ template <typename Problem>
     search.confident = asked <= options.max_iterations;
     needed = (std::min)(asked, options.max_iterations);
   };
-  typename MinimalSampler<sample_size>::Sample sample;
-  while (search.iterations < (std::max)(needed, options.min_iterations) && sampler.draw(random, sample)) {
+  std::array<std::uint32_t, sample_size> sample;
+  while (search.iterations < (std::max)(needed, options.min_iterations) &&
+         draw_sample(weights.size(), sums, random, sample)) {
     ++search.iterations;
     problem.solve(sample, judge);
   }
