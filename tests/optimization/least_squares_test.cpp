@@ -105,9 +105,9 @@ cfp::LeastSquaresResult minimize(Model& model, cfp::Vector2<double>& p, double d
   cfp::LevenbergMarquardtOptions options;
   options.initial_damping = options.min_damping = damping;
   options.max_iterations = iterations;
-  cfp::detail::DenseLeastSquares<2, cfp::Vector2<double>, Model> problem(model, p);
+  cfp::detail::DenseLeastSquares<2, cfp::Vector2<double>, Model> problem{model, p};
   const cfp::LeastSquaresResult result = minimize_least_squares(problem, options);
-  p = problem.state();
+  p = problem.state;
   return result;
 }
 

@@ -101,10 +101,10 @@ struct MotionRefinement {
       if (!measure_noise()) return motion;
       if (exact) continue;
       if (round == 0) sigma_px *= static_cast<Scalar>(first_scale);
-      DenseLeastSquares<6, SE3<double>, MotionRefinement> problem(*this, refined.T_cur_prev, 1e-14);
+      DenseLeastSquares<6, SE3<double>, MotionRefinement> problem{*this, refined.T_cur_prev, 1e-14};
       minimize_least_squares(problem, steps);
-      if (!invert_normal_equations<6>(problem.equations().H, 1e-14, covariance)) return motion;
-      refined.T_cur_prev = problem.state();
+      if (!invert_normal_equations<6>(problem.equations.H, 1e-14, covariance)) return motion;
+      refined.T_cur_prev = problem.state;
       refined.covariance = covariance;
     }
     motion.known = measure_noise() && agreeing >= options.min_inlier_share * pairs;

@@ -148,36 +148,29 @@ inline namespace CFP_ISA {
 ///   State moved(const State& state, const Eigen::Matrix<double, N, 1>& step)
 /// For local use: alignment depends on flags.
 template <int N, typename State, typename Model>
-class DenseLeastSquares {
- public:
-  DenseLeastSquares(Model& model, const State& start, double min_pivot = 1e-12) noexcept
-      : model_(model), state_(start), trial_(start), min_pivot_(min_pivot) {}
+struct DenseLeastSquares {
+  Model& model;
+  State state;
+  double min_pivot = 1e-12;
+  NormalEquations<N> equations = {};  // at the state
+  State trial = state;
+  NormalEquations<N> trial_equations = {};
 
-  [[nodiscard]] const State& state() const noexcept { return state_; }
-  /// At state().
-  [[nodiscard]] const NormalEquations<N>& equations() const noexcept { return equations_; }
-
-  double linearize() { return model_.linearize(state_, equations_); }
+  double linearize() { return model.linearize(state, equations); }
   double propose(double damping) {
     Eigen::Matrix<double, N, 1> step;
-    if (!solve_normal_equations<N>(equations_.H, equations_.g, damping, min_pivot_, step))
+    if (!solve_normal_equations<N>(equations.H, equations.g, damping, min_pivot, step))
       return std::numeric_limits<double>::quiet_NaN();
-    trial_ = model_.moved(state_, step);
+    trial = model.moved(state, step);
     double promised = 0;
-    for (int r = 0; r < N; ++r) promised += step[r] * (damping * equations_.H(r, r) * step[r] - equations_.g[r]);
+    for (int r = 0; r < N; ++r) promised += step[r] * (damping * equations.H(r, r) * step[r] - equations.g[r]);
     return promised;
   }
-  double linearize_trial() { return model_.linearize(trial_, trial_equations_); }
+  double linearize_trial() { return model.linearize(trial, trial_equations); }
   void accept() {
-    std::swap(state_, trial_);
-    std::swap(equations_, trial_equations_);
+    std::swap(state, trial);
+    std::swap(equations, trial_equations);
   }
-
- private:
-  Model& model_;
-  State state_, trial_;
-  NormalEquations<N> equations_, trial_equations_;
-  double min_pivot_;
 };
 
 }  // namespace CFP_ISA

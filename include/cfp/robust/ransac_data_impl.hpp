@@ -89,9 +89,9 @@ double refine(Model model, int max_steps, double tolerance, State& state) {
   options.max_damping = 1e6;
   options.min_relative_decrease = tolerance;
   options.min_absolute_decrease = 0;
-  DenseLeastSquares<N, State, Model> problem(model, state);
+  DenseLeastSquares<N, State, Model> problem{model, state};
   const LeastSquaresResult result = minimize_least_squares(problem, options);
-  state = problem.state();
+  state = problem.state;
   return result.status == SolverStatus::not_finite ? std::numeric_limits<double>::infinity() : result.final_cost;
 }
 

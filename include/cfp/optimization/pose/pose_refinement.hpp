@@ -125,14 +125,14 @@ SolverStatus run_rounds(PoseModel<Scalar, Camera>& model, const SE3<double>& sta
     const bool hands_over = !options.from_start && r + 1 < options.round_count;
     steps.min_absolute_decrease =
         hands_over ? (std::max)(options.min_decrease, options.handover_decrease * result.used) : options.min_decrease;
-    DenseLeastSquares<6, SE3<double>, PoseModel<Scalar, Camera>> problem(model, options.from_start ? start : pose,
-                                                                         min_pivot);
+    DenseLeastSquares<6, SE3<double>, PoseModel<Scalar, Camera>> problem{model, options.from_start ? start : pose,
+                                                                         min_pivot};
     const LeastSquaresResult solved = minimize_least_squares(problem, steps);
     ++result.rounds;
     status = solved.status;
     if (!is_solved(status)) return status;
-    pose = problem.state();
-    equations = problem.equations();
+    pose = problem.state;
+    equations = problem.equations;
     result.cost = solved.final_cost * model.columns.mean_weight;
     if (model.last_pose.rotation != pose.rotation || model.last_pose.translation != pose.translation)
       (void)model.linearize(pose, equations);  // the last trial was refused
