@@ -11,6 +11,7 @@
 
 #include <cmath>
 #include <type_traits>
+#include <utility>
 
 #include <Eigen/Core>
 
@@ -79,15 +80,11 @@ struct Packet {
 // For formulas of packets and of scalars alike, dual numbers included.
 
 template <typename P>
-struct ScalarOf {
-  using type = P;
-};
+P lane_of(const P&);  // for its type alone
 template <typename T>
-struct ScalarOf<Packet<T>> {
-  using type = T;
-};
+T lane_of(const Packet<T>&);
 template <typename P>
-using scalar_of = typename ScalarOf<P>::type;
+using scalar_of = decltype(lane_of(std::declval<P>()));
 
 /// The numbers at `from`, as many as P has lanes.
 template <typename P>
