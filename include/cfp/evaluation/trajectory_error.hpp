@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "cfp/core/options.hpp"
@@ -159,7 +160,10 @@ template <typename Truth, typename Estimate>
     matches.push_back({truth_order[k], i});
   }
   const std::size_t n = matches.size();
-  const double max_difference_s = 2 * detail::median_interval(truth, truth_order);
+  std::vector<double> intervals;  // of which numpy.median is taken
+  for (std::size_t k = 1; k < truth_order.size(); ++k)
+    intervals.push_back((std::min)(true_stamp(k) - true_stamp(k - 1), (std::numeric_limits<double>::max)()));
+  const double max_difference_s = 2 * error_statistics(std::move(intervals)).median;
   const auto has_truth = [&](const TimeMatch& match) {
     return std::abs(truth[match.first].time_s - (estimate[match.second].time_s + options.offset_s)) <= max_difference_s;
   };
