@@ -547,7 +547,7 @@ TEST_CASE("What a lens bends more than it is told hides nobody and moves nobody"
       scene.boxes = {{60, 100, 200, 440}};
       for (int k = 0; k < 3; ++k) scene.T_cur_prev.translation[k] = 0.03 * random.normal();
       const cfp::Vector3<double> turn(random.normal(), random.normal(), random.normal());
-      scene.T_cur_prev.rotation = cfp::so3_exp(0.01 * turn);
+      scene.T_cur_prev.rotation = cfp::so3_exp<double>(0.01 * turn);
       const auto bend = [&](std::array<double, 2>& pixel) {
         const cfp::Vector2<double> middle(scene.camera.cx, scene.camera.cy), at(pixel[0], pixel[1]);
         const double r_sq = (at - middle).squaredNorm() / (scene.camera.fx * scene.camera.fx);

@@ -49,11 +49,6 @@ template <typename Scalar = double>
   return so3_series(w, a, b);
 }
 
-template <typename Derived, typename = typename Derived::PlainObject>
-[[nodiscard]] Matrix3<typename Derived::Scalar> so3_exp(const Eigen::MatrixBase<Derived>& w) noexcept {
-  return so3_exp(Vector3<typename Derived::Scalar>(w));
-}
-
 /// The rotation matrix of the quaternion q = (x, y, z, w) over its length, in the order of Eigen's coefficients and of
 /// TUM trajectories: a pose is {so3_from_quaternion(q), translation}. Not finite for a zero quaternion.
 template <typename Scalar>

@@ -86,7 +86,7 @@ template <typename State>
 void move(const BundleIndex& index, const State& state, const BundleSchur& schur, State& next) noexcept {
   for (std::size_t k = 0; k < index.free_poses; ++k) {
     const Eigen::Map<const Vector6<double>> xi(schur.pose_steps.data() + 6 * k);
-    next.poses[k] = {state.poses[k].rotation * so3_exp(xi.tail<3>()), state.poses[k].center - xi.head<3>()};
+    next.poses[k] = {state.poses[k].rotation * so3_exp<double>(xi.tail<3>()), state.poses[k].center - xi.head<3>()};
   }
   for (std::size_t j = 0; j < index.points; ++j)
     next.points[j] = state.points[j] + Eigen::Map<const Vector3<double>>(schur.point_steps.data() + 3 * j);
