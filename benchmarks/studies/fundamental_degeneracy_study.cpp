@@ -336,7 +336,7 @@ Matrix3<double> noise_floor(const Problem& problem) {
   if (previous.size() < 8) return Matrix3<double>::Zero();
   cfp::detail::load_pairs(cfp::PointPairs<double>{previous, current}, 1e-6, pairs);
   cfp::detail::FactoredF<double> F(cfp_test::scaled_fundamental(problem.true_F, pairs.scaling));
-  cfp::detail::refine_fundamental(cfp::detail::exact_columns(pairs), 1e4, 20, 1e-9, F);
+  cfp::detail::refine<7>(cfp::detail::SampsonModel<double>{cfp::detail::exact_columns(pairs), 1e4}, 20, 1e-9, F);
   return cfp::detail::unscaled_fundamental(F.matrix(), pairs.scaling);
 }
 

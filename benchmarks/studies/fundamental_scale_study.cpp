@@ -75,8 +75,9 @@ class Experiment {
     std::vector<double> out;
     for (const double scale : scales) {
       cfp::detail::FactoredF<double> refined = F;
-      cfp::detail::refine_fundamental(cfp::detail::exact_columns(pairs_), scale * scale * search.noise.variance, 30,
-                                      1e-8, refined);
+      cfp::detail::refine<7>(
+          cfp::detail::SampsonModel<double>{cfp::detail::exact_columns(pairs_), scale * scale * search.noise.variance},
+          30, 1e-8, refined);
       out.push_back(cfp_test::median_sampson_of_truth<double>(
           scene, cfp::detail::unscaled_fundamental(refined.matrix(), pairs_.scaling)));
     }

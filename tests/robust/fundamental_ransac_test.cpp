@@ -125,7 +125,7 @@ TEST_CASE("F is nearly as good as from the true inliers alone", "[robust]") {
       cfp::detail::PairArrays inliers;
       cfp::detail::load_pairs(PointPairs{scene.prev, scene.cur, labels}, 1e-6, inliers);
       cfp::detail::FactoredF<double> F(cfp_test::scaled_fundamental(scene.F, inliers.scaling));
-      cfp::detail::refine_fundamental(cfp::detail::exact_columns(inliers), 1e6, 30, 1e-10, F);
+      cfp::detail::refine<7>(cfp::detail::SampsonModel<double>{cfp::detail::exact_columns(inliers), 1e6}, 30, 1e-10, F);
       ideal += cfp_test::median_sampson_of_truth<double>(
           scene, cfp::detail::unscaled_fundamental(F.matrix(), inliers.scaling));
     }

@@ -102,10 +102,11 @@ TEST_CASE("Refinement never raises the cost and agrees between float and double"
     const double before =
         cfp::detail::sampson_system(cfp::detail::exact_columns(pairs.arrays), start.matrix(), scale, system);
     FactoredF exact = start, fast = start;
-    const double cost =
-        cfp::detail::refine_fundamental(cfp::detail::exact_columns(pairs.arrays), scale, 50, 1e-10, exact);
+    const double cost = cfp::detail::refine<7>(
+        cfp::detail::SampsonModel<double>{cfp::detail::exact_columns(pairs.arrays), scale}, 50, 1e-10, exact);
     CHECK(cost <= before);
-    CHECK_THAT(cfp::detail::refine_fundamental(cfp::detail::fast_columns(pairs.arrays), scale, 50, 1e-6, fast),
+    CHECK_THAT(cfp::detail::refine<7>(cfp::detail::SampsonModel<float>{cfp::detail::fast_columns(pairs.arrays), scale},
+                                      50, 1e-6, fast),
                WithinAbs(cost, 1e-3 * cost));
     CHECK_THAT(exact.matrix().norm(), WithinAbs(1, 1e-12));
     CHECK(std::abs(exact.matrix().determinant()) < 1e-12);
@@ -201,7 +202,8 @@ TEST_CASE("The noise of an F that was fitted to few pairs is not underestimated"
     const double px_sq = pairs.factor * pairs.factor;
     cfp::detail::FundamentalSearch<double> search{pairs, 9 * px_sq, list, distances_sq, cfp::Random(1)};
     FactoredF F(cfp_test::scaled_fundamental(scene.F, pairs.scaling));
-    cfp::detail::refine_fundamental(cfp::detail::exact_columns(pairs), 1e4 * px_sq, 30, 1e-9, F);
+    cfp::detail::refine<7>(cfp::detail::SampsonModel<double>{cfp::detail::exact_columns(pairs), 1e4 * px_sq}, 30, 1e-9,
+                           F);
     search.measure_noise(F.matrix());
     variance += search.noise.variance / px_sq / trials;
   }

@@ -160,7 +160,7 @@ struct FactoredF {
   }
 };
 
-// Sum w rho(d^2 / scale) as a model of least_squares.hpp.
+// Sum w rho(d^2 / scale), scaled pixels, as a model of least_squares.hpp.
 template <typename T>
 struct SampsonModel {
   PairColumns<T> pairs;
@@ -183,14 +183,6 @@ struct SampsonModel {
     return F;
   }
 };
-
-// Refines F (scaled pixels) until a step promises or brings less than `tolerance` of the cost, or for `max_steps`.
-// Returns the cost of F, which never rises.
-template <typename T>
-double refine_fundamental(const PairColumns<T>& pairs, double scale, int max_steps, double tolerance,
-                          FactoredF<double>& F) noexcept {
-  return refine<7>(SampsonModel<T>{pairs, scale}, max_steps, tolerance, F);
-}
 
 // Whether more pairs lie near their lines than the pairs up to three times as far let chance put there: the binomial
 // tail of that has to outdo the number of seven-point samples, C(n, 7), as the best of all their F fits some

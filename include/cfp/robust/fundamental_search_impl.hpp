@@ -86,7 +86,7 @@ struct FundamentalSearch {
 
   void optimize(Candidate& candidate) const noexcept {
     FactoredF<T> refined(candidate.model);
-    refine_fundamental(thinned_columns(pairs), limit, 3, 1e-3, refined);
+    refine<7>(SampsonModel<float>{thinned_columns(pairs), limit}, 3, 1e-3, refined);
     const double refined_cost = cost(refined.matrix(), candidate.cost);
     if (refined_cost < candidate.cost) candidate = {refined.matrix(), refined_cost};
   }
@@ -143,7 +143,8 @@ struct FundamentalSearch {
     }
     const T widest = wide_limit();
     const auto refined_nats = [&](FactoredF<T>& of) {
-      refine_fundamental(thinned_columns(pairs), (std::min)(widest, final_scale * noise.variance), 2, 1e-3, of);
+      const T scale = (std::min)(widest, final_scale * noise.variance);
+      refine<7>(SampsonModel<float>{thinned_columns(pairs), scale}, 2, 1e-3, of);
       measure_noise(of.matrix());
       return nats(pairs, noise);
     };
@@ -165,7 +166,7 @@ struct FundamentalSearch {
       explore(factored);
       measure_noise(factored.matrix());
     }
-    refine_fundamental(exact_columns(pairs), final_scale * noise.variance, 14, 1e-5, factored);
+    refine<7>(SampsonModel<T>{exact_columns(pairs), final_scale * noise.variance}, 14, 1e-5, factored);
     F = factored.matrix();
     measure_noise(F);
   }

@@ -83,7 +83,8 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
   result.iterations = search.iterations;
   result.status = RansacStatus::no_consensus;
   if (!is_finite(search.best.cost)) return result;
-  problem.refine<double>(problem.limit, 10, search.best.model);  // the scale of the loss near the inliers' spread
+  // The scale of the loss is near the inliers' spread.
+  detail::refine<6>(detail::ReprojectionModel<double>{observations, problem.limit}, 10, 1e-4, search.best.model);
 
   SE3<double> T = search.best.model;
   T.translation -= T.rotation * origin;

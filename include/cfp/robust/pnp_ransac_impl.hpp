@@ -100,15 +100,10 @@ struct PnpProblem {
     return bounded_sum<float>(in.size, bound * limit, cost) / limit;
   }
 
-  template <typename Real>
-  void refine(T scale, int max_steps, Model& pose) const {
-    cfp::detail::refine<6>(ReprojectionModel<Real>{in, static_cast<Real>(scale)}, max_steps, 1e-4, pose);
-  }
-
   // A wide loss: four squared thresholds.
   void optimize(RansacCandidate<Model>& candidate) const {
     RansacCandidate<Model> refined = candidate;
-    refine<float>(4 * limit, 3, refined.model);
+    refine<6>(ReprojectionModel<float>{in, static_cast<float>(4 * limit)}, 3, 1e-4, refined.model);
     refined.cost = cost(refined.model, candidate.cost);
     if (refined.cost < candidate.cost) candidate = refined;
   }
