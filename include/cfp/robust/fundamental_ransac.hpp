@@ -12,8 +12,8 @@
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/point_pairs.hpp"
-#include "cfp/robust/fundamental_covariance_impl.hpp"
 #include "cfp/robust/fundamental_degeneracy_impl.hpp"
+#include "cfp/robust/fundamental_noise_impl.hpp"
 #include "cfp/robust/fundamental_search_impl.hpp"
 #include "cfp/robust/ransac.hpp"
 
