@@ -83,13 +83,6 @@ template <typename T>
   return pitch > 0 ? static_cast<std::size_t>(std::clamp(along / pitch + middle, 0.0, 2 * middle - 0.01)) : 0;
 }
 
-// Empties the cells and makes room for so many pairs.
-inline void begin_cells(std::size_t most, CellCounts& cells) {
-  std::size_t size = 64;
-  while (size < 2 * most) size *= 2;
-  cells.keys.assign(size, 0), cells.counts.assign(size, 0), cells.slots.resize(most);
-}
-
 // Enters every pair's point of one image, the first row of which is given; cells of 1 / inverse_size. A centred point
 // over no size at all is not a number: the order of the arguments sends it to the lower end.
 inline void count_cells(const PairArrays& pairs, std::size_t row, double inverse_size, CellCounts& cells) noexcept {
@@ -142,7 +135,10 @@ void load_pairs(const PointPairs<Scalar>& input, double cell_px, PairArrays& pai
   pairs.scaling = scale_pairs(input);
   pairs.factor = 0;
   pairs.begin(input.previous.size());
-  for (CellCounts& cells : pairs.cells) begin_cells(input.previous.size(), cells);
+  std::size_t size = 64;
+  while (size < 2 * input.previous.size()) size *= 2;
+  for (CellCounts& cells : pairs.cells)
+    cells.keys.assign(size, 0), cells.counts.assign(size, 0), cells.slots.resize(input.previous.size());
   pairs.size = pairs.scaling.used;
   pairs.thinned.resize(5 * PairArrays::enough);
   if (!pairs.scaling.valid()) return;

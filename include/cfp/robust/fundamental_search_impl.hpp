@@ -19,17 +19,6 @@
 namespace cfp::detail {
 inline namespace CFP_ISA {
 
-// Both points of every pair of a sample must lie on the same side of the cameras: Chum, Werner, Matas: "Epipolar
-// geometry estimation via RANSAC benefits from the oriented epipolar constraint", ICPR 2004.
-template <typename T>
-[[nodiscard]] bool is_oriented(const Matrix3<T>& F, const std::array<Vector3<T>, 7>& p,
-                               const std::array<Vector3<T>, 7>& q) noexcept {
-  const Vector3<T> epipole = epipole_of(F);
-  int positive = 0;
-  for (std::size_t i = 0; i < 7; ++i) positive += cross(epipole, q[i]).dot(Vector3<T>(F * p[i])) > 0 ? 1 : 0;
-  return positive == 0 || positive == 7;
-}
-
 // One call of fundamental_ransac: the problem of lo_ransac, and the steps after it. T is double.
 template <typename T>
 struct FundamentalSearch {
@@ -75,8 +64,14 @@ struct FundamentalSearch {
     }
     std::array<Matrix3<T>, 3> solutions;
     const int count = solve_seven_point(p, q, solutions);
+    // Both points of every pair of a sample must lie on the same side of the cameras: Chum, Werner, Matas: "Epipolar
+    // geometry estimation via RANSAC benefits from the oriented epipolar constraint", ICPR 2004.
     for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) {
-      if (is_oriented(solutions[k], p, q)) visit(solutions[k]);
+      const Vector3<T> epipole = epipole_of(solutions[k]);
+      int positive = 0;
+      for (std::size_t i = 0; i < 7; ++i)
+        positive += cross(epipole, q[i]).dot(Vector3<T>(solutions[k] * p[i])) > 0 ? 1 : 0;
+      if (positive == 0 || positive == 7) visit(solutions[k]);
     }
   }
 
