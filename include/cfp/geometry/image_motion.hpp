@@ -65,12 +65,8 @@ template <typename Scalar>
   const double taken = 1 - 12 * left_sq / moved_sq;
   if (!(taken > 0)) return false;
   turn = 1.0 + taken * (turn - 1.0), shift *= taken;
-  motion.setIdentity();
-  motion(0, 0) = motion(1, 1) = Scalar(turn.real());
-  motion(1, 0) = Scalar(turn.imag());
-  motion(0, 1) = -motion(1, 0);
-  motion(0, 2) = Scalar(shift.real());
-  motion(1, 2) = Scalar(shift.imag());
+  const Scalar a = Scalar(turn.real()), b = Scalar(turn.imag());
+  motion = Matrix3<Scalar>{{a, -b, Scalar(shift.real())}, {b, a, Scalar(shift.imag())}, {0, 0, 1}};
   return true;
 }
 
