@@ -108,9 +108,7 @@ template <typename Scalar>
 }  // namespace CFP_ISA
 }  // namespace detail
 
-template <typename Previous, typename Current>
-PointPairs(const Previous&, const Current&) -> PointPairs<detail::coordinate_of<Previous>>;
-template <typename Previous, typename Current, typename Weights>
-PointPairs(const Previous&, const Current&, const Weights&) -> PointPairs<detail::coordinate_of<Previous>>;
+template <typename Previous, typename Current, typename... Weights>
+PointPairs(const Previous&, const Current&, const Weights&...) -> PointPairs<detail::coordinate_of<Previous>>;
 
 }  // namespace cfp
