@@ -218,8 +218,7 @@ class Tracker {
   /// Where keypoint_evidence may keep K from its say.
   [[nodiscard]] bool is_limited(std::size_t i) const {
     const cfp::FrameState<double>& state = probability_.state();
-    return state.report.constrained > 0 && state.label[i] == cfp::KeypointLabel::foreground && m_[i] >= 0 &&
-           !cfp::came_from_nowhere(i, state);
+    return state.report.constrained > 0 && state.label[i] == cfp::KeypointLabel::foreground && m_[i] >= 0;
   }
   [[nodiscard]] double independent(double k, double m, std::size_t i) const {
     const double e = std::min(cfp::first_stage_evidence(i, rule_.options, probability_.state()), 0.5);

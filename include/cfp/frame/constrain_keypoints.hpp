@@ -132,7 +132,7 @@ template <typename Scalar, typename Camera>
 /// Sets state.evidence of keypoint i, which is in a box: what the fine stage knows of it; its M is m, negative: none.
 template <typename Scalar>
 void gather_evidence(std::size_t i, const FrameConstraints<Scalar>& constraints, Scalar m, Scalar way_at_metre_px,
-                     FrameState<Scalar>& state) noexcept {
+                     bool posterior, FrameState<Scalar>& state) noexcept {
   const FrameScratch<Scalar>& scratch = state.scratch;
   const ConstraintModel<Scalar>&projection = constraints.projection, &epipolar = constraints.epipolar;
   const std::size_t b = static_cast<std::size_t>(state.box[i]);
@@ -143,7 +143,7 @@ void gather_evidence(std::size_t i, const FrameConstraints<Scalar>& constraints,
   keypoint.map_point_probability = m >= Scalar(0) ? m : Scalar(1);
   keypoint.foreground = state.label[i] == KeypointLabel::foreground;
   keypoint.matched = is_finite(scratch.points[i][0]) && is_finite(scratch.points[i][1]);
-  keypoint.box_associated = state.boxes[b].associated;
+  keypoint.box_associated = posterior || state.boxes[b].associated;  // by Bayes' rule a false match's distance tells it
   const Scalar seen_px = projection.status != Status::not_enough_data ? projection.threshold_px : epipolar.threshold_px;
   keypoint.visibility = way_at_metre_px > Scalar(0) && is_valid_depth(scratch.depths[i])
                             ? visibility_of(way_at_metre_px / scratch.depths[i], seen_px)
@@ -186,7 +186,7 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
   for (std::size_t i = 0; i < n; ++i) {
     if (state.box[i] == no_box) continue;
     const Scalar m = detail::map_point_at(map_point_probability, i);
-    detail::gather_evidence(i, constraints, m, way_at_metre_px, state);
+    detail::gather_evidence(i, constraints, m, way_at_metre_px, posterior, state);
     const SecondStageKeypoint<Scalar>& keypoint = state.evidence[i];
     state.static_probability[i] =
         posterior ? second_stage_evidence(keypoint, threshold) : second_stage_probability(keypoint, threshold);

@@ -46,10 +46,6 @@ void score_flow_at_keypoints(const Frame<Scalar>& frame, const FrameOptions& opt
 }
 
 /// Gives the members of box b, foreground where scratch.mask marks them, to its object: see label_keypoints.
-///
-/// Not in the paper, and not by its weights: what is also foreground of an object that was there before is that
-/// object's and not a new one's. A detector that gives somebody two boxes now and then would else take his observations
-/// away (came_from_nowhere).
 template <typename Scalar>
 void label_members(std::size_t b, const FrameOptions& options, FrameState<Scalar>& state) noexcept {
   const FrameScratch<Scalar>& scratch = state.scratch;
@@ -57,17 +53,13 @@ void label_members(std::size_t b, const FrameOptions& options, FrameState<Scalar
   const Scalar o = static_cast<Scalar>(state.objects[b].static_probability);
   const Scalar k_foreground = first_stage_probability(o, true, threshold);
   const Scalar k_background = options.coarse.soft_background ? first_stage_probability(o, false, threshold) : Scalar(1);
-  const bool was_there = state.boxes[b].associated;
   for (std::size_t j = 0; j < scratch.members.size(); ++j) {
     const std::size_t i = static_cast<std::size_t>(scratch.members[j]);
     const bool foreground = scratch.mask[j] != 0;
-    const bool one_is_new = options.map_point.weight == WeightRule::posterior && foreground &&
-                            state.label[i] == KeypointLabel::foreground &&
-                            state.boxes[static_cast<std::size_t>(state.box[i])].associated != was_there;
     const Scalar k = foreground ? k_foreground : k_background;
     const bool lower = k < state.static_probability[i] ||
                        (k == state.static_probability[i] && foreground && state.label[i] == KeypointLabel::background);
-    if (state.box[i] != no_box && !(one_is_new ? was_there : lower)) continue;
+    if (state.box[i] != no_box && !lower) continue;
     state.static_probability[i] = k;
     state.label[i] = foreground ? KeypointLabel::foreground : KeypointLabel::background;
     state.box[i] = static_cast<std::int32_t>(b);
@@ -122,7 +114,7 @@ inline namespace CFP_ISA {
 
 /// Sets K, label and box of every keypoint from state.boxes and state.objects. A keypoint on several objects takes the
 /// smallest of their K, and that box decides for it from then on (ties: foreground before background, then the lower
-/// index; by WeightRule::posterior a new object takes nothing from one that was there before). Keypoints on no object
+/// index). Keypoints on no object
 /// keep K = 1. What a mask or object_of_keypoint gives an object is its foreground; depth then only tells where it
 /// stands, and what lies in its box and on no object's mask is background: masks leave out hands and feet, which the
 /// flow at their place tells (cfp_posterior_study). In a box for which nothing is named depth decides. O(keypoints x

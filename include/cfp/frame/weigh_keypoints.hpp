@@ -16,12 +16,6 @@
 namespace cfp {
 inline namespace CFP_ISA {
 
-/// Whether a keypoint is on an object that was not there in the frame before: its matches are false, whatever they say.
-template <typename Scalar>
-[[nodiscard]] bool came_from_nowhere(std::size_t i, const FrameState<Scalar>& state) noexcept {
-  return state.label[i] == KeypointLabel::foreground && !state.boxes[static_cast<std::size_t>(state.box[i])].associated;
-}
-
 /// Whether a keypoint is in no box, and the flow around it moves all the same: something that nobody reported.
 template <typename Scalar>
 [[nodiscard]] bool is_unreported(std::size_t i, const FrameState<Scalar>& state) noexcept {
@@ -80,7 +74,7 @@ template <typename Scalar>
 
 /// The weight by Bayes' rule, before any fallback. Outside all boxes it is M. In one, and for what is_unreported, E can
 /// only lower it, because what rests may move in the next frame; K counts once the constraints were asked, as
-/// keypoint_evidence has it, and what came from nowhere is then left out.
+/// keypoint_evidence has it.
 template <typename Scalar>
 [[nodiscard]] Scalar posterior_weight(std::size_t i, non_deduced<Scalar> map_point_probability,
                                       const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
@@ -88,11 +82,9 @@ template <typename Scalar>
       map_point_probability >= Scalar(0) ? Scalar(map_point_probability) : unknown_map_point(i, options, state);
   if (state.label[i] == KeypointLabel::invalid) return Scalar(0);
   if (state.box[i] == no_box && !is_unreported(i, state)) return clamp_probability(m);
-  const bool asked = state.report.constrained > 0;
-  if (asked && came_from_nowhere(i, state)) return Scalar(0);
   const Scalar e = (std::min)(first_stage_evidence(i, options, state), Scalar(0.5));
   const Scalar k = keypoint_evidence(state.static_probability[i], e, is_on_object(i, state));
-  return posterior_probability(asked ? k : Scalar(0.5), e, m, options.map_point);
+  return posterior_probability(state.report.constrained > 0 ? k : Scalar(0.5), e, m, options.map_point);
 }
 
 /// Whether the printed weights leave the observation out because K and M are too far apart. In the coarse stage K is
