@@ -430,6 +430,64 @@ TEST_CASE("Who is nearer than what his box is taken to hold does not support the
   CHECK(farther > 0);  // else nothing was asked
 }
 
+TEST_CASE("What lies behind the object of two boxes may be the other's and does not support the camera's motion",
+          "[frame]") {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    CAPTURE(seed);
+    cfp::Random random(seed, "two boxes");
+    DynamicScene<double> scene;
+    scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.002, 0.001, 0.001, 0.001, -0.002, 0.001));
+    const auto add = [&](double x, double y, double z, double shift) {
+      add_pair(scene, {x, y}, z, shift, 0.1, random);
+    };
+    for (int k = 0; k < 80; ++k) add(random.uniform(200, 400), random.uniform(100, 460), random.uniform(1.5, 1.6), 0);
+    for (int k = 0; k < 60; ++k) add(random.uniform(200, 400), random.uniform(100, 460), random.uniform(3, 3.1), 0.04);
+    for (int k = 0; k < 30; ++k) add(random.uniform(0, 120), random.uniform(0, 480), random.uniform(2, 5), 0);
+    scene.previous_depths = scene.depths;
+    scene.boxes = {{190, 60, 410, 480}, {195, 70, 405, 480}};  // one stands, and one walks behind
+    FrameRun<double> run(scene);
+    cfp::Frame<double> frame = run.frame();
+    frame.flow.previous_depths = scene.depths;
+    const cfp::FrameReport report = run.coarse({}, frame, scene.camera);
+    CHECK(report.flow_model == cfp::FlowModelKind::motion);
+    CHECK(run.state.objects[0].static_probability > 0.9);
+  }
+}
+
+TEST_CASE("Few pairs that move do not make all move who rested a frame ago, nor hide who starts before a room",
+          "[frame]") {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    for (const bool room : {false, true}) {
+      CAPTURE(seed, room);
+      cfp::Random random(seed, "rested");
+      DynamicScene<double> scene;
+      const auto add = [&](double x, double y, double z, double shift) {
+        add_pair(scene, {x, y}, z, shift, 0.1, random);
+      };
+      // Three people, whom a camera at rest sees start at once; or something in no box goes the other way.
+      const double people_m = room ? 0.03 : 0, others_m = room ? 0 : -0.03;
+      for (const double left : {50.0, 250.0, 450.0}) {
+        for (int k = 0; k < 40; ++k) add(left + random.uniform(10, 140), random.uniform(100, 460), 1.5, people_m);
+        scene.boxes.push_back({left, 60, left + 150, 480});
+      }
+      for (int k = 0; k < (room ? 200 : 30); ++k) add(random.uniform(0, 640), random.uniform(0, 35), 3, others_m);
+      scene.previous_depths = scene.depths;
+      FrameRun<double> run(scene);
+      for (std::int64_t b = 0; b < 3; ++b) run.state.memories.push_back({b, {3, true}});
+      cfp::Frame<double> frame = run.frame();
+      frame.flow.previous_depths = scene.depths;
+      const cfp::FrameReport report = run.coarse({}, frame, scene.camera);
+      CHECK(report.flow_model == (room ? cfp::FlowModelKind::motion : cfp::FlowModelKind::none));
+      CHECK(report.unknown_objects == (room ? 0 : 3));
+      cfp::remember_objects({}, run.state);
+      for (const cfp::ObjectProbability& object : run.state.objects) CHECK((object.static_probability > 0.9) == !room);
+      // Who knows the motion is believed.
+      frame.T_cur_prev = {cfp::SE3<double>{}, 0, 0};
+      CHECK(run.coarse({}, frame, scene.camera).flow_support == cfp::FlowSupport::caller);
+    }
+  }
+}
+
 TEST_CASE("What a box leaves out of its person does not outvote what lies behind the person in the box", "[frame]") {
   for (const double person_motion_m : {0.0, 0.003}) {
     for (std::uint64_t seed = 1; seed <= 20; ++seed) {

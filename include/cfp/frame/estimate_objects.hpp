@@ -72,22 +72,46 @@ void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameS
   }
 }
 
-/// Marks in scratch.outside the flow pairs that lie on no object: outside all boxes, and behind what is in them.
+/// Marks in scratch.outside the flow pairs that lie on no object: outside all boxes, and behind what is in one of them.
+/// Behind what is in two, which depth takes for the nearer one's object, they may be on the other's.
 template <typename Scalar>
 [[nodiscard]] FlowSupport mark_outside(std::size_t pairs, const FlowModelOptions& options,
                                        FrameScratch<Scalar>& scratch) {
   scratch.outside.assign(pairs, char(1));
   std::size_t outside_boxes = 0;
   for (std::size_t i = 0; i < pairs; ++i) {
-    bool outside = true;
+    std::size_t in_boxes = 0;
+    bool behind = true;
     for (std::size_t of_box = i; of_box < scratch.pair_label.size(); of_box += pairs) {
       const PairLabel label = scratch.pair_label[of_box];
-      outside = outside && label == PairLabel::outside;
-      if (label == PairLabel::foreground || label == PairLabel::undecided) scratch.outside[i] = char(0);
+      in_boxes += label != PairLabel::outside ? 1U : 0U;
+      behind = behind && (label == PairLabel::outside || label == PairLabel::background);
     }
-    outside_boxes += outside ? 1U : 0U;
+    if (in_boxes > 1 || !behind) scratch.outside[i] = char(0);
+    outside_boxes += in_boxes == 0 ? 1U : 0U;
   }
   return outside_boxes >= options.min_outside_pairs ? FlowSupport::outside_pairs : FlowSupport::background_pairs;
+}
+
+/// Whether, of the pairs on objects that rested a frame ago, most move under the model, and more than support it: it
+/// then rests on what moves, and nobody has started.
+template <typename Scalar>
+[[nodiscard]] bool moves_what_rested(const ObjectProbabilityOptions& scored, const FrameState<Scalar>& state) noexcept {
+  constexpr double surely = 1;  // evidence, of 3 at most
+  const FrameScratch<Scalar>& scratch = state.scratch;
+  const std::size_t n = scratch.outside.size();
+  const auto support = static_cast<std::size_t>(std::count(scratch.outside.begin(), scratch.outside.end(), char(1)));
+  std::size_t on_resting = 0, moving = 0;
+  for (std::size_t b = 0; b < state.boxes.size(); ++b) {
+    if (!(of_track(state.memories, state.boxes[b].id).evidence > surely)) continue;
+    for (std::size_t i = 0; i < n; ++i) {
+      const Scalar distance = scratch.object_distances[i];
+      if (scratch.pair_label[b * n + i] != PairLabel::foreground || !has_distance(distance)) continue;
+      ++on_resting;
+      moving += object_score(distance, scored) < Scalar(0.5) ? 1U : 0U;
+    }
+  }
+  return state.previous.known && moving > support && 2 * moving > on_resting;
 }
 
 /// The options with the positions that ObjectProbabilityOptions::max_stray_share makes of them; few pairs on no object
@@ -171,6 +195,12 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   const FlowSupport support = detail::mark_outside(n, coarse.flow, scratch);
   FlowModel<Scalar> model = detail::flow_model(frame, pinhole, coarse, flow, state);
   if (coarse.object.noise_factor == 0) model = among_neighbours(model);  // as printed: F is exact
+  scratch.object_distances.resize(n);
+  flow_distances(model, flow, pinhole, coarse.flow, span<Scalar>(scratch.object_distances));
+  const ObjectProbabilityOptions scored =
+      scaled_to_noise(coarse.object, static_cast<double>(model.sigma_px), model.coordinates);
+  if (model.support != FlowSupport::caller && detail::moves_what_rested(scored, state))
+    model = {}, state.current.motion = {};
   report.flow_model = model.kind;
   report.flow_support = model.support == FlowSupport::outside_pairs ? support : model.support;
   report.flow_status = model.status;
@@ -179,8 +209,6 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   report.flow_coordinates = model.coordinates;
   if (model.kind == FlowModelKind::none) return;
 
-  scratch.object_distances.resize(n);
-  flow_distances(model, flow, pinhole, coarse.flow, span<Scalar>(scratch.object_distances));
   state.flow_distances = scratch.object_distances;
   if (neighbours_share_its_error(model))
     flow_distances(among_neighbours(model), flow, pinhole, coarse.flow, span<Scalar>(state.flow_distances));
