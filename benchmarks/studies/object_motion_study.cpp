@@ -218,7 +218,7 @@ struct Way {
 constexpr double host_error_m = 0.003, host_error_rad = 0.001;
 
 std::vector<Way> ways() {
-  std::vector<Way> all(15);
+  std::vector<Way> all(17);
   all[0].name = "as printed";
   all[1].name = "without depths";
   all[2].name = "depth";
@@ -234,6 +234,8 @@ std::vector<Way> ways() {
   all[12].name = "depth, shared, error 0.01 px";
   all[13].name = "depth, a host's wrong motion";
   all[14].name = "depth, strays counted";
+  all[15].name = "depth of every fifth pair";
+  all[16].name = "depth of every twentieth pair";
   all[0].options.coarse.flow.use_motion_up_to_scale = false;
   all[0].options.coarse.flow.use_depth = all[1].options.coarse.flow.use_depth = false;
   all[0].options.coarse.object.noise_factor = all[4].options.coarse.object.noise_factor = 0;
@@ -241,6 +243,8 @@ std::vector<Way> ways() {
   all[0].options.coarse.object.max_stray_share = all[14].options.coarse.object.max_stray_share = 0;
   all[5].options.coarse.use_depth_foreground = false;
   all[6].depth_of_every = 2;
+  all[15].depth_of_every = 5;
+  all[16].depth_of_every = 20;
   all[7].given = Given::pairs_as_exact;
   all[8].given = Given::prediction_as_exact;
   all[9].given = Given::prediction;

@@ -91,9 +91,10 @@ template <typename Scalar>
                                                 FlowPairs<Scalar>& flow, FrameState<Scalar>& state) {
   const FlowModelOptions& options = coarse.flow;
   const span<const char> outside(state.scratch.outside);
-  const bool few_known =
-      state.boxes.empty() && !given && share_with_depth(flow, outside) < coarse.unreported.min_known_depths;
-  if (!options.use_depth || flow.previous_depths.empty() || few_known) return {};
+  if (!options.use_depth || flow.previous_depths.empty()) return {};
+  // Of depths that hardly any pair has all pairs tell more by F (cfp_object_motion_study, "depth of every").
+  const bool may_be_one_thing = state.boxes.empty() && !given;
+  if (share_with_depth(flow, outside) < (may_be_one_thing ? coarse.unreported.min_known_depths : 0.1)) return {};
   CameraMotionWorkspace<Scalar>& workspace = state.scratch.flow.motion;
   CameraMotion<Scalar> motion = estimate_camera_motion(flow, outside, camera, options.motion, workspace);
   if (!motion.known) return {};
