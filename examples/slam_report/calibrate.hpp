@@ -60,7 +60,6 @@ inline float weight_with(const CalibrationSample& sample, const CalibratedOption
   cfp::SecondStageKeypoint<float> known = sample.known;
   if (chosen.min_translation_m > run.probability.fine.min_translation_m)
     known.epipolar.available = known.epipolar.available && sample.step_m > chosen.min_translation_m;
-  if (known.foreground && !known.box_associated) return 0;
   cfp::MapPointOptions options = run.probability.map_point;
   options.constraint_power = chosen.constraint_power;
   const float e =
@@ -118,7 +117,7 @@ inline void add_run(const std::filesystem::path& folder, const RunRecord& run, C
                float(e.map_point_probability),
                foreground,
                e.match != cfp::no_match,
-               e.associated,
+               true,
                float(e.visibility)};
     s.map_point = float(e.map_point_probability);
     s.flow = float(e.flow_probability);

@@ -143,7 +143,7 @@ void gather_evidence(std::size_t i, const FrameConstraints<Scalar>& constraints,
   keypoint.map_point_probability = m >= Scalar(0) ? m : Scalar(1);
   keypoint.foreground = state.label[i] == KeypointLabel::foreground;
   keypoint.matched = is_finite(scratch.points[i][0]) && is_finite(scratch.points[i][1]);
-  keypoint.box_associated = posterior || state.boxes[b].associated;  // by Bayes' rule a false match's distance tells it
+  keypoint.box_associated = posterior || state.boxes[b].associated;
   const Scalar seen_px = projection.status != Status::not_enough_data ? projection.threshold_px : epipolar.threshold_px;
   keypoint.visibility = way_at_metre_px > Scalar(0) && is_valid_depth(scratch.depths[i])
                             ? visibility_of(way_at_metre_px / scratch.depths[i], seen_px)
@@ -161,9 +161,11 @@ inline namespace CFP_ISA {
 /// sigmoid for each from the keypoints outside all boxes; second_stage_probability for those inside. M is that of
 /// before this frame, negative where there is no map point; empty for a host that keeps none. With
 /// WeightRule::posterior a keypoint that neither constraint judges, for want of a match, a depth or a translation, gets
-/// 1/2: its weight is what was known before; and K counts as much as a walker's motion would show at its depth
-/// (FineOptions::least_speed_m_s). When neither sigmoid has enough samples, the coarse K stays; a pose that
-/// is not finite has that effect. O(keypoints).
+/// 1/2: its weight is what was known before; K counts as much as a walker's motion would show at its depth
+/// (FineOptions::least_speed_m_s); and a box that was not there before is as any: the paper's 0 in it takes the wall in
+/// a false box, and somebody's second one, where a false match's distance shows it anyway (examples/slam/WEIGHTS.md).
+/// When neither sigmoid has enough samples, the coarse K stays; a pose that is not finite has that effect.
+/// O(keypoints).
 template <typename Scalar, typename Camera>
 void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar>> map_point_probability,
                          const Camera& camera, const FrameOptions& options, FrameState<Scalar>& state) {

@@ -52,6 +52,12 @@ struct KannalaBrandtCamera {
     return true;
   }
 
+  /// Whether r has this length at the angle, to `most`, and rises up to there.
+  [[nodiscard]] CFP_INLINE bool solves(const Scalar& angle, const Scalar& radius, const Scalar& most) const noexcept {
+    const Scalar error = angle * stretch(angle) - radius;
+    return error <= most && -error <= most && rises_to(angle);
+  }
+
   /// Whether a squared radius of the plane z = 1 is so small that sqrt, which has no slope at 0 for a dual number, is
   /// to be avoided.
   [[nodiscard]] CFP_INLINE static bool is_on_axis(const Scalar& radius_sq) noexcept {
@@ -99,23 +105,21 @@ struct KannalaBrandtCamera {
     }
     const Scalar radius = sqrt(s), last = Scalar(0.4999) * Scalar(pi<double>);
     const Scalar most = Scalar(8) * Scalar(std::numeric_limits<Scalar>::epsilon()) * (Scalar(1) + radius);
-    const auto found = [&](const Scalar& error) { return error <= most && -error <= most; };
-    const auto solves = [&](const Scalar& at) { return found(at * stretch(at) - radius) && rises_to(at); };
     Scalar angle = radius < last ? radius : last;
     for (int step = 0; step < 20; ++step) {
       const Scalar error = angle * stretch(angle) - radius;
-      if (found(error)) break;
+      if (error <= most && -error <= most) break;
       const Scalar next = angle - error / slope(angle);
       angle = !(next > Scalar(0)) ? Scalar(0.5) * angle : next < last ? next : last;
     }
-    if (!solves(angle)) {  // no ray, or it began, or went, beyond where r ceases to rise
+    if (!solves(angle, radius, most)) {  // no ray, or it began, or went, beyond where r ceases to rise
       if (last * stretch(last) < radius && rises_to(last)) return false;
       Scalar low = Scalar(0), high = last;
       for (int halving = 0; halving < 60; ++halving) {
         angle = Scalar(0.5) * (low + high);
         (angle * stretch(angle) < radius && rises_to(angle) ? low : high) = angle;
       }
-      if (!solves(angle)) return false;
+      if (!solves(angle, radius, most)) return false;
     }
     const Scalar ratio = tan(angle) / radius;
     ray = {x * ratio, y * ratio, Scalar(1)};

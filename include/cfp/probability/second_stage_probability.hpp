@@ -27,7 +27,7 @@ struct SecondStageKeypoint {
   Scalar map_point_probability = Scalar(1);  ///< M of its map point; 1 where there is none
   bool foreground = true;                    ///< from the depth clustering
   bool matched = false;                      ///< has a match in frame k-1
-  bool box_associated = true;                ///< its box continues a box of frame k-1
+  bool box_associated = true;                ///< its box continues a box of frame k-1, or that is not asked
   Scalar visibility = Scalar(1);             ///< of motion, in [0, 1]: how much second_stage_evidence may say
 };
 
