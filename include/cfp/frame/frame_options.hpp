@@ -23,7 +23,7 @@ struct ObjectClass {
   int class_id = 0;
   bool non_rigid = true;  ///< people, animals: told from the background by depth; rigid: all inside is foreground
   /// M of a new map point on it, in (0, 1); not set: MapPointOptions::foreground_prior, that of people. Most cars are
-  /// parked: 0.2.
+  /// parked: 0.5.
   std::optional<double> prior = {};
 };
 

@@ -35,8 +35,8 @@ struct MapPointOptions {
   /// posterior only: power of K's odds in the weight, in (0, 1]. By construction of D_Th every fifth static point is
   /// beyond it, so that a small K is weaker evidence than its odds.
   double constraint_power = 0.5;
-  /// posterior only: M of which nothing is known yet, on an object that may move and behind one, in (0, 1). Depth tells
-  /// the two apart well; a point on a person has to earn its weight.
+  /// posterior only: M of which nothing is known yet, on an object that may move and behind one, in (0, 1); below
+  /// evidence_limit it counts as that. Depth tells the two apart well; a point on a person has to earn its weight.
   double foreground_prior = 0.02;
   /// K = 0 has to take a weight below 1/2: odds of less than ((1 - limit) / limit)^constraint_power, here 7.
   double background_prior = 0.8;
