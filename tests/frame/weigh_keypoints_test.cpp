@@ -365,6 +365,25 @@ TEST_CASE("A box that was not there before takes away nothing but by the printed
   }
 }
 
+TEST_CASE("Behind the objects of two boxes a new point has the prior of one, as it may be on the other", "[frame]") {
+  const cfp::FrameOptions options;
+  FrameRun<double> run(make_dynamic_scene<double>({}, 78));
+  run.coarse(options);
+  std::vector<double> in_one;
+  for (std::size_t i = 0; i < run.m.size(); ++i) in_one.push_back(cfp::unknown_map_point(i, options, run.state));
+  run.state.boxes.push_back(run.state.boxes[0]);
+  int behind = 0;
+  for (std::size_t i = 0; i < run.m.size(); ++i) {
+    const double in_two = cfp::unknown_map_point(i, options, run.state);
+    const bool changes = run.state.box[i] == 0 && run.label(i) == cfp::KeypointLabel::background;
+    const double e = std::max(cfp::first_stage_evidence(i, options, run.state), 0.5);
+    const double of_object = cfp::posterior_probability(0.5, e, options.map_point.foreground_prior, options.map_point);
+    CHECK(in_two == (changes ? of_object : in_one[i]));
+    behind += changes && in_two < in_one[i] ? 1 : 0;
+  }
+  CHECK(behind > 20);
+}
+
 TEST_CASE("A fine stage without constraints, by choice or for want of a pose, leaves the coarse weights", "[frame]") {
   for (const bool enabled : {false, true}) {
     FrameRun<double> unasked(make_dynamic_scene<double>({}, 78));

@@ -172,7 +172,8 @@ inline namespace CFP_ISA {
 
 /// Sets state.objects: O of every box from the flow pairs whose current point lies in it, one by one and, where depths
 /// are known, together: the lower of the two. Without flow, without a model or with too few pairs in the box, O is
-/// unknown and counts as unknown_object_probability.
+/// unknown and counts as unknown_object_probability. A model of the flow's own under which most of what rested
+/// a frame ago would move, more pairs than support it, is none: not in the paper, whose F then follows a walker.
 template <typename Scalar, typename Camera>
 void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const FrameOptions& options,
                       FrameState<Scalar>& state) {

@@ -28,6 +28,16 @@ template <typename Scalar>
   return state.label[i] == KeypointLabel::foreground || is_unreported(i, state);
 }
 
+/// Whether keypoint i lies behind the objects of two boxes: where these overlap depth takes the nearer object for both,
+/// and it may be on the other.
+template <typename Scalar>
+[[nodiscard]] bool is_behind_two(std::size_t i, const FrameState<Scalar>& state) noexcept {
+  const auto& [x, y] = state.current.keypoints[i];
+  std::size_t boxes = 0;
+  for (const TrackedBox<Scalar>& box : state.boxes) boxes += contains(box.box, x, y) ? 1U : 0U;
+  return state.label[i] == KeypointLabel::background && boxes > 1;
+}
+
 /// Whether its depth puts keypoint i on an object of known O. Without depths, and in boxes of rigid classes, the wall
 /// counts as foreground, too.
 template <typename Scalar>
@@ -60,12 +70,13 @@ template <typename Scalar>
 }
 
 /// M of a map point of which nothing is known when keypoint i observes it: 1 outside all boxes where nothing moves and
-/// by the printed rules, else the prior of its label, which what is shown static raises.
+/// by the printed rules, else the prior of its label, of an object where it is_behind_two, which what is shown static
+/// raises.
 template <typename Scalar>
 [[nodiscard]] Scalar unknown_map_point(std::size_t i, const FrameOptions& options,
                                        const FrameState<Scalar>& state) noexcept {
   const MapPointOptions& o = options.map_point;
-  const bool on_object = is_on_object(i, state);
+  const bool on_object = is_on_object(i, state) || is_behind_two(i, state);
   if (o.weight != WeightRule::posterior || (state.box[i] == no_box && !on_object)) return Scalar(1);
   const Scalar e = (std::max)(first_stage_evidence(i, options, state), Scalar(0.5));
   const double prior = on_object ? foreground_prior(i, options, state) : o.background_prior;
