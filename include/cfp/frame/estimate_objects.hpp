@@ -93,25 +93,27 @@ template <typename Scalar>
   return outside_boxes >= options.min_outside_pairs ? FlowSupport::outside_pairs : FlowSupport::background_pairs;
 }
 
-/// Whether, of the pairs on objects that rested a frame ago, most move under the model, and more than support it: it
-/// then rests on what moves, and nobody has started.
+/// Whether several objects that rested a frame ago, with most of the pairs on such and more than support the model,
+/// move under it: it then rests on what moves. One may have started, but not all at once.
 template <typename Scalar>
 [[nodiscard]] bool moves_what_rested(const ObjectProbabilityOptions& scored, const FrameState<Scalar>& state) noexcept {
   constexpr double surely = 1;  // evidence, of 3 at most
   const FrameScratch<Scalar>& scratch = state.scratch;
   const std::size_t n = scratch.outside.size();
   const auto support = static_cast<std::size_t>(std::count(scratch.outside.begin(), scratch.outside.end(), char(1)));
-  std::size_t on_resting = 0, moving = 0;
+  std::size_t on_resting = 0, moving = 0, started = 0;
   for (std::size_t b = 0; b < state.boxes.size(); ++b) {
     if (!(of_track(state.memories, state.boxes[b].id).evidence > surely)) continue;
+    std::size_t its_pairs = 0, its_moving = 0;
     for (std::size_t i = 0; i < n; ++i) {
       const Scalar distance = scratch.object_distances[i];
       if (scratch.pair_label[b * n + i] != PairLabel::foreground || !has_distance(distance)) continue;
-      ++on_resting;
-      moving += object_score(distance, scored) < Scalar(0.5) ? 1U : 0U;
+      ++its_pairs;
+      its_moving += object_score(distance, scored) < Scalar(0.5) ? 1U : 0U;
     }
+    on_resting += its_pairs, moving += its_moving, started += 2 * its_moving > its_pairs ? 1U : 0U;
   }
-  return state.previous.known && moving > support && 2 * moving > on_resting;
+  return state.previous.known && started > 1 && moving > support && 2 * moving > on_resting;
 }
 
 /// The options with the positions that ObjectProbabilityOptions::max_stray_share makes of them; few pairs on no object
@@ -173,7 +175,8 @@ inline namespace CFP_ISA {
 /// Sets state.objects: O of every box from the flow pairs whose current point lies in it, one by one and, where depths
 /// are known, together: the lower of the two. Without flow, without a model or with too few pairs in the box, O is
 /// unknown and counts as unknown_object_probability. A model of the flow's own under which most of what rested
-/// a frame ago would move, more pairs than support it, is none: not in the paper, whose F then follows a walker.
+/// a frame ago would move, several objects and more pairs than support it, is none: not in the paper, whose F then
+/// follows a walker.
 template <typename Scalar, typename Camera>
 void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const FrameOptions& options,
                       FrameState<Scalar>& state) {
