@@ -36,7 +36,7 @@ template <typename Scalar>
 void reserve_scratch(std::size_t most, FrameScratch<Scalar>& scratch) {
   const auto reserve = [most](auto&... memory) { (memory.reserve(most), ...); };
   reserve(scratch.members, scratch.mask, scratch.points, scratch.undistorted_previous, scratch.undistorted_current,
-          scratch.depths, scratch.samples, scratch.values, scratch.foreground);
+          scratch.depths, scratch.samples, scratch.values, scratch.foreground, scratch.flow.distances);
 }
 
 }  // namespace CFP_ISA
