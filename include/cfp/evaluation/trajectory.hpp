@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "cfp/core/options.hpp"
@@ -171,6 +172,17 @@ template <typename Scalar>
 SE3<double> double_pose(const StampedPose<Scalar>& pose) noexcept {
   const SE3<double> T = pose.T_world_cam.template cast<double>();
   return {normalized_rotation<double>(T.rotation), T.translation};
+}
+
+/// Median time between neighbours (numpy.median); 0 below two poses.
+template <typename Poses>
+double median_interval(const Poses& poses, const std::vector<std::size_t>& order) {
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < order.size(); ++i) {
+    intervals.push_back(
+        (std::min)(poses[order[i]].time_s - poses[order[i - 1]].time_s, (std::numeric_limits<double>::max)()));
+  }
+  return error_statistics(std::move(intervals)).median;
 }
 
 /// One more of PoseErrors: the length of a translation, the largest double where it overflows, and a rotation's angle.

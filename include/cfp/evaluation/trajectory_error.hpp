@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 #include <vector>
 
 #include "cfp/core/options.hpp"
@@ -69,6 +68,26 @@ struct RelativeErrorResult : TrajectoryErrorResult {
   double delta = 1;
   DeltaUnit unit = DeltaUnit::seconds;
 };
+
+namespace detail {
+inline namespace CFP_ISA {
+
+/// The estimated poses in order of time, each with the true one nearest in time; none without a truth.
+template <typename Truth, typename Estimate>
+[[nodiscard]] std::vector<TimeMatch> nearest_in_time(const Truth& truth, const std::vector<std::size_t>& truth_order,
+                                                     const Estimate& estimate, double offset_s) {
+  std::vector<TimeMatch> matches;
+  if (truth_order.empty()) return matches;
+  const auto truth_stamp = [&](std::size_t i) { return truth[truth_order[i]].time_s; };
+  for (const std::size_t i : time_order(estimate)) {
+    const std::size_t nearest = closest_index(truth_order.size(), estimate[i].time_s + offset_s, truth_stamp);
+    matches.push_back({truth_order[nearest], i});
+  }
+  return matches;
+}
+
+}  // namespace CFP_ISA
+}  // namespace detail
 
 inline namespace CFP_ISA {
 
@@ -152,18 +171,9 @@ template <typename Truth, typename Estimate>
     return result;
   }
   const std::vector<std::size_t> truth_order = time_order(truth);
-  std::vector<TimeMatch> matches;  // the estimated poses in order of time, each with the true one nearest in time
-  const auto true_stamp = [&](std::size_t k) { return truth[truth_order[k]].time_s; };
-  for (const std::size_t i : time_order(estimate)) {
-    if (truth_order.empty()) break;
-    const std::size_t k = detail::closest_index(truth_order.size(), estimate[i].time_s + options.offset_s, true_stamp);
-    matches.push_back({truth_order[k], i});
-  }
+  const std::vector<TimeMatch> matches = detail::nearest_in_time(truth, truth_order, estimate, options.offset_s);
   const std::size_t n = matches.size();
-  std::vector<double> intervals;  // of which numpy.median is taken
-  for (std::size_t k = 1; k < truth_order.size(); ++k)
-    intervals.push_back((std::min)(true_stamp(k) - true_stamp(k - 1), (std::numeric_limits<double>::max)()));
-  const double max_difference_s = 2 * error_statistics(std::move(intervals)).median;
+  const double max_difference_s = 2 * detail::median_interval(truth, truth_order);
   const auto has_truth = [&](const TimeMatch& match) {
     return std::abs(truth[match.first].time_s - (estimate[match.second].time_s + options.offset_s)) <= max_difference_s;
   };
