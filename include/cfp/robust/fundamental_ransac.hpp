@@ -34,6 +34,7 @@ struct FundamentalResult : RansacReport {
 /// nothing.
 struct FundamentalRansacWorkspace {
   detail::PairArrays pairs;
+  std::vector<double> sampling;
   std::vector<std::uint32_t> list;
   std::vector<double> distances_sq, scratch;
   Matrix3<double> F = Matrix3<double>::Zero();  // of the last call and of scaled pixels
@@ -42,6 +43,29 @@ struct FundamentalRansacWorkspace {
 
 namespace detail {
 inline namespace CFP_ISA {
+
+/// F of scaled coordinates and its inliers as the result.
+template <typename Scalar>
+void report_fundamental(const Matrix3<double>& F, const FundamentalSearch<double>& search, std::size_t min_inliers,
+                        span<char> inlier_mask, FundamentalResult<Scalar>& result) noexcept {
+  const auto is_inlier = [&](std::size_t i) { return search.distances_sq[i] <= search.limit; };
+  report_inliers(search.pairs, is_inlier, min_inliers, inlier_mask, result);
+  if (result.found()) result.F = unscaled_fundamental(F, search.pairs.scaling).template cast<Scalar>();
+}
+
+/// In the place of an F: what motion the homography is, its pairs and itself.
+template <typename Scalar>
+void report_homography(DegeneracyCheck<double>& check, const Matrix3<double>* K, std::size_t min_inliers,
+                       span<char> inlier_mask, FundamentalResult<Scalar>& result) noexcept {
+  const PairArrays& pairs = check.pairs;
+  result.status = check.classify(K);
+  const auto is_inlier = [&](std::size_t i) { return transfer_sq(pairs, check.H, i) <= check.transfer_limit(); };
+  report_inliers(pairs, is_inlier, min_inliers, inlier_mask, result);
+  if (result.status == RansacStatus::no_consensus) return;
+  const Matrix3<double> pixels =
+      unscaling_matrix(pairs.scaling.current) * check.H * scaling_matrix(pairs.scaling.previous);
+  result.homography = ((determinant(pixels) < 0 ? -1.0 : 1.0) * pixels.normalized()).template cast<Scalar>();
+}
 
 template <typename Scalar>
 [[nodiscard]] FundamentalResult<Scalar> fundamental_ransac(const PointPairs<Scalar>& input, const Matrix3<double>* K,
@@ -53,9 +77,10 @@ template <typename Scalar>
   FundamentalResult<Scalar> result;
   PairArrays& pairs = workspace.pairs;
   load_pairs(input, 2 * options.threshold_px, pairs);
+  workspace.sampling.reserve(pairs.capacity);
   workspace.list.reserve(pairs.capacity);
   workspace.distances_sq.resize(pairs.capacity);
-  workspace.scratch.reserve(4 * pairs.capacity);
+  workspace.scratch.resize(4 * pairs.capacity);
   result.used = pairs.size;
   if (pairs.size < options.min_inliers || pairs.size < 8) return result;
   result.status = RansacStatus::degenerate;
@@ -64,8 +89,7 @@ template <typename Scalar>
   FundamentalSearch<double> search{pairs, threshold * threshold, workspace.list, workspace.distances_sq,
                                    Random(options.seed, "fundamental_ransac")};
 
-  RansacSearch<Matrix3<double>> found = lo_ransac(search, options, search.random, workspace.scratch);
-  workspace.scratch.resize(4 * pairs.capacity);
+  RansacSearch<Matrix3<double>> found = lo_ransac(search, options, search.random, workspace.sampling);
   result.iterations = found.iterations;
   Matrix3<double>& F = found.best.model;
   bool has_F = is_finite(found.best.cost);
@@ -86,22 +110,13 @@ template <typename Scalar>
     for (std::size_t i = 0; i < pairs.size; ++i) search.distances_sq[i] = transfer_sq(pairs, check.H, i) / 4;
     search.measure_noise();
   }
-  const auto report = [&](const auto& is_inlier) {
-    report_inliers(pairs, is_inlier, options.min_inliers, inlier_mask, result);
-  };
   if (has_F) {
     result.status = found.confident ? RansacStatus::ok : RansacStatus::iteration_limit;
-    report([&](std::size_t i) { return search.distances_sq[i] <= search.limit; });
-    if (result.found()) result.F = unscaled_fundamental(F, pairs.scaling).template cast<Scalar>();
+    report_fundamental(F, search, options.min_inliers, inlier_mask, result);
     workspace.F = F;
     workspace.noise_variance = search.noise.variance;
-  } else if (check.dominant) {  // in the place of an F what motion the homography is, its pairs and itself
-    result.status = check.classify(K);
-    report([&](std::size_t i) { return transfer_sq(pairs, check.H, i) <= check.transfer_limit(); });
-    if (result.status == RansacStatus::no_consensus) return result;
-    const Matrix3<double> pixels =
-        unscaling_matrix(pairs.scaling.current) * check.H * scaling_matrix(pairs.scaling.previous);
-    result.homography = ((determinant(pixels) < 0 ? -1.0 : 1.0) * pixels.normalized()).template cast<Scalar>();
+  } else if (check.dominant) {
+    report_homography(check, K, options.min_inliers, inlier_mask, result);
   }
   return result;
 }
