@@ -114,11 +114,11 @@ inline namespace CFP_ISA {
 
 /// Sets K, label and box of every keypoint from state.boxes and state.objects. A keypoint on several objects takes the
 /// smallest of their K, and that box decides for it from then on (ties: foreground before background, then the lower
-/// index). Keypoints on no object
-/// keep K = 1. What a mask or object_of_keypoint gives an object is its foreground; depth then only tells where it
-/// stands, and what lies in its box and on no object's mask is background: masks leave out hands and feet, which the
-/// flow at their place tells (cfp_posterior_study). In a box for which nothing is named depth decides. O(keypoints x
-/// boxes), and flow pairs near each keypoint. Outside of boxes the flow is asked as UnreportedOptions say.
+/// index). Keypoints on no object keep K = 1. What a mask or object_of_keypoint gives an object is its foreground;
+/// depth then only tells where it stands, and what lies in its box and on no object's mask is background: masks leave
+/// out hands and feet, which the flow at their place tells (cfp_posterior_study). In a box for which nothing is named
+/// depth decides. O(keypoints x boxes), and flow pairs near each keypoint. Outside of boxes the flow is asked as
+/// UnreportedOptions say.
 template <typename Scalar>
 void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   CFP_ASSERT(state.objects.size() == state.boxes.size());

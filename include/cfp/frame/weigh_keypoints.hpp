@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 
 #include "cfp/core/span.hpp"
 #include "cfp/frame/frame_options.hpp"
@@ -32,10 +33,10 @@ template <typename Scalar>
 /// and it may be on the other.
 template <typename Scalar>
 [[nodiscard]] bool is_behind_two(std::size_t i, const FrameState<Scalar>& state) noexcept {
-  const auto& [x, y] = state.current.keypoints[i];
-  std::size_t boxes = 0;
-  for (const TrackedBox<Scalar>& box : state.boxes) boxes += contains(box.box, x, y) ? 1U : 0U;
-  return state.label[i] == KeypointLabel::background && boxes > 1;
+  if (state.label[i] != KeypointLabel::background) return false;
+  const std::array<Scalar, 2>& at = state.current.keypoints[i];
+  const auto holds = [&](const TrackedBox<Scalar>& box) { return contains(box.box, at[0], at[1]); };
+  return std::count_if(state.boxes.begin(), state.boxes.end(), holds) > 1;
 }
 
 /// Whether its depth puts keypoint i on an object of known O. Without depths, and in boxes of rigid classes, the wall
