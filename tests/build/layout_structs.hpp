@@ -119,7 +119,7 @@
   CFP_LAYOUT(cfp::SecondStageKeypoint<double>, visibility)               \
   CFP_LAYOUT(cfp::MapPointOptions, background_prior)                     \
   CFP_LAYOUT(cfp::ObjectProbabilityOptions, unknown_object_probability)  \
-  CFP_LAYOUT(cfp::ObjectProbability, status)                             \
+  CFP_LAYOUT(cfp::ObjectProbability, together)                           \
   CFP_LAYOUT(cfp::P3PProblem<float>, rays)                               \
   CFP_LAYOUT(cfp::P3PProblem<double>, rays)                              \
   CFP_LAYOUT(cfp::P3PSolutions<float>, status)                           \

@@ -161,6 +161,7 @@ TEST_CASE("A report that nothing was counted for counts nothing", "[core]") {
   CHECK((clusters.noise == 0 && clusters.invalid == 0));
   const cfp::ObjectProbability o;
   CHECK((o.static_probability == 0 && o.pairs == 0 && o.status == cfp::Status::not_enough_data));
+  CHECK(o.together == 1);
   const cfp::ObjectMemory memory;
   CHECK((memory.evidence == 0 && !memory.known));
   const cfp::ConstraintModel<double> model;

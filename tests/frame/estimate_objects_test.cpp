@@ -577,24 +577,48 @@ auto add_to(DynamicScene<double>& scene, cfp::Random& random, const Error& error
 }  // namespace
 
 TEST_CASE("Who moves by no more than the flow's noise moves by what the pairs share", "[frame]") {
-  const auto called = [](double person_motion_m, double shared_error_px) {
+  const auto fill = [](double person_motion_m) {
+    return [=](DynamicScene<double>& scene, cfp::Random& random) {
+      scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.005, 0.002, 0.004, 0.001, -0.002, 0.001));
+      for (int k = 0; k < 300; ++k)
+        add_pair(scene, {random.uniform(20, 620), random.uniform(20, 460)}, random.uniform(2.5, 5), 0, 0.4, random);
+      for (int k = 0; k < 60; ++k)
+        add_pair(scene, {random.uniform(270, 370), random.uniform(120, 420)}, random.uniform(1.95, 2.05),
+                 person_motion_m, 0.4, random);
+    };
+  };
+  const auto sharing = [](double shared_error_px) {
     cfp::FrameOptions options;
     options.coarse.object.shared_error_px = shared_error_px;
-    return called_moving(
-        "together", true,
-        [&](DynamicScene<double>& scene, cfp::Random& random) {
-          scene.T_cur_prev = cfp::se3_exp(cfp::Vector6<double>(0.005, 0.002, 0.004, 0.001, -0.002, 0.001));
-          for (int k = 0; k < 300; ++k)
-            add_pair(scene, {random.uniform(20, 620), random.uniform(20, 460)}, random.uniform(2.5, 5), 0, 0.4, random);
-          for (int k = 0; k < 60; ++k)
-            add_pair(scene, {random.uniform(270, 370), random.uniform(120, 420)}, random.uniform(1.95, 2.05),
-                     person_motion_m, 0.4, random);
-        },
-        options);
+    return options;
   };
-  CHECK(called(0, 0.02) <= 4);
-  CHECK(called(0.0025, 0) <= 35);  // 0.7 px
-  CHECK(called(0.0025, 0.02) >= 92);
+  const double slow_m = 0.0025;  // 0.7 px
+  CHECK(called_moving("together", true, fill(0), sharing(0.02)) <= 4);
+  CHECK(called_moving("together", true, fill(slow_m), sharing(0)) <= 35);
+  CHECK(called_moving("together", true, fill(slow_m), sharing(0.02)) >= 92);
+
+  // What none of them shows alone none of them may deny.
+  const auto at_rest_by_flow = [&](double person_motion_m, double shared_error_px) {
+    cfp::Random random(7, "together");
+    DynamicScene<double> scene;
+    scene.boxes = {{250, 100, 390, 440}};
+    fill(person_motion_m)(scene, random);
+    FrameRun<double> run(scene);
+    cfp::Frame<double> frame = run.frame();
+    frame.flow.previous_depths = scene.depths;
+    const cfp::FrameOptions options = sharing(shared_error_px);
+    run.coarse(options, frame, scene.camera);
+    CHECK((run.state.objects[0].together < options.object_threshold) == (person_motion_m > 0 && shared_error_px > 0));
+    std::size_t at_rest = 0;
+    for (std::size_t i = 0; i < scene.keypoints.size(); ++i) {
+      if (cfp::is_placed(i, options, run.state))
+        at_rest += run.state.flow_probability[i] > options.object_threshold ? 1U : 0U;
+    }
+    return at_rest;
+  };
+  CHECK(at_rest_by_flow(0, 0.02) > 20);
+  CHECK(at_rest_by_flow(slow_m, 0) > 10);
+  CHECK(at_rest_by_flow(slow_m, 0.02) == 0);
 }
 
 TEST_CASE("What the rows of a rolling shutter err by hides nobody and moves nobody", "[frame]") {

@@ -90,7 +90,10 @@ void score_objects(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow
     const double shift =
         common_shift(flow, scratch.members, model.motion, camera, noise_of(model, coarse.flow),
                      coarse.flow.motion.distance, (std::max)(scored.shared_error_px, model.shared_error_px));
-    object.static_probability = (std::min)(object.static_probability, shift_probability(shift));
+    const double together = shift_probability(shift);
+    if (!(together < object.static_probability)) continue;
+    if (object.static_probability > 0.5) object.together = together;
+    object.static_probability = together;
   }
 }
 

@@ -43,9 +43,10 @@ struct KeypointExplanation {
   ObjectProbability object;                        ///< O, its pairs, and whether it is known
   FlowModelKind flow_model = FlowModelKind::none;  ///< what those pairs were judged by
   double flow_sigma_px = 0;                        ///< their noise; 0: not measured
-  double flow_probability = -1;                    ///< what stands for O in its weight: score of the flow at its place
-  bool placed = false;                             ///< O counts beside it: by depth the keypoint is on the object
-  double coarse_probability = 1;                   ///< K of the first stage
+  double flow_probability = -1;  ///< what stands for O in its weight: score of the flow at its place, or of its
+                                 ///< object's pairs together (ObjectProbability::together)
+  bool placed = false;            ///< O counts beside it: by depth the keypoint is on the object
+  double coarse_probability = 1;  ///< K of the first stage
   std::int32_t match = no_match;
   ConstraintExplanation projection, epipolar;
   double visibility = 1;                               ///< how much of a walker's motion would show at its depth
@@ -162,6 +163,7 @@ template <typename Scalar>
     if (e.flow_probability >= 0) {
       const bool joined = e.placed && e.high_dynamic;
       text += "  flow    " + number(e.flow_probability) + " at its place" +
+              (e.placed && e.object.together < 1 ? " or of its object's pairs together" : "") +
               (joined ? "; by its depth it is on the object, so that O counts, too\n" : "\n");
     }
     text += "  coarse  K " + number(e.coarse_probability) + "\n";

@@ -11,6 +11,7 @@
 #include "cfp/frame/object_members_impl.hpp"
 #include "cfp/frame/point_grid_impl.hpp"
 #include "cfp/frame/unreported_impl.hpp"
+#include "cfp/frame/weigh_keypoints.hpp"
 #include "cfp/probability/first_stage_probability.hpp"
 
 namespace cfp {
@@ -19,7 +20,9 @@ namespace detail {
 inline namespace CFP_ISA {
 
 /// Sets state.flow_probability: the score of the flow pair next to the keypoint, among the pairs in its box and, where
-/// both have one, at its depth: what stands beside somebody's silhouette is no part of him. After estimate_objects.
+/// both have one, at its depth: what stands beside somebody's silhouette is no part of him. On an object whose pairs
+/// only show together that it moves, no single one can say that it rests: ObjectProbability::together, if that is less.
+/// After estimate_objects.
 template <typename Scalar>
 void score_flow_at_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   const Scalar radius_px = static_cast<Scalar>(options.coarse.flow_radius_px);
@@ -40,8 +43,11 @@ void score_flow_at_keypoints(const Frame<Scalar>& frame, const FrameOptions& opt
       const bool apart = is_valid_depth(depth) && is_valid_depth(its) && std::abs(its - depth) > depth_share * depth;
       return contains(box, p.x, p.y) && !apart;
     });
-    if (pair < state.flow_distances.size())
-      state.flow_probability[i] = object_score(state.flow_distances[pair], scored);
+    if (pair >= state.flow_distances.size()) continue;
+    Scalar score = object_score(state.flow_distances[pair], scored);
+    if (is_placed(i, options, state))
+      score = (std::min)(score, static_cast<Scalar>(state.objects[static_cast<std::size_t>(state.box[i])].together));
+    state.flow_probability[i] = score;
   }
 }
 

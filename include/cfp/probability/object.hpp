@@ -59,6 +59,7 @@ struct ObjectProbability {
   double static_probability = 0;            ///< O in [0, 1]; unknown_object_probability when the status is not ok
   std::size_t pairs = 0;                    ///< usable pairs: finite, non-negative distances
   Status status = Status::not_enough_data;  ///< not_enough_data: O is unknown
+  double together = 1;  ///< O of this frame by what its pairs share, where one by one they look at rest; else 1
 };
 
 struct ObjectMemoryOptions {
@@ -169,7 +170,7 @@ inline ObjectProbability remember_object(const ObjectProbability& object, double
   }
   if (!memory.known) return object;
   const double odds = std::exp(memory.evidence) * object_threshold / (1 - object_threshold);
-  return {odds / (1 + odds), object.pairs, Status::ok};
+  return {odds / (1 + odds), object.pairs, Status::ok, object.together};
 }
 
 }  // namespace CFP_ISA
