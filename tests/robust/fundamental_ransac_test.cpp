@@ -939,3 +939,59 @@ TEST_CASE("Mismatches that all end in one place are no support", "[robust]") {
     CHECK(cfp_test::median_sampson_of_truth<double>(scene, result.F) < 0.35);
   }
 }
+
+TEST_CASE("Mismatches that all end in one place, or nearly, make no F where nothing has parallax", "[robust]") {
+  FundamentalRansacWorkspace workspace;
+  for (const double noise_px : {0.0, 0.5}) {
+    for (const double jitter_px : {0.0, 1.0, 2.0}) {
+      for (const std::size_t hub : {6U, 12U, 40U}) {
+        cfp::Random random(50, "hub");
+        int found = 0;
+        for (int trial = 0; trial < 60; ++trial) {
+          TwoViewOptions options = without_parallax(200, 0, noise_px, trial % 3 == 0 ? 0 : 0.035);
+          if (trial % 3 == 2) options.shape = cfp_test::SceneShape::plane, options.translation_m = 0.1;
+          auto scene = make_two_view_scene<double>(random, options);
+          const double x = random.uniform(100, 540), y = random.uniform(80, 400);
+          for (std::size_t i = 0; i < hub; ++i) {
+            const double dx = random.uniform(-jitter_px, jitter_px), dy = random.uniform(-jitter_px, jitter_px);
+            scene.cur[i] = {x + dx, y + dy};
+          }
+          const auto result =
+              fundamental_ransac(PointPairs{scene.prev, scene.cur}, FundamentalRansacOptions{}, workspace);
+          found += result.found() ? 1 : 0;
+        }
+        CAPTURE(noise_px, jitter_px, hub);
+        CHECK(found <= 1);
+      }
+    }
+  }
+}
+
+TEST_CASE("Points on one line leave a plane open, among mismatches, too", "[robust]") {
+  FundamentalRansacWorkspace workspace;
+  cfp::Random random(51, "line");
+  for (const double outlier_share : {0.0, 0.1, 0.3}) {
+    int degenerate = 0;
+    for (int trial = 0; trial < 40; ++trial) {
+      auto scene = make_two_view_scene<double>(random, noisy(200, outlier_share));
+      const double x = random.uniform(-0.5, 0.5), y = random.uniform(-0.5, 0.5), slope = random.uniform(-1, 1);
+      for (std::size_t i = 0; i < 200; ++i) {
+        if (scene.is_inlier[i] == 0) continue;
+        const double at = random.uniform(-0.6, 0.6);
+        const cfp::Vector3<double> point(x + at, y + slope * at, 3 + 0.3 * at);
+        for (const bool current : {false, true}) {
+          cfp::Vector2<double> pixel(0, 0);
+          REQUIRE(scene.camera.project(current ? scene.T_cur_prev * point : point, pixel));
+          for (double& coordinate : pixel) coordinate += 0.3 * random.normal();
+          (current ? scene.cur : scene.prev)[i] = {pixel.x(), pixel.y()};
+        }
+      }
+      const auto result = fundamental_ransac(PointPairs{scene.prev, scene.cur}, FundamentalRansacOptions{}, workspace);
+      CHECK(result.status != cfp::RansacStatus::homography);
+      CHECK(result.homography.isZero(0));
+      degenerate += result.status == cfp::RansacStatus::degenerate ? 1 : 0;
+    }
+    CAPTURE(outlier_share);
+    CHECK(degenerate >= (outlier_share < 0.2 ? 38 : 25));  // among many mismatches F is sometimes found
+  }
+}

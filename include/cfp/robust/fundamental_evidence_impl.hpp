@@ -24,7 +24,8 @@ inline namespace CFP_ISA {
 // Whatever s, a pair that does not know F expects the ratio 1, and so 1 + share (ratio - 1), where only a share of the
 // pairs obeys F. By Markov's inequality the product over all pairs then exceeds e^t with a probability of at most e^-t.
 // So does the mean of such products for several shares: its logarithm is the evidence. Mismatches lie far from H,
-// parallax mostly near it: each range of d has a share of its own. T is double.
+// parallax mostly near it: each range of d has a share of its own. Of n pairs that share their weight each has the n-th
+// root of its ratio: together they say no more than one, however much that is. T is double.
 template <typename T>
 struct FundamentalEvidence {
   static constexpr std::size_t cells = PairArrays::window_cells;
@@ -112,11 +113,12 @@ struct FundamentalEvidence {
       const T a2 = 1 + 2 * search.distances_sq[i] * per_s2;
       const T ratio = (1 + d2) * std::sqrt(1 + d2) / ((1 + d2 / 2) * a2 * a2);
       x[count] = pairs.row(prev_x)[i], y[count] = pairs.row(prev_y)[i];
-      gain[count] = pairs.row(evidence_weight)[i] * (ratio >= 0 ? ratio - 1 : T(-1));
+      const T w = pairs.weights()[i], told = pairs.row(evidence_weight)[i] / w;
+      gain[count] = w * (ratio >= 0 ? (told < 1 ? std::pow(ratio, told) : ratio) - 1 : T(-1));
       range[count] = 0;
       T edge = 6;
       for (std::size_t r = 1; r < ranges; ++r, edge *= 4) range[count] += d2 > edge ? T(1) : T(0);
-      if (search.distances_sq[i] <= limit) distinct += pairs.row(evidence_weight)[i] / pairs.weights()[i];
+      if (search.distances_sq[i] <= limit) distinct += told;
     }
     std::fill(gain + count, gain + (count + pairs.block - 1) / pairs.block * pairs.block, T(0));
     return distinct * static_cast<T>(stride);

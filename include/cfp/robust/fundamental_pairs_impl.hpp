@@ -20,7 +20,8 @@ struct CellCounts {
 
 // Coordinates are centred per image and scaled by one common factor, so that distances are pixels times `factor`. Pairs
 // that begin or end in one cell share weight: copies, or mismatches that all end in one place, are no support. In the
-// score they have the weight of three at most, as evidence that of one.
+// score they have the weight of three at most, as evidence that of one. A place may lie across the cells of one grid,
+// so there are two, half a cell apart.
 enum PairRow : std::size_t { prev_x, prev_y, cur_x, cur_y, score_weight, evidence_weight, own_weight, pair_rows };
 
 struct PairArrays : RansacColumns<pair_rows> {
@@ -36,7 +37,7 @@ struct PairArrays : RansacColumns<pair_rows> {
   double grid_sq = 0;          // squared pitch of the grid that all coordinates lie on, scaled; 0 without one
   double total_shared = 0;     // sum of the weights in the score
   std::vector<float> thinned;  // see thinned_columns
-  CellCounts cells[2];
+  CellCounts cells[4];         // of either image, of one grid and of the other
 };
 
 inline namespace CFP_ISA {
@@ -83,12 +84,14 @@ template <typename T>
   return pitch > 0 ? static_cast<std::size_t>(std::clamp(along / pitch + middle, 0.0, 2 * middle - 0.01)) : 0;
 }
 
-// Enters every pair's point of one image, the first row of which is given; cells of 1 / inverse_size. A centred point
-// over no size at all is not a number: the order of the arguments sends it to the lower end.
-inline void count_cells(const PairArrays& pairs, std::size_t row, double inverse_size, CellCounts& cells) noexcept {
+// Enters every pair's point of one image, the first row of which is given; cells of 1 / inverse_size, shifted by a
+// share of one. A centred point over no size at all is not a number: the order of the arguments sends it to the lower
+// end.
+inline void count_cells(const PairArrays& pairs, std::size_t row, double inverse_size, double shift,
+                        CellCounts& cells) noexcept {
   const std::size_t size = cells.keys.size();
   const auto index = [&](double x) {
-    return static_cast<std::uint64_t>((std::min)((std::max)(-1e9, x * inverse_size), 1e9) + 2e9);
+    return static_cast<std::uint64_t>((std::min)((std::max)(-1e9, x * inverse_size + shift), 1e9) + 2e9);
   };
   for (std::size_t i = 0; i < pairs.size; ++i) {
     const std::uint64_t key = index(pairs.row(row)[i]) << 32 | index(pairs.row(row + 1)[i]);  // never 0
@@ -102,13 +105,13 @@ inline void count_cells(const PairArrays& pairs, std::size_t row, double inverse
 
 // Shares the weights among the pairs that begin in one cell, or end in one.
 inline void share_weights(PairArrays& pairs, double cell_size) noexcept {
-  const CellCounts& previous = pairs.cells[0];
-  const CellCounts& current = pairs.cells[1];
-  for (std::size_t image = 0; image < 2; ++image) count_cells(pairs, 2 * image, 1 / cell_size, pairs.cells[image]);
+  for (std::size_t k = 0; k < 4; ++k) count_cells(pairs, 2 * (k % 2), 1 / cell_size, k < 2 ? 0 : 0.5, pairs.cells[k]);
   pairs.total_shared = 0;
   float* const fast = pairs.fast.data() + score_weight * pairs.capacity;
   for (std::size_t i = 0; i < pairs.size; ++i) {
-    const double n = (std::max)(previous.counts[previous.slots[i]], current.counts[current.slots[i]]);
+    std::uint32_t most = 1;
+    for (const CellCounts& cells : pairs.cells) most = (std::max)(most, cells.counts[cells.slots[i]]);
+    const double n = most;
     const double w = pairs.weights()[i], shared = w * (std::min)(3 / n, 1.0);
     pairs.row(score_weight)[i] = shared, fast[i] = static_cast<float>(shared), pairs.row(evidence_weight)[i] = w / n;
     pairs.total_shared += shared;

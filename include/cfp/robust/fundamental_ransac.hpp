@@ -53,13 +53,41 @@ void report_fundamental(const Matrix3<double>& F, const FundamentalSearch<double
   if (result.found()) result.F = unscaled_fundamental(F, search.pairs.scaling).template cast<Scalar>();
 }
 
+/// Whether the inliers, but for a few, lie on one line of the previous image, which leaves the homography of a plane
+/// open: two pairs beside it make one that only chance confirms.
+template <typename IsInlier>
+[[nodiscard]] bool lie_on_a_line(const PairArrays& pairs, double width, const IsInlier& is_inlier) noexcept {
+  Random random(pairs.size, "lie_on_a_line");
+  const auto drawn = [&] {
+    std::size_t i = random.index(static_cast<std::uint32_t>(pairs.size));
+    for (std::size_t k = 0; k < pairs.size && !is_inlier(i); ++k) i = (i + 1) % pairs.size;
+    return previous_point<double>(pairs, i);
+  };
+  for (int trial = 0; trial < 16; ++trial) {
+    const Vector3<double> a = drawn(), line = cross(a, drawn());
+    const double most = width * line.head<2>().norm();
+    if (!(most > 0)) continue;
+    std::size_t on = 0, off = 0;
+    for (std::size_t i = 0; i < pairs.size; ++i) {
+      if (is_inlier(i)) ++(std::abs(line.dot(previous_point<double>(pairs, i))) <= most ? on : off);
+    }
+    if (off <= 4 + on / 20) return true;
+  }
+  return false;
+}
+
 /// In the place of an F: what motion the homography is, its pairs and itself.
 template <typename Scalar>
 void report_homography(DegeneracyCheck<double>& check, const Matrix3<double>* K, std::size_t min_inliers,
                        span<char> inlier_mask, FundamentalResult<Scalar>& result) noexcept {
   const PairArrays& pairs = check.pairs;
-  result.status = check.classify(K);
   const auto is_inlier = [&](std::size_t i) { return transfer_sq(pairs, check.H, i) <= check.transfer_limit(); };
+  result.status = check.classify(K);
+  const bool of_plane = result.status == RansacStatus::planar || result.status == RansacStatus::homography;
+  if (of_plane && lie_on_a_line(pairs, 2 * std::sqrt(check.transfer_limit()), is_inlier)) {
+    result.status = RansacStatus::degenerate;
+    return;
+  }
   report_inliers(pairs, is_inlier, min_inliers, inlier_mask, result);
   if (result.status == RansacStatus::no_consensus) return;
   const Matrix3<double> pixels =
@@ -76,7 +104,7 @@ template <typename Scalar>
   std::fill(inlier_mask.begin(), inlier_mask.end(), char(0));
   FundamentalResult<Scalar> result;
   PairArrays& pairs = workspace.pairs;
-  load_pairs(input, 2 * options.threshold_px, pairs);
+  load_pairs(input, 3 * options.threshold_px, pairs);
   workspace.sampling.reserve(pairs.capacity);
   workspace.list.reserve(pairs.capacity);
   workspace.distances_sq.resize(pairs.capacity);
@@ -141,9 +169,9 @@ inline namespace CFP_ISA {
 ///  - its lines explain the pairs better than chance does, beside that homography and beside no motion,
 ///  - also without any part of the image that somebody near may fill,
 ///  - and without any two lines of points (`degenerate`).
-/// Pairs that begin or end in one place (a cell of two thresholds) count as one there. Where most pairs are mismatches
-/// a moving region may still be taken for parallax; so may noise that is larger in one direction of the image, of all
-/// pairs alike (docs/limits.md). Lens distortion is to be taken out of the pixels before.
+/// Pairs that begin or end in one place (a cell of three thresholds) count as one there. Where most pairs are
+/// mismatches a moving region may still be taken for parallax; so may noise that is larger in one direction of the
+/// image, of all pairs alike (docs/limits.md). Lens distortion is to be taken out of the pixels before.
 ///
 /// The result is refined under a Geman-McClure loss of 2.25 standard deviations of the noise that the pairs themselves
 /// show, from several starts, as a short baseline gives the cost several minima. Cost per sample about 1 us plus 0.3 us
