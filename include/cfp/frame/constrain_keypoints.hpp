@@ -22,133 +22,126 @@ namespace cfp {
 namespace detail {
 inline namespace CFP_ISA {
 
-/// The matched point of every keypoint in scratch.points, its depth in scratch.depths; without a match a point that no
-/// distance accepts.
+/// What was fitted to the distances of one constraint, and how far it is believed.
 template <typename Scalar>
-void gather_matches(FrameState<Scalar>& state) {
-  const Scalar nowhere = std::numeric_limits<Scalar>::quiet_NaN();
-  const FrameMemory<Scalar>& previous = state.previous;
-  state.scratch.points.resize(state.size());
-  state.scratch.depths.resize(state.size());
-  for (std::size_t i = 0; i < state.size(); ++i) {
-    const bool matched = state.match[i] != no_match;
-    const std::size_t j = matched ? static_cast<std::size_t>(state.match[i]) : 0;
-    state.scratch.points[i] = matched ? previous.keypoints[j] : std::array<Scalar, 2>{nowhere, nowhere};
-    state.scratch.depths[i] = matched && !previous.depths.empty() ? previous.depths[j] : Scalar(0);
+struct FittedConstraint {
+  ConstraintModel<Scalar> model;
+  Scalar confidence{};  // C_s C_c
+
+  [[nodiscard]] bool fitted() const noexcept { return model.status != Status::not_enough_data; }
+  /// What it says of a match at this distance.
+  [[nodiscard]] Evidence<Scalar> evidence_at(Scalar distance_px) const noexcept {
+    return {cfp::static_probability(model, distance_px), confidence, fitted() && distance_px >= Scalar(0)};
   }
-}
-
-/// The distances of all matches from the epipolar lines of the pose, in the undistorted image, on the scale of its
-/// middle.
-template <typename Scalar, typename Camera>
-void pose_epipolar_distances(const SE3<double>& T_cur_prev, const Camera& camera, FrameState<Scalar>& state) {
-  FrameScratch<Scalar>& scratch = state.scratch;
-  const PointSpan<Scalar, 2> previous =
-      undistorted(camera, PointSpan<Scalar, 2>(scratch.points), scratch.undistorted_previous);
-  const PointSpan<Scalar, 2> current =
-      undistorted(camera, PointSpan<Scalar, 2>(state.current.keypoints), scratch.undistorted_current);
-  const Matrix3<Scalar> F = fundamental_from_pose(undistorted_camera(camera), T_cur_prev.template cast<Scalar>());
-  const span<const Scalar> sigmas = undistorted_sigmas(camera, current, {}, scratch.relative_sigmas);
-  epipolar_distances(F, {previous, current, {}, sigmas}, scratch.epipolar);
-}
-
-/// One constraint, fitted to the distances of the keypoints outside all boxes. Too few of those: to what is more likely
-/// static than not as well, by the coarse stage's weights (not in the paper, whose stage then gives up).
-template <typename Scalar>
-[[nodiscard]] ConstraintModel<Scalar> fit_to_static(const std::vector<Scalar>& distances,
-                                                    span<const Scalar> map_point_probability,
-                                                    const FrameOptions& options, FrameState<Scalar>& state) {
-  FrameScratch<Scalar>& scratch = state.scratch;
-  scratch.values.resize(distances.size());
-  const auto fit = [&](bool inside) {
-    scratch.samples.clear();
-    for (std::size_t i = 0; i < distances.size(); ++i) {
-      if ((state.label[i] == KeypointLabel::outside && !is_unreported(i, state)) ||
-          (inside && model_weight(i, map_point_at(map_point_probability, i), options, state) >= Scalar(0.5)))
-        scratch.samples.push_back(distances[i]);
-    }
-    return fit_constraint(scratch.samples, options.fine.constraint, scratch.values);
-  };
-  const ConstraintModel<Scalar> outside = fit(false);
-  const bool enough = outside.status != Status::not_enough_data || options.map_point.weight != WeightRule::posterior;
-  return enough ? outside : fit(true);
-}
-
-/// What a constraint says of a match at this distance.
-template <typename Scalar>
-[[nodiscard]] Evidence<Scalar> evidence_of(const ConstraintModel<Scalar>& model, Scalar distance_px,
-                                           Scalar confidence) noexcept {
-  const bool fitted = model.status != Status::not_enough_data;
-  return {static_probability(model, distance_px), confidence, fitted && distance_px >= Scalar(0)};
-}
-
-/// How much of somebody's motion shows who goes way_px in the image: all of it from D_Th on, its square below.
-template <typename Scalar>
-[[nodiscard]] Scalar visibility_of(Scalar way_px, Scalar threshold_px) noexcept {
-  const Scalar share = way_px < threshold_px ? way_px / threshold_px : Scalar(1);
-  return share * share;
-}
-
-/// Both constraints of a frame, and how far each is believed: C_s C_c.
-template <typename Scalar>
-struct FrameConstraints {
-  ConstraintModel<Scalar> projection, epipolar;
-  Scalar projection_confidence{}, epipolar_confidence{};
+  [[nodiscard]] ConstraintReport report() const noexcept {
+    return {model.status, static_cast<double>(model.threshold_px), static_cast<double>(confidence)};
+  }
 };
 
-/// Sets the distances of all matches in scratch.projection and scratch.epipolar, and fits both constraints to them.
-template <typename Scalar, typename Camera>
-[[nodiscard]] FrameConstraints<Scalar> fit_constraints(const PoseEstimate& pose,
-                                                       span<const Scalar> map_point_probability, const Camera& camera,
-                                                       const FrameOptions& options, FrameState<Scalar>& state) {
-  FrameScratch<Scalar>& scratch = state.scratch;
-  FrameConstraints<Scalar> fitted;
-  gather_matches(state);
-  scratch.projection.resize(state.size());
-  scratch.epipolar.resize(state.size());
-  reprojection_distances(PointSpan<Scalar, 2>(scratch.points), span<const Scalar>(scratch.depths),
-                         PointSpan<Scalar, 2>(state.current.keypoints), pose.T_cur_prev.template cast<Scalar>(), camera,
-                         span<Scalar>(scratch.projection));
-  fitted.projection = fit_to_static(scratch.projection, map_point_probability, options, state);
-  const bool alone =
-      fitted.projection.status == Status::not_enough_data && options.map_point.weight == WeightRule::posterior;
-  const bool moved = pose.T_cur_prev.translation.norm() > (alone ? 0 : options.fine.min_translation_m);
-  if (moved) {
-    pose_epipolar_distances(pose.T_cur_prev, camera, state);
-    fitted.epipolar = fit_to_static(scratch.epipolar, map_point_probability, options, state);
-  }
-  const Scalar cs = statistical_confidence(pose.inliers, static_cast<Scalar>(options.fine.min_pose_inliers));
-  fitted.projection_confidence = cs * fitted.projection.calculation_confidence;
-  fitted.epipolar_confidence = cs * fitted.epipolar.calculation_confidence;
-  const auto told = [](const ConstraintModel<Scalar>& model, Scalar confidence) {
-    return ConstraintReport{model.status, static_cast<double>(model.threshold_px), static_cast<double>(confidence)};
-  };
-  state.report.projection = told(fitted.projection, fitted.projection_confidence);
-  state.report.epipolar = told(fitted.epipolar, fitted.epipolar_confidence);
-  if (!moved) state.report.epipolar.status = Status::degenerate;
-  return fitted;
-}
-
-/// Sets state.evidence of keypoint i, which is in a box: what the fine stage knows of it; its M is m, negative: none.
+/// Both constraints of a frame.
 template <typename Scalar>
-void gather_evidence(std::size_t i, const FrameConstraints<Scalar>& constraints, Scalar m, Scalar way_at_metre_px,
-                     bool posterior, FrameState<Scalar>& state) noexcept {
-  const FrameScratch<Scalar>& scratch = state.scratch;
-  const ConstraintModel<Scalar>&projection = constraints.projection, &epipolar = constraints.epipolar;
-  const std::size_t b = static_cast<std::size_t>(state.box[i]);
-  SecondStageKeypoint<Scalar>& keypoint = state.evidence[i];
-  keypoint.projection = evidence_of(projection, scratch.projection[i], constraints.projection_confidence);
-  keypoint.epipolar = evidence_of(epipolar, scratch.epipolar[i], constraints.epipolar_confidence);
-  keypoint.object_probability = static_cast<Scalar>(state.objects[b].static_probability);
-  keypoint.map_point_probability = m >= Scalar(0) ? m : Scalar(1);
-  keypoint.foreground = state.label[i] == KeypointLabel::foreground;
-  keypoint.matched = is_finite(scratch.points[i][0]) && is_finite(scratch.points[i][1]);
-  keypoint.box_associated = posterior || state.boxes[b].associated;
-  const Scalar seen_px = projection.status != Status::not_enough_data ? projection.threshold_px : epipolar.threshold_px;
-  keypoint.visibility = way_at_metre_px > Scalar(0) && is_valid_depth(scratch.depths[i])
-                            ? visibility_of(way_at_metre_px / scratch.depths[i], seen_px)
-                            : Scalar(1);
-}
+struct FrameConstraints {
+  const PoseEstimate& pose;
+  span<const Scalar> map_point_probability;
+  const FrameOptions& options;
+  FrameState<Scalar>& state;
+  FrameScratch<Scalar>& scratch = state.scratch;
+  bool posterior = options.map_point.weight == WeightRule::posterior;
+  FittedConstraint<Scalar> projection = {}, epipolar = {};
+
+  /// The matched point of every keypoint in scratch.points, its depth in scratch.depths; without a match a point that
+  /// no distance accepts.
+  void gather_matches() {
+    const Scalar nowhere = std::numeric_limits<Scalar>::quiet_NaN();
+    const FrameMemory<Scalar>& previous = state.previous;
+    scratch.points.resize(state.size());
+    scratch.depths.resize(state.size());
+    for (std::size_t i = 0; i < state.size(); ++i) {
+      const bool matched = state.match[i] != no_match;
+      const std::size_t j = matched ? static_cast<std::size_t>(state.match[i]) : 0;
+      scratch.points[i] = matched ? previous.keypoints[j] : std::array<Scalar, 2>{nowhere, nowhere};
+      scratch.depths[i] = matched && !previous.depths.empty() ? previous.depths[j] : Scalar(0);
+    }
+  }
+
+  /// The distances of all matches from the epipolar lines of the pose, in the undistorted image, on the scale of its
+  /// middle.
+  template <typename Camera>
+  void measure_epipolar(const Camera& camera) {
+    const auto previous = undistorted(camera, PointSpan<Scalar, 2>(scratch.points), scratch.undistorted_previous);
+    const auto current =
+        undistorted(camera, PointSpan<Scalar, 2>(state.current.keypoints), scratch.undistorted_current);
+    const Matrix3<Scalar> F =
+        fundamental_from_pose(undistorted_camera(camera), pose.T_cur_prev.template cast<Scalar>());
+    const span<const Scalar> sigmas = undistorted_sigmas(camera, current, {}, scratch.relative_sigmas);
+    epipolar_distances(F, {previous, current, {}, sigmas}, scratch.epipolar);
+  }
+
+  /// One constraint, fitted to the distances of the keypoints outside all boxes. Too few of those: to what is more
+  /// likely static than not as well, by the coarse stage's weights (not in the paper, whose stage then gives up).
+  [[nodiscard]] FittedConstraint<Scalar> fit_to_static(const std::vector<Scalar>& distances) {
+    scratch.values.resize(distances.size());
+    const auto fit = [&](bool inside) {
+      scratch.samples.clear();
+      for (std::size_t i = 0; i < distances.size(); ++i) {
+        if ((state.label[i] == KeypointLabel::outside && !is_unreported(i, state)) ||
+            (inside && model_weight(i, map_point_at(map_point_probability, i), options, state) >= Scalar(0.5)))
+          scratch.samples.push_back(distances[i]);
+      }
+      return fit_constraint(scratch.samples, options.fine.constraint, scratch.values);
+    };
+    FittedConstraint<Scalar> constraint{fit(false)};
+    if (posterior && !constraint.fitted()) constraint.model = fit(true);
+    const Scalar cs = statistical_confidence(pose.inliers, static_cast<Scalar>(options.fine.min_pose_inliers));
+    constraint.confidence = cs * constraint.model.calculation_confidence;
+    return constraint;
+  }
+
+  /// Sets the distances of all matches in scratch.projection and scratch.epipolar, and fits both constraints to them.
+  template <typename Camera>
+  void fit(const Camera& camera) {
+    gather_matches();
+    scratch.projection.resize(state.size());
+    scratch.epipolar.resize(state.size());
+    reprojection_distances(PointSpan<Scalar, 2>(scratch.points), span<const Scalar>(scratch.depths),
+                           PointSpan<Scalar, 2>(state.current.keypoints), pose.T_cur_prev.template cast<Scalar>(),
+                           camera, span<Scalar>(scratch.projection));
+    projection = fit_to_static(scratch.projection);
+    const bool alone = posterior && !projection.fitted();
+    const bool moved = pose.T_cur_prev.translation.norm() > (alone ? 0 : options.fine.min_translation_m);
+    if (moved) {
+      measure_epipolar(camera);
+      epipolar = fit_to_static(scratch.epipolar);
+    }
+    state.report.projection = projection.report();
+    state.report.epipolar = epipolar.report();
+    if (!moved) state.report.epipolar.status = Status::degenerate;
+  }
+
+  /// How much of somebody's motion shows who goes way_px in the image: all of it from D_Th on, its square below.
+  [[nodiscard]] Scalar visibility_of(Scalar way_px) const noexcept {
+    const Scalar threshold_px = (projection.fitted() ? projection : epipolar).model.threshold_px;
+    const Scalar share = way_px < threshold_px ? way_px / threshold_px : Scalar(1);
+    return share * share;
+  }
+
+  /// Sets state.evidence of keypoint i, which is in a box: what the fine stage knows of it.
+  const SecondStageKeypoint<Scalar>& gather_evidence(std::size_t i, Scalar way_at_metre_px) noexcept {
+    const Scalar m = map_point_at(map_point_probability, i);
+    const std::size_t b = static_cast<std::size_t>(state.box[i]);
+    SecondStageKeypoint<Scalar>& keypoint = state.evidence[i];
+    keypoint.projection = projection.evidence_at(scratch.projection[i]);
+    keypoint.epipolar = epipolar.evidence_at(scratch.epipolar[i]);
+    keypoint.object_probability = static_cast<Scalar>(state.objects[b].static_probability);
+    keypoint.map_point_probability = m >= Scalar(0) ? m : Scalar(1);
+    keypoint.foreground = state.label[i] == KeypointLabel::foreground;
+    keypoint.matched = is_finite(scratch.points[i][0]) && is_finite(scratch.points[i][1]);
+    keypoint.box_associated = posterior || state.boxes[b].associated;
+    const bool seen = way_at_metre_px > Scalar(0) && is_valid_depth(scratch.depths[i]);
+    keypoint.visibility = seen ? visibility_of(way_at_metre_px / scratch.depths[i]) : Scalar(1);
+    return keypoint;
+  }
+};
 
 }  // namespace CFP_ISA
 }  // namespace detail
@@ -173,25 +166,19 @@ void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar
   state.report.stage = Stage::fine;
   state.report.constrained = 0;
   if (!options.fine.enabled) return;
-  const detail::FrameConstraints<Scalar> constraints =
-      detail::fit_constraints<Scalar>(pose, map_point_probability, camera, options, state);
-  if (constraints.projection.status == Status::not_enough_data &&
-      constraints.epipolar.status == Status::not_enough_data)
-    return;
+  detail::FrameConstraints<Scalar> constraints{pose, map_point_probability, options, state};
+  constraints.fit(camera);
+  if (!constraints.projection.fitted() && !constraints.epipolar.fitted()) return;
 
-  const std::size_t n = state.size();
-  state.evidence.resize(n);
-  const bool posterior = options.map_point.weight == WeightRule::posterior;
+  state.evidence.resize(state.size());
   const Scalar threshold = static_cast<Scalar>(options.object_threshold);
   const Scalar way_at_metre_px =
       undistorted_camera(camera).fx * static_cast<Scalar>(options.fine.least_speed_m_s * detail::elapsed_s(state));
-  for (std::size_t i = 0; i < n; ++i) {
+  for (std::size_t i = 0; i < state.size(); ++i) {
     if (state.box[i] == no_box) continue;
-    const Scalar m = detail::map_point_at(map_point_probability, i);
-    detail::gather_evidence(i, constraints, m, way_at_metre_px, posterior, state);
-    const SecondStageKeypoint<Scalar>& keypoint = state.evidence[i];
-    state.static_probability[i] =
-        posterior ? second_stage_evidence(keypoint, threshold) : second_stage_probability(keypoint, threshold);
+    const SecondStageKeypoint<Scalar>& keypoint = constraints.gather_evidence(i, way_at_metre_px);
+    state.static_probability[i] = constraints.posterior ? second_stage_evidence(keypoint, threshold)
+                                                        : second_stage_probability(keypoint, threshold);
     ++state.report.constrained;
   }
 }
