@@ -34,6 +34,28 @@ const auto all = [](std::size_t) { return true; };
 
 }  // namespace
 
+TEMPLATE_TEST_CASE("Where most values lie is not decided by one far away", "[frame]", float, double) {
+  const auto extent = [](const std::vector<TestType>& values) {
+    return cfp::detail::extent_of_most<TestType>(values.size(), [&](std::size_t i) { return values[i]; });
+  };
+  for (const std::size_t n : {std::size_t(30), std::size_t(100), std::size_t(1000)}) {
+    std::vector<TestType> values;
+    for (std::size_t i = 0; i < n; ++i) values.push_back(TestType(i * 7919 % n) * TestType(600) / TestType(n));
+    const auto [low, high] = extent(values);
+    CHECK(low == 0);
+    CHECK(high == TestType(n - 1) * TestType(600) / TestType(n));
+    for (const TestType far : {TestType(1e6), TestType(-1e6), std::numeric_limits<TestType>::infinity(),
+                               std::numeric_limits<TestType>::quiet_NaN()}) {
+      values[0] = far;
+      const auto [left, right] = extent(values);
+      CHECK(std::abs(left - low) < 160);
+      CHECK(std::abs(right - high) < 160);
+    }
+  }
+  CHECK(extent({}) == std::array<TestType, 2>{0, 0});
+  CHECK(extent({3}) == std::array<TestType, 2>{3, 3});
+}
+
 TEST_CASE("A grid finds the points that all pairs tell", "[frame][point_grid]") {
   cfp::Random random(1, "grid");
   Grid grid;

@@ -1,7 +1,6 @@
 #include "cfp/math/order_statistic.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -100,28 +99,6 @@ TEST_CASE("A quantile is the value at its rank", "[math]") {
   CHECK(cfp::quantile(span(values), 0.21) == 2);
   CHECK(cfp::quantile(span(values), 1) == 5);
   CHECK(cfp::quantile(span<double>(), 0.5) == 0);
-}
-
-TEMPLATE_TEST_CASE("Where most values lie is not decided by one far away", "[math]", float, double) {
-  const auto extent = [](const std::vector<TestType>& values) {
-    return cfp::detail::extent_of_most<TestType>(values.size(), [&](std::size_t i) { return values[i]; });
-  };
-  for (const std::size_t n : {std::size_t(30), std::size_t(100), std::size_t(1000)}) {
-    std::vector<TestType> values;
-    for (std::size_t i = 0; i < n; ++i) values.push_back(TestType(i * 7919 % n) * TestType(600) / TestType(n));
-    const auto [low, high] = extent(values);
-    CHECK(low == 0);
-    CHECK(high == TestType(n - 1) * TestType(600) / TestType(n));
-    for (const TestType far : {TestType(1e6), TestType(-1e6), std::numeric_limits<TestType>::infinity(),
-                               std::numeric_limits<TestType>::quiet_NaN()}) {
-      values[0] = far;
-      const auto [left, right] = extent(values);
-      CHECK(std::abs(left - low) < 160);
-      CHECK(std::abs(right - high) < 160);
-    }
-  }
-  CHECK(extent({}) == std::array<TestType, 2>{0, 0});
-  CHECK(extent({3}) == std::array<TestType, 2>{3, 3});
 }
 
 TEMPLATE_TEST_CASE("no values give 0", "[math]", float, double) {

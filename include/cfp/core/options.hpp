@@ -14,7 +14,6 @@
 #include <string>
 
 #include "cfp/core/numeric.hpp"
-#include "cfp/version.hpp"
 
 namespace cfp {
 inline namespace CFP_ISA {

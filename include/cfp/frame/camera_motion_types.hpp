@@ -3,14 +3,13 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <vector>
 
 #include "cfp/core/options.hpp"
 #include "cfp/frame/point_grid_impl.hpp"
 #include "cfp/geometry/motion_distance.hpp"
 #include "cfp/math/uncertain_motion.hpp"
-#include "cfp/optimization/pose/pose_refinement.hpp"
+#include "cfp/optimization/pose/pose_problem.hpp"
 #include "cfp/robust/pnp_ransac.hpp"
 
 namespace cfp {

@@ -2,8 +2,6 @@
 /// What goes into flow_model.hpp and comes out.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <vector>
 
 #include "cfp/core/options.hpp"

@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/frame/camera_motion.hpp"
+#include "cfp/frame/point_grid_impl.hpp"
 #include "cfp/geometry/epipolar.hpp"
 #include "cfp/geometry/motion_residual_impl.hpp"
 #include "cfp/math/order_statistic.hpp"

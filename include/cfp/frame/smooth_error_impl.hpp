@@ -3,14 +3,12 @@
 /// interface.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <vector>
 
 #include "cfp/core/numeric.hpp"
 #include "cfp/core/span.hpp"
 #include "cfp/frame/camera_motion.hpp"
-#include "cfp/frame/frame.hpp"
 #include "cfp/geometry/camera.hpp"
 #include "cfp/geometry/motion_residual_impl.hpp"
 #include "cfp/math/normal_equations.hpp"

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cstdint>
 
 #include "cfp/geometry/motion_distance.hpp"
 #include "cfp/math/normal_equations.hpp"

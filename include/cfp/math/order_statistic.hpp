@@ -7,7 +7,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -47,32 +46,4 @@ template <typename Scalar>
 }
 
 }  // namespace CFP_ISA
-
-namespace detail {
-inline namespace CFP_ISA {
-
-/// Where value(0) to value(n - 1) lie, but at most a quarter beyond the middle nine tenths of a sample of them: a pair
-/// far beside the image, or at the rim of a fisheye, has no say in it, nor has what is not finite. 0 to 0 of nothing.
-template <typename Scalar, typename Value>
-[[nodiscard]] std::array<Scalar, 2> extent_of_most(std::size_t n, const Value& value) noexcept {
-  std::array<Scalar, 128> sample;
-  const std::size_t most = (std::min)(n, sample.size());
-  std::size_t used = 0;
-  Scalar low = std::numeric_limits<Scalar>::infinity(), high = -low;
-  for (std::size_t i = 0, k = 0; i < n; ++i) {
-    const Scalar at = value(i);
-    if (is_finite(at)) low = (std::min)(low, at), high = (std::max)(high, at);
-    if (i != k * n / most) continue;
-    sample[used] = at;
-    used += is_finite(at) ? 1U : 0U;
-    ++k;
-  }
-  const span<Scalar> values(sample.data(), used);
-  if (used == 0) return {0, 0};
-  const Scalar left = quantile(values, 0.05), right = quantile(values, 0.95), margin = (right - left) / 4;
-  return {(std::max)(low, left - margin), (std::min)(high, right + margin)};
-}
-
-}  // namespace CFP_ISA
-}  // namespace detail
 }  // namespace cfp
