@@ -92,7 +92,11 @@ LeastSquaresResult minimize_least_squares(Problem& problem, const LevenbergMarqu
   result.status = SolverStatus::not_finite;
   if (!is_finite(cost)) return result;
   result.initial_cost = cost;
-  result.status = SolverStatus::iteration_limit;
+  const auto ended = [&](SolverStatus status) {
+    result.status = status;
+    result.final_cost = cost;
+    return result;
+  };
   const auto clamped = [&](double damping) { return std::clamp(damping, options.min_damping, options.max_damping); };
   const double rejected_damping = (std::min)(options.rejected_damping, options.max_damping);
   double damping = clamped(options.initial_damping), growth = 2;
@@ -103,11 +107,9 @@ LeastSquaresResult minimize_least_squares(Problem& problem, const LevenbergMarqu
       // Little promised or won says something about the minimum only where the damping is small, too.
       const bool damped = damping > (std::max)(options.initial_damping, options.rejected_damping);
       const double enough = (std::max)(options.min_absolute_decrease, options.min_relative_decrease * cost);
-      if (!(promised > (damped ? 0 : enough))) {
-        // After a refusal it means a short step, not an optimum.
-        result.status = growth > 2 ? SolverStatus::no_decrease : SolverStatus::converged;
-        break;
-      }
+      // After a refusal a short step promises little, and not an optimum alone.
+      if (!(promised > (damped ? 0 : enough)))
+        return ended(growth > 2 ? SolverStatus::no_decrease : SolverStatus::converged);
       const double next = problem.linearize_trial(), decrease = cost - next, gain = decrease / promised;
       if (gain > 1e-3) {
         const double t = 2 * (std::min)(gain, 1.0) - 1;
@@ -117,23 +119,17 @@ LeastSquaresResult minimize_least_squares(Problem& problem, const LevenbergMarqu
         problem.accept();
         ++result.accepted;
         cost = next;
-        if (damped || decrease > options.min_relative_decrease * cost) continue;
-        result.status = SolverStatus::converged;
-        break;
+        if (!damped && !(decrease > options.min_relative_decrease * cost)) return ended(SolverStatus::converged);
+        continue;
       }
     } else if (!(damping > 0)) {
-      result.status = SolverStatus::degenerate;
-      break;
+      return ended(SolverStatus::degenerate);
     }
-    if (damping >= options.max_damping) {
-      result.status = SolverStatus::no_decrease;
-      break;
-    }
+    if (damping >= options.max_damping) return ended(SolverStatus::no_decrease);
     damping = clamped((std::max)(damping * growth, rejected_damping));
     growth *= 2;
   }
-  result.final_cost = cost;
-  return result;
+  return ended(SolverStatus::iteration_limit);
 }
 
 }  // namespace CFP_ISA

@@ -90,18 +90,10 @@ inline namespace CFP_ISA {
 /// returns.
 template <typename Scalar, typename Work>
 auto with_loss(LossType type, const Scalar& delta, Work&& work) {
-  switch (type) {
-    case LossType::huber:
-      return work(Huber<Scalar>{delta});
-    case LossType::cauchy:
-      return work(Cauchy<Scalar>{delta});
-    case LossType::geman_mcclure:
-      return work(GemanMcClure<Scalar>{delta});
-    case LossType::truncated:
-      return work(Truncated<Scalar>{delta});
-    case LossType::trivial:
-      break;
-  }
+  if (type == LossType::huber) return work(Huber<Scalar>{delta});
+  if (type == LossType::cauchy) return work(Cauchy<Scalar>{delta});
+  if (type == LossType::geman_mcclure) return work(GemanMcClure<Scalar>{delta});
+  if (type == LossType::truncated) return work(Truncated<Scalar>{delta});
   return work(Trivial<Scalar>{delta});
 }
 
