@@ -71,24 +71,19 @@ struct SmoothErrorFit {
       change = -covariance.lazyProduct(sums.g);
       return true;
     };
-    const auto leave_out = [&](int unknown) {
+    const auto solves_without = [&](int unknown) {
       sums.H(unknown, unknown) += none;
       --parameters;
+      return solves();
     };
     const auto lens_is_chance = [&] {
       const double k1 = coefficients[3] + change[9];
       return k1 * k1 < 10.8 * covariance(9, 9);
     };
     lens = lens && solves() && !lens_is_chance();
-    if (!lens) {
-      leave_out(9);
-      if (!solves()) {
-        // Before a bare wall, or where all depths count as one, what errs from the middle of the image is the way
-        // forward: there is no such error then.
-        leave_out(6);
-        if (!solves()) return false;
-      }
-    }
+    // Before a bare wall, or where all depths count as one, what errs from the middle of the image is the way forward:
+    // there is no such error then.
+    if (!lens && !solves_without(9) && !solves_without(6)) return false;
     T_cur_prev = se3_exp(Vector6<double>(change.template head<6>())) * T_cur_prev;
     coefficients += change.template tail<4>();
     return true;
