@@ -80,13 +80,14 @@ struct FrameConstraints {
   /// One constraint, fitted to the distances of the keypoints outside all boxes. Too few of those: to what is more
   /// likely static than not as well, by the coarse stage's weights (not in the paper, whose stage then gives up).
   [[nodiscard]] FittedConstraint<Scalar> fit_to_static(const std::vector<Scalar>& distances) {
+    scratch.samples.resize(distances.size());
     scratch.values.resize(distances.size());
     const auto fit = [&](bool inside) {
-      scratch.samples.clear();
       for (std::size_t i = 0; i < distances.size(); ++i) {
-        if ((state.label[i] == KeypointLabel::outside && !is_unreported(i, state)) ||
-            (inside && model_weight(i, map_point_at(map_point_probability, i), options, state) >= Scalar(0.5)))
-          scratch.samples.push_back(distances[i]);
+        const bool rests =
+            (state.label[i] == KeypointLabel::outside && !is_unreported(i, state)) ||
+            (inside && model_weight(i, map_point_at(map_point_probability, i), options, state) >= Scalar(0.5));
+        scratch.samples[i] = rests ? distances[i] : Scalar(no_distance<double>);
       }
       return fit_constraint(scratch.samples, options.fine.constraint, scratch.values);
     };
