@@ -96,6 +96,22 @@ TEST_CASE("The window ends at the widest gap behind the front, or at a fixed dep
   CHECK_THAT(out.result.far_m, WithinAbs(2.7, 0.011));
 }
 
+TEST_CASE("The window ends at the widest gap, and not a few points beyond, however many points there are",
+          "[clustering]") {
+  cfp::Random random(3, "empty gap");
+  for (const std::size_t n : {100U, 149U, 150U, 300U, 601U, 2000U}) {
+    for (const std::size_t behind : {n / 20, n / 5}) {
+      std::vector<double> depths;
+      for (std::size_t i = 0; i < n - behind; ++i) depths.push_back(2 + 0.08 * random.normal());
+      for (std::size_t i = 0; i < behind; ++i) depths.push_back(random.uniform(3.5, 3.9));
+      const Outcome out = run(depths);
+      CAPTURE(n, behind);
+      CHECK(kept(out.mask, 0, n - behind) == n - behind);
+      CHECK(kept(out.mask, n - behind, behind) == 0);
+    }
+  }
+}
+
 TEST_CASE("Every end of the window belongs to it, what lies a little beyond does not", "[clustering]") {
   constexpr double little = 1e-9;
   std::vector<double> depths;

@@ -88,8 +88,10 @@ template <typename Scalar>
     const double gap = depth(i + stride) - depth(i);
     if (!(gap > widest)) continue;
     widest = gap;
-    // Of equal depths all or none, whatever their order.
-    end_at_gap = (std::min)(up_to(depth(i + (stride - 1) / 2)), nearer_than(depth(i + stride)));
+    end_at_gap = i + 1;  // before the widest gap between two neighbours: of equal depths all or none
+    for (std::size_t next = i + 1; next < i + stride; ++next) {
+      if (depth(next + 1) - depth(next) > depth(end_at_gap) - depth(end_at_gap - 1)) end_at_gap = next + 1;
+    }
   }
   if (end_at_gap > 0) return {first, end_at_gap};
   return {first, (std::max)(first, (std::min)(end, up_to(front + o.behind_m)))};
