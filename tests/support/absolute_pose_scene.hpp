@@ -83,6 +83,26 @@ AbsolutePoseScene<Scalar> make_long_lens_scene(cfp::Random& random, const Camera
   return scene;
 }
 
+/// `right` of the points are right, with a noise of 0.7 px; of the mismatches, `crowd`, which come first, are in a
+/// square patch of 2 half_px.
+template <typename Camera>
+AbsolutePoseScene<double> make_crowded_scene(cfp::Random& random, const Camera& camera, std::size_t points,
+                                             std::size_t right, std::size_t crowd, double half_px) {
+  AbsolutePoseOptions options;
+  options.points = points;
+  options.noise_px = 0.7;
+  AbsolutePoseScene<double> scene = make_absolute_pose_scene<double>(random, camera, options);
+  const double u = random.uniform(60, 580), v = random.uniform(60, 420);
+  for (std::size_t i = 0; i + right < points; ++i) {
+    const bool crowds = i < crowd;
+    const double x = crowds ? u + random.uniform(-half_px, half_px) : random.uniform(0, 640);
+    const double y = crowds ? v + random.uniform(-half_px, half_px) : random.uniform(0, 480);
+    scene.pixels[i] = {x, y};
+    scene.is_inlier[i] = 0;
+  }
+  return scene;
+}
+
 /// Distance of the camera centres, m, and angle between the rotations, rad.
 template <typename Scalar>
 std::array<double, 2> pose_distance(const cfp::SE3<Scalar>& T, const cfp::SE3<double>& truth) {

@@ -56,7 +56,10 @@ inline namespace CFP_ISA {
 /// share of inliers gives the confidence. Scores and optimises locally in float, the rest in double.
 ///
 /// A pose is found only where more observations lie near their projections than chance would put there: with nothing
-/// but mismatches on an object of 40 to 160 px, eight inliers or more come up by chance. Points on a line, or in one
+/// but mismatches on an object of 40 to 160 px, eight inliers or more come up by chance. More, too, than would if those
+/// within six thresholds exchanged their pixels: mismatches that crowd in a patch of the image have a camera far away
+/// that projects everything there. Where a pose is refused and more than three pixels lie in a cell of two thresholds,
+/// such a cell counts as one for the rest of the samples, which then follow the weights. Points on a line, or in one
 /// place, are degenerate, and so are inliers of which four or more, and all but two, lie on one to what threshold_px is
 /// at their depth; those in three places are no consensus, however many they are.
 template <typename Camera, typename Scalar = typename Camera::ScalarType>
@@ -80,31 +83,45 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
   detail::PnpProblem<double> problem{observations, options.threshold_px * options.threshold_px};
   Random random(options.seed, "pnp_ransac");
   RansacSearch<SE3<double>> search = lo_ransac(problem, options, random, workspace.sampling);
-  result.iterations = search.iterations;
-  result.status = RansacStatus::no_consensus;
-  if (!is_finite(search.best.cost)) return result;
-  // The scale of the loss is near the inliers' spread.
-  detail::refine<6>(detail::ReprojectionModel<double>{observations, problem.limit}, 10, 1e-4, search.best.model);
-
-  SE3<double> T = search.best.model;
-  T.translation -= T.rotation * origin;
-  const SE3<Scalar> pose = T.template cast<Scalar>();
-  result.status = search.confident ? RansacStatus::ok : RansacStatus::iteration_limit;
-  const auto is_inlier = [&](std::size_t i) {
-    const std::size_t k = observations.index[i];
-    Vector2<Scalar> pixel(Scalar(0), Scalar(0));
-    return camera.project(pose * world[k], pixel) &&
-           (pixel - pixels[k]).squaredNorm() <= static_cast<Scalar>(problem.limit);
+  const auto conclude = [&] {
+    result.iterations += search.iterations;
+    result.status = RansacStatus::no_consensus;
+    if (!is_finite(search.best.cost)) return;
+    // The scale of the loss is near the inliers' spread.
+    detail::refine<6>(detail::ReprojectionModel<double>{observations, problem.limit}, 10, 1e-4, search.best.model);
+    SE3<double> T = search.best.model;
+    T.translation -= T.rotation * origin;
+    const SE3<Scalar> pose = T.template cast<Scalar>();
+    result.status = search.confident ? RansacStatus::ok : RansacStatus::iteration_limit;
+    const auto is_inlier = [&](std::size_t i) {
+      const std::size_t k = observations.index[i];
+      Vector2<Scalar> pixel(Scalar(0), Scalar(0));
+      return camera.project(pose * world[k], pixel) &&
+             (pixel - pixels[k]).squaredNorm() <= static_cast<Scalar>(problem.limit);
+    };
+    detail::report_inliers(observations, is_inlier, options.min_inliers, inlier_mask, result);
+    if (!result.found()) return;
+    const RansacStatus verdict = detail::judge_pose(problem, search.best.model, options.threshold_px, rounding,
+                                                    is_inlier, result, workspace.sampling);
+    if (verdict != RansacStatus::ok)
+      detail::refuse(inlier_mask, result, verdict);
+    else
+      result.T_cam_world = pose;
   };
-  detail::report_inliers(observations, is_inlier, options.min_inliers, inlier_mask, result);
-  if (result.found() && !detail::four_places(observations, is_inlier)) detail::refuse(inlier_mask, result);
-  if (result.found() && detail::hang_on_a_line(observations, search.best.model, options.threshold_px, rounding,
-                                               is_inlier, workspace.sampling))
-    detail::refuse(inlier_mask, result, RansacStatus::degenerate);
-  const bool few = 5 * result.inliers < 2 * result.used;  // chance makes no more, save where all pixels are one
-  if (few && result.found() && !problem.stands_out(search.best.model, search.iterations))
-    detail::refuse(inlier_mask, result);
-  if (result.found()) result.T_cam_world = pose;
+  conclude();
+  // Is something there beside what crowds in places?
+  if (result.found() || result.iterations >= options.max_iterations ||
+      !detail::share_weights(pixels, 2 * options.threshold_px, observations, workspace.sampling))
+    return result;
+  PnpRansacOptions again = options;
+  again.max_iterations -= result.iterations;
+  again.min_iterations = (std::min)(again.min_iterations, again.max_iterations);
+  again.sampling = Sampling::weighted;
+  search = lo_ransac(problem, again, random, workspace.sampling);
+  detail::load_observations(world, pixels, weights, camera, observations, workspace.sampling);
+  const RansacStatus first = result.status;
+  conclude();
+  if (!result.found()) result.status = first;
   return result;
 }
 

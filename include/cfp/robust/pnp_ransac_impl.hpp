@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include "cfp/core/types.hpp"
 #include "cfp/geometry/p3p.hpp"
 #include "cfp/math/se3.hpp"
+#include "cfp/robust/pnp_crowd_impl.hpp"
 #include "cfp/robust/pnp_observations_impl.hpp"
 #include "cfp/robust/ransac.hpp"
 #include "cfp/robust/ransac_data_impl.hpp"
@@ -108,10 +110,21 @@ struct PnpProblem {
     if (refined.cost < candidate.cost) candidate = refined;
   }
 
-  // Whether the pose is more than the best that chance makes of mismatches, be it by number or by weight: the weights
-  // may know nothing, and then leave fewer data, or tell all mismatches.
-  [[nodiscard]] bool stands_out(const Model& pose, std::size_t samples) const noexcept {
-    return outdoes_chance(pose, samples, false) || outdoes_chance(pose, samples, true);
+  // Whether the pose is more than the best that chance makes of mismatches, and than they make of being close to each
+  // other; be it by number or by weight: the weights may know nothing, and then leave fewer data, or tell all
+  // mismatches. Mostly some of the observations tell clearly enough.
+  [[nodiscard]] bool stands_out(const Model& pose, std::size_t samples, bool few, std::vector<double>& scratch) const {
+    constexpr std::size_t some = 32;
+    const double bar = std::log(12 * static_cast<double>(samples));
+    list_distances(in, pose, few ? in.size : (std::min)(in.size, some), scratch);
+    if (few && !outdoes_chance(scratch, bar, false) && !outdoes_chance(scratch, bar, true)) return false;
+    std::size_t inliers = list_near(in, limit, scratch);
+    const auto nats = [&](std::size_t most, bool weighed) {
+      return exchange_nats(in, pose, limit, scratch, inliers, most, weighed);
+    };
+    if (nats(some, false) > 2 * bar) return true;
+    if (!few) list_distances(in, pose, in.size, scratch), inliers = list_near(in, limit, scratch);
+    return nats(in.size, false) > bar || nats(in.size, true) > bar;
   }
 
   [[nodiscard]] auto inlier_test(const Model& pose) const noexcept {
@@ -123,13 +136,13 @@ struct PnpProblem {
   // images and estimate the fundamental matrix", IJCV 2004. Three of the observations fit by construction, and each
   // sample has up to four poses, three times as many for what the refinement adds: mismatches alone on a small object
   // then have a pose in one call of a hundred.
-  [[nodiscard]] bool outdoes_chance(const Model& pose, std::size_t samples, bool weighed) const noexcept {
+  [[nodiscard]] bool outdoes_chance(const std::vector<double>& squared, double bar, bool weighed) const noexcept {
     enum { all, squares, near, ring, area, x, y, xx, xy, yy, count };
     T sum[count] = {};
     for (std::size_t i = 0; i < in.size; ++i) {
       const auto of = [&](std::size_t row) { return in.row(row)[i]; };
       const T w = weighed ? of(observation_weight_row) : T(1), wx = w * of(ray_x), wy = w * of(ray_y);
-      const T distance_sq = LinearReprojection<T>(in, pose, i).distance_sq;
+      const T distance_sq = squared[i];
       sum[all] += w, sum[squares] += w * w;
       if (distance_sq <= limit) sum[near] += w;
       if (distance_sq > 9 * limit && distance_sq <= 36 * limit) sum[ring] += w;
@@ -147,9 +160,20 @@ struct PnpProblem {
     const T cxx = mean(xx) - mean(x) * mean(x) + l / 4, cyy = mean(yy) - mean(y) * mean(y) + l / 4;
     const T cxy = mean(xy) - mean(x) * mean(y);
     const T chance = (std::max)((others - std::sqrt(others)) / (27 * n), l / (4 * std::sqrt(cxx * cyy - cxy * cxy)));
-    return binomial_nats(inliers - 3, n - 3, chance) > std::log(T(12) * static_cast<T>(samples));
+    return binomial_nats(inliers - 3, n - 3, chance) > bar;
   }
 };
+
+// ok, or why a pose that has enough inliers, those that `counts` accepts, is refused.
+template <typename T, typename Counts>
+[[nodiscard]] RansacStatus judge_pose(const PnpProblem<T>& problem, const SE3<T>& pose, double threshold_px,
+                                      double rounding, const Counts& counts, const RansacReport& report,
+                                      std::vector<double>& scratch) {
+  if (!four_places(problem.in, counts)) return RansacStatus::no_consensus;
+  if (hang_on_a_line(problem.in, pose, threshold_px, rounding, counts, scratch)) return RansacStatus::degenerate;
+  const bool few = 5 * report.inliers < 2 * report.used;  // chance makes no more, save of pixels that crowd
+  return problem.stands_out(pose, report.iterations, few, scratch) ? RansacStatus::ok : RansacStatus::no_consensus;
+}
 
 }  // namespace CFP_ISA
 }  // namespace cfp::detail
