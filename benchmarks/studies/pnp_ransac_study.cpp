@@ -6,7 +6,8 @@
 // mismatches, which must be refused. Then: of 200 observations in the volume some right, and mismatches some of which
 // crowd in a square patch of the image.
 //   cfp_pnp_ransac_study [problems per cell, default 1000 | --smoke]
-// Fails unless of each cell up to 90 % of mismatches, and beside each crowd, 97 % are solved and at most 1 % are wrong.
+// Fails unless of each cell up to 90 % of mismatches 97 %, and beside each crowd 90 %, are solved and at most 1 %
+// wrong.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -91,7 +92,7 @@ bool run_crowds(const cfp::PinholeCamera<double>& camera, int problems) {
         std::printf("%5zu %6zu %10.0f %9.1f %10.1f %8.1f\n", right, crowd, 2 * half_px, percent * cell.solved,
                     percent * cell.refused, percent * cell.wrong);
         std::fflush(stdout);
-        good = good && cell.wrong <= 0.01 * problems + 1 && (right == 0 || cell.solved >= 0.97 * problems - 1);
+        good = good && cell.wrong <= 0.01 * problems + 1 && (right == 0 || cell.solved >= 0.9 * problems - 1);
       }
     }
   }

@@ -168,7 +168,7 @@ TEST_CASE("Mismatches that crowd in a patch of the image make no pose", "[robust
     std::size_t points, crowd;
     double half_px;
   };
-  // On the headers before: found in 7, 28, 33, 76, 37, 81, 32 %; above 40 % of inliers in 33, 23, 23, 12 %.
+  // In the last four the inliers are more than 40 %.
   const Case cases[] = {{200, 15, 4}, {200, 25, 6}, {200, 60, 4}, {200, 60, 6}, {200, 100, 4}, {200, 100, 6},
                         {50, 30, 4},  {20, 20, 5},  {30, 30, 4},  {20, 20, 4},  {50, 50, 4}};
   cfp::Random random(64, "crowd");
@@ -184,7 +184,7 @@ TEST_CASE("Mismatches that crowd in a patch of the image make no pose", "[robust
       CHECK(result.iterations <= PnpRansacOptions{}.max_iterations);
     }
   }
-  CHECK(found <= 2);  // of 220
+  CHECK(found <= 2);  // of 220; unless an exchange of pixels is looked at 71
 }
 
 TEST_CASE("Right matches are found beside mismatches that crowd", "[robust]") {
