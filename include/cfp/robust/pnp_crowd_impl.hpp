@@ -4,7 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -14,7 +13,6 @@
 #include "cfp/math/se3.hpp"
 #include "cfp/robust/pnp_observations_impl.hpp"
 #include "cfp/robust/ransac_data_impl.hpp"
-#include "cfp/simd/packet.hpp"
 
 namespace cfp::detail {
 
@@ -42,69 +40,32 @@ inline std::size_t list_near(const ObservationArrays& in, double limit, std::vec
   return inliers;
 }
 
-// A few observations and where they project to, to compare each with the pixels of the others.
-class ExchangedPixels {
-  using P = simd::Packet<float>;
-  enum { x, y, seen_x, seen_y, a, b, c, weight, rows };
-
- public:
-  static constexpr std::size_t most = 16;
-
-  void push(const ObservationArrays& in, const SE3<float>& pose, std::size_t i, bool weighed) noexcept {
-    const auto of = [&](std::size_t row) { return in.column<float>(row)[i]; };
-    const Vector3<float> p = pose * Vector3<float>(of(X), of(Y), of(Z));
-    const float datum[rows] = {p.x() / p.z(), p.y() / p.z(), of(ray_x), of(ray_y),
-                               of(s11),       of(s12),       of(s22),   weighed ? of(observation_weight_row) : 1.0F};
-    for (std::size_t r = 0; r < rows; ++r) at_[r][size_] = datum[r];
-    ++size_;
-  }
-
-  // The weight of the pairs of a point and the pixel of another one that lie near each other.
-  [[nodiscard]] double weight_near(float limit) noexcept {
-    double near = 0;
-    for (std::size_t i = 0; i < size_; ++i) {
-      const float own = std::exchange(at_[weight][i], 0.0F);
-      const P px(at_[x][i]), py(at_[y][i]), zero(0.0F), most_sq(limit);
-      P sum = zero;
-      for (std::size_t k = 0; k < most; k += P::lanes) {
-        const auto load = [&](std::size_t row) { return P::load(at_[row] + k); };
-        const P dx = px - load(seen_x), dy = py - load(seen_y), u = load(a) * dx + load(b) * dy, v = load(c) * dy;
-        sum += simd::select(u * u + v * v <= most_sq, load(weight), zero);
-      }
-      at_[weight][i] = own;
-      near += static_cast<double>(own * reduce_add(sum));
-    }
-    return near;
-  }
-
- private:
-  std::size_t size_ = 0;
-  float at_[rows][most] = {};
-};
-
 // Nats by which it is unlikely that as many of the observations listed are within the threshold, the first ones, if all
 // of them exchanged their pixels: mismatches that crowd in a patch of the image lie near whatever is projected there.
-// Of evenly chosen ones, `most` at most; three fit by construction, and one pair more than counted is taken to fit.
+// Of `most` evenly chosen ones, each with the pixels of up to 15 others; three fit by construction, and one pair more
+// than counted is taken to fit.
 [[nodiscard]] inline double exchange_nats(const ObservationArrays& in, const SE3<double>& pose, double limit,
                                           const std::vector<double>& list, std::size_t inliers, std::size_t most,
                                           bool weighed) noexcept {
-  const SE3<float> draft = pose.cast<float>();
-  const std::size_t size = (std::min)(list.size(), most);
-  const std::size_t groups = (size + ExchangedPixels::most - 1) / ExchangedPixels::most;
+  constexpr std::size_t others = 15;
+  const std::size_t size = (std::min)(list.size(), most), step = (std::max)(size / (others + 1), std::size_t(1));
+  const auto listed = [&](std::size_t k) { return k * list.size() / size; };
+  const auto weight_of = [&](std::size_t i) { return weighed ? in.weights()[i] : 1.0; };
   double sum = 0, squares = 0, near = 0, near_pairs = 0, pairs = 0;
-  for (std::size_t g = 0; g < groups; ++g) {
-    ExchangedPixels group;
-    double in_group = 0;
-    for (std::size_t k = g; k < size; k += groups) {
-      const std::size_t at = k * list.size() / size, i = static_cast<std::size_t>(list[at]);
-      const double w = weighed ? in.weights()[i] : 1.0;
-      in_group += w, squares += w * w, near += at < inliers ? w : 0.0;
-      group.push(in, draft, i, weighed);
+  for (std::size_t k = 0; k < size; ++k) {
+    const auto i = static_cast<std::size_t>(list[listed(k)]);
+    const double w = weight_of(i);
+    sum += w, squares += w * w, near += listed(k) < inliers ? w : 0.0;
+    const LinearReprojection<double> projected(in, pose, i);
+    for (std::size_t d = 1; d <= others && d < size; ++d) {
+      const auto j = static_cast<std::size_t>(list[listed((k + d * step) % size)]);
+      const double dx = projected.x - in.row(ray_x)[j], dy = projected.y - in.row(ray_y)[j],
+                   u = in.row(s11)[j] * dx + in.row(s12)[j] * dy, v = in.row(s22)[j] * dy;
+      pairs += w * weight_of(j);
+      if (u * u + v * v <= limit) near_pairs += w * weight_of(j);
     }
-    sum += in_group, pairs += in_group * in_group;
-    near_pairs += group.weight_near(static_cast<float>(limit));
   }
-  const double unit = squares / sum, one = unit * unit, chance = (near_pairs + one) / (pairs - squares + one);
+  const double unit = squares / sum, one = unit * unit, chance = (near_pairs + one) / (pairs + one);
   return near > 0 ? binomial_nats(near / unit - 3, sum / unit - 3, chance) : 0.0;
 }
 
