@@ -37,7 +37,7 @@ struct PairArrays : RansacColumns<pair_rows> {
   double grid_sq = 0;          // squared pitch of the grid that all coordinates lie on, scaled; 0 without one
   double total_shared = 0;     // sum of the weights in the score
   std::vector<float> thinned;  // see thinned_columns
-  CellCounts cells[4];         // of either image, of one grid and of the other
+  CellCounts cells[2][2];      // of either image, of either grid
 };
 
 inline namespace CFP_ISA {
@@ -84,35 +84,40 @@ template <typename T>
   return pitch > 0 ? static_cast<std::size_t>(std::clamp(along / pitch + middle, 0.0, 2 * middle - 0.01)) : 0;
 }
 
-// Enters every pair's point of one image, the first row of which is given; cells of 1 / inverse_size, shifted by a
-// share of one. A centred point over no size at all is not a number: the order of the arguments sends it to the lower
+// Enters every pair's point of one image, the first row of which is given, into both grids of cells of 1 /
+// inverse_size. A centred point over no size at all is not a number: the order of the arguments sends it to the lower
 // end.
-inline void count_cells(const PairArrays& pairs, std::size_t row, double inverse_size, double shift,
-                        CellCounts& cells) noexcept {
-  const std::size_t size = cells.keys.size();
-  const auto index = [&](double x) {
-    return static_cast<std::uint64_t>((std::min)((std::max)(-1e9, x * inverse_size + shift), 1e9) + 2e9);
+inline void count_cells(const PairArrays& pairs, std::size_t row, double inverse_size,
+                        CellCounts (&grids)[2]) noexcept {
+  const auto half_cells = [&](double x) {
+    return static_cast<std::uint64_t>((std::min)((std::max)(-1e9, 2 * x * inverse_size), 1e9) + 2e9);
   };
+  const std::size_t size = grids[0].keys.size();
   for (std::size_t i = 0; i < pairs.size; ++i) {
-    const std::uint64_t key = index(pairs.row(row)[i]) << 32 | index(pairs.row(row + 1)[i]);  // never 0
-    std::size_t at = static_cast<std::size_t>(key * 0x9e3779b97f4a7c15U >> 32) & (size - 1);
-    while (cells.keys[at] != 0 && cells.keys[at] != key) at = (at + 1) & (size - 1);
-    cells.keys[at] = key;
-    ++cells.counts[at];
-    cells.slots[i] = static_cast<std::uint32_t>(at);
+    const std::uint64_t x = half_cells(pairs.row(row)[i]), y = half_cells(pairs.row(row + 1)[i]);
+    for (std::size_t half = 0; half < 2; ++half) {
+      CellCounts& cells = grids[half];
+      const std::uint64_t key = (x + half) / 2 << 32 | (y + half) / 2;  // never 0
+      std::size_t at = static_cast<std::size_t>(key * 0x9e3779b97f4a7c15U >> 32) & (size - 1);
+      while (cells.keys[at] != 0 && cells.keys[at] != key) at = (at + 1) & (size - 1);
+      cells.keys[at] = key;
+      ++cells.counts[at];
+      cells.slots[i] = static_cast<std::uint32_t>(at);
+    }
   }
 }
 
 // Shares the weights among the pairs that begin in one cell, or end in one.
 inline void share_weights(PairArrays& pairs, double cell_size) noexcept {
-  for (std::size_t k = 0; k < 4; ++k) count_cells(pairs, 2 * (k % 2), 1 / cell_size, k < 2 ? 0 : 0.5, pairs.cells[k]);
+  for (std::size_t image = 0; image < 2; ++image) count_cells(pairs, 2 * image, 1 / cell_size, pairs.cells[image]);
   pairs.total_shared = 0;
   float* const fast = pairs.fast.data() + score_weight * pairs.capacity;
   for (std::size_t i = 0; i < pairs.size; ++i) {
     std::uint32_t most = 1;
-    for (const CellCounts& cells : pairs.cells) most = (std::max)(most, cells.counts[cells.slots[i]]);
-    const double n = most;
-    const double w = pairs.weights()[i], shared = w * (std::min)(3 / n, 1.0);
+    for (const auto& grids : pairs.cells) {
+      for (const CellCounts& cells : grids) most = (std::max)(most, cells.counts[cells.slots[i]]);
+    }
+    const double n = most, w = pairs.weights()[i], shared = w * (std::min)(3 / n, 1.0);
     pairs.row(score_weight)[i] = shared, fast[i] = static_cast<float>(shared), pairs.row(evidence_weight)[i] = w / n;
     pairs.total_shared += shared;
   }
@@ -140,8 +145,10 @@ void load_pairs(const PointPairs<Scalar>& input, double cell_px, PairArrays& pai
   pairs.begin(input.previous.size());
   std::size_t size = 64;
   while (size < 2 * input.previous.size()) size *= 2;
-  for (CellCounts& cells : pairs.cells)
-    cells.keys.assign(size, 0), cells.counts.assign(size, 0), cells.slots.resize(input.previous.size());
+  for (auto& grids : pairs.cells) {
+    for (CellCounts& cells : grids)
+      cells.keys.assign(size, 0), cells.counts.assign(size, 0), cells.slots.resize(input.previous.size());
+  }
   pairs.size = pairs.scaling.used;
   pairs.thinned.resize(5 * PairArrays::enough);
   if (!pairs.scaling.valid()) return;
