@@ -995,3 +995,24 @@ TEST_CASE("Points on one line leave a plane open, among mismatches, too", "[robu
     CHECK(degenerate >= (outlier_share < 0.2 ? 38 : 25));  // among many mismatches F is sometimes found
   }
 }
+
+TEST_CASE("Few pairs of a camera at rest or turning are seldom taken for a plane", "[robust]") {
+  FundamentalRansacWorkspace workspace;
+  cfp::Random random(52, "few pairs");
+  const auto named = [&](std::size_t pairs, double noise_px, double rotation_rad) {
+    FundamentalRansacOptions options;
+    options.min_inliers = 8;
+    int right = 0;
+    for (int trial = 0; trial < 200; ++trial) {
+      const auto scene = make_two_view_scene<double>(random, without_parallax(pairs, 0, noise_px, rotation_rad));
+      const auto result = fundamental_ransac(PointPairs{scene.prev, scene.cur}, scene.camera, options, workspace);
+      right += result.status == (rotation_rad > 0 ? cfp::RansacStatus::pure_rotation : cfp::RansacStatus::no_motion);
+    }
+    return right;
+  };
+  CHECK(named(12, 0.1, 0) >= 150);  // of 200; 100 where a homography that follows the noise counts
+  CHECK(named(20, 0.5, 0) >= 175);  // 159
+  CHECK(named(12, 0.1, 0.035) >= 150);
+  CHECK(named(20, 0.5, 0.035) >= 185);
+  CHECK(named(30, 0.1, 0) >= 198);
+}

@@ -190,18 +190,20 @@ struct DegeneracyCheck {
   [[nodiscard]] Matrix3<T> no_motion() const noexcept { return scaled_homography(Matrix3<T>::Identity()); }
 
   // What motion H stands for; K: intrinsics or null. `found`, which may be H, becomes no motion, or the rotation that
-  // fits best, where it explains nine tenths of the pairs that H does.
+  // fits best, where it explains nine tenths of the pairs that H does, or all of them as well.
   [[nodiscard]] RansacStatus motion_of(const Matrix3<T>* K, Matrix3<T>& found) const noexcept {
-    const auto takes = [&](const Matrix3<T>& other) {
-      if (!other.allFinite() || !(explained_by(other) >= 0.9)) return false;
+    const auto takes = [&](const Matrix3<T>& other, int more) {
+      if (!other.allFinite() ||
+          !(explained_by(other) >= 0.9 || explains_as_well(pairs, other, H, more, transfer_noise_limit())))
+        return false;
       found = other;
       return true;
     };
-    if (takes(no_motion())) return RansacStatus::no_motion;
+    if (takes(no_motion(), 8)) return RansacStatus::no_motion;
     if (K == nullptr) return RansacStatus::homography;
     const auto rays = [&](std::size_t i) { return holds(i); };
-    return takes(scaled_homography(fitted_rotation(pairs, *K, rays))) ? RansacStatus::pure_rotation
-                                                                      : RansacStatus::planar;
+    return takes(scaled_homography(fitted_rotation(pairs, *K, rays)), 5) ? RansacStatus::pure_rotation
+                                                                         : RansacStatus::planar;
   }
 
   // The same of H refined, which becomes what was found.

@@ -53,29 +53,6 @@ void report_fundamental(const Matrix3<double>& F, const FundamentalSearch<double
   if (result.found()) result.F = unscaled_fundamental(F, search.pairs.scaling).template cast<Scalar>();
 }
 
-/// Whether the inliers, but for a few, lie on one line of the previous image, which leaves the homography of a plane
-/// open: two pairs beside it make one that only chance confirms.
-template <typename IsInlier>
-[[nodiscard]] bool lie_on_a_line(const PairArrays& pairs, double width, const IsInlier& is_inlier) noexcept {
-  Random random(pairs.size, "lie_on_a_line");
-  const auto drawn = [&] {
-    std::size_t i = random.index(static_cast<std::uint32_t>(pairs.size));
-    for (std::size_t k = 0; k < pairs.size && !is_inlier(i); ++k) i = (i + 1) % pairs.size;
-    return previous_point<double>(pairs, i);
-  };
-  for (int trial = 0; trial < 16; ++trial) {
-    const Vector3<double> a = drawn(), line = cross(a, drawn());
-    const double most = width * line.head<2>().norm();
-    if (!(most > 0)) continue;
-    std::size_t on = 0, off = 0;
-    for (std::size_t i = 0; i < pairs.size; ++i) {
-      if (is_inlier(i)) ++(std::abs(line.dot(previous_point<double>(pairs, i))) <= most ? on : off);
-    }
-    if (off <= 4 + on / 20) return true;
-  }
-  return false;
-}
-
 /// In the place of an F: what motion the homography is, its pairs and itself.
 template <typename Scalar>
 void report_homography(DegeneracyCheck<double>& check, const Matrix3<double>* K, std::size_t min_inliers,

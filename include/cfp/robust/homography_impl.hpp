@@ -136,5 +136,43 @@ template <typename T, typename Holds>
   return K * (m.U * m.V.transpose()) * K_inverse;
 }
 
+// Whether the inliers, but for a few, lie on one line of the previous image, which leaves the homography of a plane
+// open: two pairs beside it make one that only chance confirms.
+template <typename IsInlier>
+[[nodiscard]] bool lie_on_a_line(const PairArrays& pairs, double width, const IsInlier& is_inlier) noexcept {
+  Random random(pairs.size, "lie_on_a_line");
+  const auto drawn = [&] {
+    std::size_t i = random.index(static_cast<std::uint32_t>(pairs.size));
+    for (std::size_t k = 0; k < pairs.size && !is_inlier(i); ++k) i = (i + 1) % pairs.size;
+    return previous_point<double>(pairs, i);
+  };
+  for (int trial = 0; trial < 16; ++trial) {
+    const Vector3<double> a = drawn(), line = cross(a, drawn());
+    const double most = width * line.head<2>().norm();
+    if (!(most > 0)) continue;
+    std::size_t on = 0, off = 0;
+    for (std::size_t i = 0; i < pairs.size; ++i) {
+      if (is_inlier(i)) ++(std::abs(line.dot(previous_point<double>(pairs, i))) <= most ? on : off);
+    }
+    if (off <= 4 + on / 20 && on >= 2 * off) return true;
+  }
+  return false;
+}
+
+// Whether H, which has so many parameters more than `other`, explains the pairs that it holds within the squared
+// distance better by no more than these let it: an F test, as the best homography of few pairs follows their noise.
+template <typename T>
+[[nodiscard]] bool explains_as_well(const PairArrays& pairs, const Matrix3<T>& other, const Matrix3<T>& H, int more,
+                                    T limit) noexcept {
+  T by_other = 0, by_H = 0, held = 0;
+  for (std::size_t i = 0; i < pairs.size; ++i) {
+    const T distance_sq = transfer_sq(pairs, H, i);
+    if (!(distance_sq <= limit)) continue;
+    by_other += transfer_sq(pairs, other, i), by_H += distance_sq, held += 1;
+  }
+  const T freedom = 2 * held - 8;
+  return freedom > 0 && (by_other - by_H) * freedom <= T(6) * static_cast<T>(more) * by_H;
+}
+
 }  // namespace CFP_ISA
 }  // namespace cfp::detail
