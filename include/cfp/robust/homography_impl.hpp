@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "cfp/core/random.hpp"
 #include "cfp/math/matrix3.hpp"
 #include "cfp/robust/fundamental_pairs_impl.hpp"
 
