@@ -1010,9 +1010,9 @@ TEST_CASE("Few pairs of a camera at rest or turning are seldom taken for a plane
     }
     return right;
   };
-  CHECK(named(12, 0.1, 0) >= 150);  // of 200; 100 where a homography that follows the noise counts
-  CHECK(named(20, 0.5, 0) >= 175);  // 159
-  CHECK(named(12, 0.1, 0.035) >= 150);
-  CHECK(named(20, 0.5, 0.035) >= 185);
-  CHECK(named(30, 0.1, 0) >= 198);
+  // Of 2,000 frames 82, 94 and 83 % are; where a homography that follows the noise counts, 49, 81 and 66 %. The bounds
+  // are four standard deviations below.
+  CHECK(named(12, 0.1, 0) >= 142);
+  CHECK(named(20, 0.5, 0) >= 175);
+  CHECK(named(12, 0.1, 0.035) >= 145);
 }
