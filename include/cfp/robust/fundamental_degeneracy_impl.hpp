@@ -68,10 +68,7 @@ struct DegeneracyCheck {
   // outnumber little parallax under a threshold far above the noise. Source: Chum, Werner, Matas: "Two-view geometry
   // estimation unaffected by a dominant plane", CVPR 2005.
   void complete_from_plane(RansacCandidate<Matrix3<T>>& candidate) noexcept {
-    search.list.clear();
-    for (std::size_t i = 0; i < pairs.size; ++i) {
-      if (transfer_sq(pairs, H, i) > transfer_limit()) search.list.push_back(static_cast<std::uint32_t>(i));
-    }
+    search.list_where([&](std::size_t i) { return transfer_sq(pairs, H, i) > transfer_limit(); });
     if (search.list.size() < 2) return;
     constexpr int samples = 100;  // 99 % for parallax in a fifth of the pairs off the plane
     FundamentalSearch<T> fine = search;

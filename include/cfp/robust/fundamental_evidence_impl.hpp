@@ -201,17 +201,14 @@ struct FundamentalEvidence {
       const P e = multiply_add(P(line[0]), P::load(x + k), multiply_add(P(line[1]), P::load(y + k), P(line[2])));
       return e * e <= width_sq;
     };
-    T most = 0;
-    Vector3<T> best = Vector3<T>::Zero();
-    for (int trial = 0; trial < 16; ++trial) {
-      const Vector3<T> a = point(), across = cross(a, point()), line = across / across.template head<2>().norm();
+    const Vector3<T> best = heaviest_line<T>(point, [&](const Vector3<T>& line) {
       P sum = zero;
       for (std::size_t k = 0; k < count; k += P::lanes) {
         const P g = P::load(gain + k);
         sum += select(near(line, k), select(g < one, select(g > zero, g, zero), one), zero);
       }
-      if (reduce_add(sum) > most) most = reduce_add(sum), best = line;
-    }
+      return reduce_add(sum);
+    });
     for (std::size_t k = 0; k < count; k += P::lanes) select(near(best, k), zero, P::load(gain + k)).store(gain + k);
   }
 };

@@ -60,13 +60,13 @@ void report_homography(DegeneracyCheck<double>& check, const Matrix3<double>* K,
   const PairArrays& pairs = check.pairs;
   const auto is_inlier = [&](std::size_t i) { return transfer_sq(pairs, check.H, i) <= check.transfer_limit(); };
   result.status = check.classify(K);
-  const bool of_plane = result.status == RansacStatus::planar || result.status == RansacStatus::homography;
-  if (of_plane && lie_on_a_line(pairs, 2 * std::sqrt(check.transfer_limit()), is_inlier)) {
-    result.status = RansacStatus::degenerate;
-    return;
-  }
   report_inliers(pairs, is_inlier, min_inliers, inlier_mask, result);
-  if (result.status == RansacStatus::no_consensus) return;
+  if (result.status == RansacStatus::planar || result.status == RansacStatus::homography) {
+    check.search.list_where(is_inlier);
+    if (lie_on_a_line(pairs, check.search.list, 2 * std::sqrt(check.transfer_limit())))
+      refuse(inlier_mask, result, RansacStatus::degenerate);
+  }
+  if (result.status == RansacStatus::no_consensus || result.status == RansacStatus::degenerate) return;
   const Matrix3<double> pixels =
       unscaling_matrix(pairs.scaling.current) * check.H * scaling_matrix(pairs.scaling.previous);
   result.homography = ((determinant(pixels) < 0 ? -1.0 : 1.0) * pixels.normalized()).template cast<Scalar>();

@@ -91,12 +91,17 @@ struct FundamentalSearch {
     return [this](std::size_t i) { return distances_sq[i] <= limit; };
   }
 
-  // Into `list`, by distances_sq.
-  void collect_inliers() noexcept {
+  template <typename Holds>
+  void list_where(const Holds& holds) noexcept {
     list.clear();
     for (std::size_t i = 0; i < pairs.size; ++i) {
-      if (distances_sq[i] <= limit) list.push_back(static_cast<std::uint32_t>(i));
+      if (holds(i)) list.push_back(static_cast<std::uint32_t>(i));
     }
+  }
+
+  // By distances_sq.
+  void collect_inliers() noexcept {
+    list_where([this](std::size_t i) { return distances_sq[i] <= limit; });
   }
 
   // Draws a sample of the listed inliers beside the neighbours, over a person's width, of one of them.

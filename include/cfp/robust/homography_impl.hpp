@@ -3,8 +3,10 @@
 /// interface.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include "cfp/core/random.hpp"
 #include "cfp/math/matrix3.hpp"
@@ -137,27 +139,34 @@ template <typename T, typename Holds>
   return K * (m.U * m.V.transpose()) * K_inverse;
 }
 
-// Whether the inliers, but for a few, lie on one line of the previous image, which leaves the homography of a plane
-// open: two pairs beside it make one that only chance confirms.
-template <typename IsInlier>
-[[nodiscard]] bool lie_on_a_line(const PairArrays& pairs, double width, const IsInlier& is_inlier) noexcept {
-  Random random(pairs.size, "lie_on_a_line");
-  const auto drawn = [&] {
-    std::size_t i = random.index(static_cast<std::uint32_t>(pairs.size));
-    for (std::size_t k = 0; k < pairs.size && !is_inlier(i); ++k) i = (i + 1) % pairs.size;
-    return previous_point<double>(pairs, i);
-  };
+// Of the lines through two points of 16 draws the one that weighs most; zero where none weighs anything.
+template <typename T, typename Draw, typename WeightOf>
+[[nodiscard]] Vector3<T> heaviest_line(const Draw& draw, const WeightOf& weight_of) noexcept {
+  T most = 0;
+  Vector3<T> best = Vector3<T>::Zero();
   for (int trial = 0; trial < 16; ++trial) {
-    const Vector3<double> a = drawn(), line = cross(a, drawn());
-    const double most = width * line.head<2>().norm();
-    if (!(most > 0)) continue;
-    std::size_t on = 0, off = 0;
-    for (std::size_t i = 0; i < pairs.size; ++i) {
-      if (is_inlier(i)) ++(std::abs(line.dot(previous_point<double>(pairs, i))) <= most ? on : off);
-    }
-    if (off <= 4 + on / 20 && on >= 2 * off) return true;
+    const Vector3<T> a = draw(), across = cross(a, draw()), line = across / across.template head<2>().norm();
+    const T weight = weight_of(line);
+    if (weight > most) most = weight, best = line;
   }
-  return false;
+  return best;
+}
+
+// Whether the inliers listed, but for a few, lie on one line of the previous image, which leaves the homography of a
+// plane open: two pairs beside it make one that only chance confirms.
+[[nodiscard]] inline bool lie_on_a_line(const PairArrays& pairs, const std::vector<std::uint32_t>& inliers,
+                                        double width) noexcept {
+  if (inliers.empty()) return false;
+  Random random(pairs.size, "lie_on_a_line");
+  const auto on = [&](const Vector3<double>& line) {
+    const auto is_near = [&](std::uint32_t i) { return std::abs(line.dot(previous_point<double>(pairs, i))) <= width; };
+    return static_cast<double>(std::count_if(inliers.begin(), inliers.end(), is_near));
+  };
+  const auto draw = [&] {
+    return previous_point<double>(pairs, inliers[random.index(static_cast<std::uint32_t>(inliers.size()))]);
+  };
+  const double most = on(heaviest_line<double>(draw, on)), off = static_cast<double>(inliers.size()) - most;
+  return off <= 4 + most / 20 && most >= 2 * off;
 }
 
 // Whether H, which has so many parameters more than `other`, explains the pairs that it holds within the squared
