@@ -214,6 +214,10 @@ TEST_CASE("Right matches are found beside mismatches that crowd", "[robust]") {
   const auto scene = cfp_test::make_crowded_scene(random, camera<double>, 200, 30, 60, 1);
   CHECK(cfp_test::allocations_in(
             [&] { (void)pnp_ransac(scene.world, scene.pixels, {}, camera<double>, {}, workspace); }) == 0);
+  PnpRansacWorkspace reserved;
+  reserved.reserve(200);
+  CHECK(cfp_test::allocations_in(
+            [&] { (void)pnp_ransac(scene.world, scene.pixels, {}, camera<double>, {}, reserved); }) == 0);
 }
 
 TEST_CASE("An object of 12 px has a pose, alone and beside mismatches anywhere in the image", "[robust]") {

@@ -187,9 +187,7 @@ template <typename Scalar>
                                                   span<std::array<Scalar, 3>>(workspace.points), workspace.grid);
   if (workspace.taken < options.min_pairs) return {};
 
-  if (workspace.search.observations.index.size() < outside.size())  // a later call may search and must not allocate
-    workspace.search.observations.begin(outside.size());
-  workspace.search.sampling.reserve(outside.size());
+  workspace.search.reserve(outside.size());  // a later call may search and must not allocate
   workspace.near_m = detail::depth_at_share(workspace.points, options.nearest_share, workspace.distances);
   const detail::PairsWithDepth<Scalar> pairs{flow, camera, options, workspace};
   SE3<double> T;

@@ -12,12 +12,6 @@
 
 namespace cfp::detail {
 
-// Counts what falls into the same cell: open addressing.
-struct CellCounts {
-  std::vector<std::uint64_t> keys;
-  std::vector<std::uint32_t> counts, slots;  // per slot; the slot of every pair
-};
-
 // Coordinates are centred per image and scaled by one common factor, so that distances are pixels times `factor`. Pairs
 // that begin or end in one cell share weight: copies, or mismatches that all end in one place, are no support. In the
 // score they have the weight of three at most, as evidence that of one. A place may lie across the cells of one grid,
@@ -92,18 +86,9 @@ inline void count_cells(const PairArrays& pairs, std::size_t row, double inverse
   const auto half_cells = [&](double x) {
     return static_cast<std::uint64_t>((std::min)((std::max)(-1e9, 2 * x * inverse_size), 1e9) + 2e9);
   };
-  const std::size_t size = grids[0].keys.size();
   for (std::size_t i = 0; i < pairs.size; ++i) {
     const std::uint64_t x = half_cells(pairs.row(row)[i]), y = half_cells(pairs.row(row + 1)[i]);
-    for (std::size_t half = 0; half < 2; ++half) {
-      CellCounts& cells = grids[half];
-      const std::uint64_t key = (x + half) / 2 << 32 | (y + half) / 2;  // never 0
-      std::size_t at = static_cast<std::size_t>(key * 0x9e3779b97f4a7c15U >> 32) & (size - 1);
-      while (cells.keys[at] != 0 && cells.keys[at] != key) at = (at + 1) & (size - 1);
-      cells.keys[at] = key;
-      ++cells.counts[at];
-      cells.slots[i] = static_cast<std::uint32_t>(at);
-    }
+    for (std::size_t half = 0; half < 2; ++half) grids[half].enter(i, (x + half) / 2, (y + half) / 2);
   }
 }
 
@@ -115,7 +100,7 @@ inline void share_weights(PairArrays& pairs, double cell_size) noexcept {
   for (std::size_t i = 0; i < pairs.size; ++i) {
     std::uint32_t most = 1;
     for (const auto& grids : pairs.cells) {
-      for (const CellCounts& cells : grids) most = (std::max)(most, cells.counts[cells.slots[i]]);
+      for (const CellCounts& cells : grids) most = (std::max)(most, cells.beside(i));
     }
     const double n = most, w = pairs.weights()[i], shared = w * (std::min)(3 / n, 1.0);
     pairs.row(score_weight)[i] = shared, fast[i] = static_cast<float>(shared), pairs.row(evidence_weight)[i] = w / n;
@@ -143,11 +128,8 @@ void load_pairs(const PointPairs<Scalar>& input, double cell_px, PairArrays& pai
   pairs.scaling = scale_pairs(input);
   pairs.factor = 0;
   pairs.begin(input.previous.size());
-  std::size_t size = 64;
-  while (size < 2 * input.previous.size()) size *= 2;
   for (auto& grids : pairs.cells) {
-    for (CellCounts& cells : grids)
-      cells.keys.assign(size, 0), cells.counts.assign(size, 0), cells.slots.resize(input.previous.size());
+    for (CellCounts& cells : grids) cells.begin(input.previous.size());
   }
   pairs.size = pairs.scaling.used;
   pairs.thinned.resize(5 * PairArrays::enough);

@@ -72,19 +72,15 @@ inline std::size_t list_near(const ObservationArrays& in, double limit, std::vec
 // Where more than three pixels lie in one cell their weights become those of one. False where there is no such cell.
 template <typename Scalar>
 [[nodiscard]] bool share_weights(const PointSpan<Scalar, 2>& pixels, double cell_px, ObservationArrays& in,
-                                 std::vector<double>& scratch) {
-  const auto cell = [&](std::size_t i) {
-    const Vector2<double> pixel = Vector2<Scalar>(pixels[in.index[i]]).template cast<double>();
-    const auto along = [&](double px) { return std::floor(std::clamp(px / cell_px, -1e6, 1e6)); };
-    return 4e6 * along(pixel.x()) + along(pixel.y());
+                                 CellCounts& cells) {
+  const auto cell = [&](Scalar px) {
+    return static_cast<std::uint64_t>(std::clamp(static_cast<double>(px) / cell_px, -1e6, 1e6) + 2e6);
   };
-  scratch.clear();
-  for (std::size_t i = 0; i < in.size; ++i) scratch.push_back(cell(i));
-  std::sort(scratch.begin(), scratch.end());
+  cells.begin(in.size);
+  for (std::size_t i = 0; i < in.size; ++i) cells.enter(i, cell(pixels(in.index[i], 0)), cell(pixels(in.index[i], 1)));
   bool shared = false;
   for (std::size_t i = 0; i < in.size; ++i) {
-    const auto in_cell = std::equal_range(scratch.begin(), scratch.end(), cell(i));
-    const auto n = in_cell.second - in_cell.first;
+    const std::uint32_t n = cells.beside(i);
     if (n > 3) in.row(observation_weight_row)[i] /= static_cast<double>(n), shared = true;
   }
   if (shared) finish(in);

@@ -33,10 +33,17 @@ struct PnpRansacResult : RansacReport {
 };
 
 /// Scratch memory of pnp_ransac: keep one per thread. After a call with n observations, calls with up to n allocate
-/// nothing.
+/// nothing, nor do they after reserve(n).
 struct PnpRansacWorkspace {
   detail::ObservationArrays observations;
+  detail::CellCounts cells;
   std::vector<double> sampling;
+
+  CFP_INLINE void reserve(std::size_t n) {
+    if (observations.index.size() < n) observations.begin(n);
+    if (cells.slots.capacity() < n) cells.begin(n);
+    sampling.reserve(n);
+  }
 };
 
 inline namespace CFP_ISA {
@@ -72,6 +79,7 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
   std::fill(inlier_mask.begin(), inlier_mask.end(), char(0));
   PnpRansacResult<Scalar> result;
   detail::ObservationArrays& observations = workspace.observations;
+  workspace.reserve(world.size());
   detail::load_observations(world, pixels, weights, camera, observations, workspace.sampling);
   result.used = observations.size;
   if (observations.size < options.min_inliers || observations.size < 4) return result;
@@ -111,7 +119,7 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
   conclude();
   // Is something there beside what crowds in places?
   if (result.found() || result.iterations >= options.max_iterations ||
-      !detail::share_weights(pixels, 2 * options.threshold_px, observations, workspace.sampling))
+      !detail::share_weights(pixels, 2 * options.threshold_px, observations, workspace.cells))
     return result;
   PnpRansacOptions again = options;
   again.max_iterations -= result.iterations;

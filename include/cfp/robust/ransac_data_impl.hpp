@@ -51,6 +51,29 @@ struct RansacColumns {
   }
 };
 
+// Counts what falls into the same cell: open addressing.
+struct CellCounts {
+  std::vector<std::uint64_t> keys;
+  std::vector<std::uint32_t> counts, slots;  // per slot; the slot of every datum
+
+  CFP_INLINE void begin(std::size_t data) {
+    std::size_t size = 64;
+    while (size < 2 * data) size *= 2;
+    keys.assign(size, 0), counts.assign(size, 0), slots.resize(data);
+  }
+  // Datum i into cell (x, y), not both 0.
+  CFP_INLINE void enter(std::size_t i, std::uint64_t x, std::uint64_t y) noexcept {
+    const std::uint64_t key = x << 32 | y;
+    std::size_t at = static_cast<std::size_t>(key * 0x9e3779b97f4a7c15U >> 32) & (keys.size() - 1);
+    while (keys[at] != 0 && keys[at] != key) at = (at + 1) & (keys.size() - 1);
+    keys[at] = key;
+    ++counts[at];
+    slots[i] = static_cast<std::uint32_t>(at);
+  }
+  // How many are in the cell of datum i.
+  [[nodiscard]] CFP_INLINE std::uint32_t beside(std::size_t i) const noexcept { return counts[slots[i]]; }
+};
+
 inline namespace CFP_ISA {
 
 template <std::size_t Rows>
