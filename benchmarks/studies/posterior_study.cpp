@@ -25,7 +25,7 @@
 // mm, AUC 0.992 / 0.982 / 0.991 and 0.991 / 0.986 / 0.989; its price: static at weight 0 2.4 / 3.4 / 1.7 % and 0.6 /
 // 1.2 / 0.8 %, Brier score 0.088 / 0.182 / 0.101 and 0.069 / 0.130 / 0.094: the still parts of who moves lose weight.
 //
-// What pairs only show together (ObjectProbability::together) came from such a recording, too: at commit 4f8f795, seeds
+// What pairs only show together (ObjectProbability::together) came from such a recording, too: at commit 5fc790e, seeds
 // 201 and 202, 150 frames, with it and without, walking / sitting / rising: AUC 0.990 / 0.984 / 0.986 and 0.990 / 0.985
 // / 0.983, static at weight 0 3.5 / 2.7 / 2.1 % and 3.4 / 2.4 / 1.9 %, moving above 0.5 1.2 / 2.7 / 3.7 % and 1.4 / 2.8
 // / 3.7 %, Brier score 0.103 / 0.185 / 0.114 and 0.103 / 0.176 / 0.112. Where all pairs of who moves are asked, and not
