@@ -111,8 +111,8 @@ struct DegeneracyCheck {
     const bool rests = shown == RansacStatus::no_motion, turns = shown == RansacStatus::pure_rotation;
     const Vector3<T> epipole = epipole_of(F);
     const auto stands = [&](const typename FundamentalEvidence<T>::Verdict& v, T factor, bool beside_person) {
-      if (!(v.distinct >= least && v.all > 11 * factor)) return false;
-      return (!beside_person || v.person.evidence > 3 * factor) && (!broad_possible || v.broad.evidence > 3 * factor);
+      return v.all > 11 * factor && (!beside_person || v.person.evidence > 3 * factor) &&
+             (!broad_possible || v.broad.evidence > 3 * factor);
     };
     const auto suffices = [&](T factor) {
       return stands(with_H, factor, possible) && !evidence.rests_on_lines(factor) &&

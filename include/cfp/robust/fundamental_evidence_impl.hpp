@@ -54,7 +54,6 @@ struct FundamentalEvidence {
   };
 
   struct Verdict {
-    T distinct;            // distinct pairs that F explains
     T all;                 // evidence of all pairs
     Window person, broad;  // least of evidence beside a person, and beside somebody close or several side by side
   };
@@ -79,12 +78,12 @@ struct FundamentalEvidence {
   // image where H is that of the plane at infinity, beside which all that is seen moves towards one side; what moves
   // the other way, as one of two people who cross does, says nothing. Null otherwise.
   [[nodiscard]] Verdict judge(const Matrix3<T>& H, const Vector3<T>* epipole = nullptr) noexcept {
-    const T distinct = compare(H);
+    compare(H);
     if (epipole != nullptr) keep_one_side(H, *epipole);
     T best[ranges];
     leave_out_loudest();
     const T all = nats(best);
-    Verdict out = {distinct, all, {all, 0, 0, 0, 0}, {all, 0, 0, 0, 0}};
+    Verdict out = {all, {all, 0, 0, 0, 0}, {all, 0, 0, 0, 0}};
     find_windows(best, out);
     leave_out_loudest();
     out.all = nats(best);
@@ -100,13 +99,11 @@ struct FundamentalEvidence {
   }
 
  private:
-  // Fills the arrays; returns how many distinct pairs F explains.
-  T compare(const Matrix3<T>& H) noexcept {
+  // Fills the arrays.
+  void compare(const Matrix3<T>& H) noexcept {
     // Rounded to a grid, neighbours err alike, by up to its pitch: what is smaller tells nothing.
     const T noise = (std::max)(search.noise.variance, T(pairs.grid_sq));
     const T per_s2 = 1 / (4 * noise + T(2e-4) * pairs.factor * pairs.factor);
-    const T limit = search.wide_limit();
-    T distinct = 0;
     count = 0;
     for (std::size_t i = 0; i < pairs.size; i += stride, ++count) {
       const T d2 = (std::min)(whitened_transfer_sq(pairs, H, i), T(100)) * per_s2;
@@ -118,10 +115,8 @@ struct FundamentalEvidence {
       range[count] = 0;
       T edge = 6;
       for (std::size_t r = 1; r < ranges; ++r, edge *= 4) range[count] += d2 > edge ? T(1) : T(0);
-      if (search.distances_sq[i] <= limit) distinct += told;
     }
     std::fill(gain + count, gain + (count + pairs.block - 1) / pairs.block * pairs.block, T(0));
-    return distinct * static_cast<T>(stride);
   }
 
   // The windows without which the pairs say least, each pair with the share of its range.

@@ -186,21 +186,23 @@ struct SampsonModel {
 
 // Whether more pairs lie near their lines than the pairs up to three times as far let chance put there: the binomial
 // tail of that has to outdo the number of seven-point samples, C(n, 7), as the best of all their F fits some
-// mismatches, too. Weights count as Kish's number of equal ones, of which at least `least` must lie near. Source:
-// Moisan and Stival, "A probabilistic criterion to detect rigid point matches between two images and estimate the
-// fundamental matrix", IJCV 2004.
+// mismatches, too. Weights count as Kish's number of equal ones, of which at least `least` must lie near, and as many
+// distinct pairs. Source: Moisan and Stival, "A probabilistic criterion to detect rigid point matches between two
+// images and estimate the fundamental matrix", IJCV 2004.
 template <typename T>
 [[nodiscard]] bool stands_out(const PairArrays& pairs, const std::vector<T>& distances_sq, T limit, T least) noexcept {
-  T near = 0, all = 0, n = 0, squares = 0;
+  T near = 0, distinct = 0, all = 0, n = 0, squares = 0;
   for (std::size_t i = 0; i < pairs.size; ++i) {
     const T weight = pairs.row(evidence_weight)[i];
     n += weight, squares += weight * weight;
     near += distances_sq[i] <= limit ? weight : T(0);
+    distinct += distances_sq[i] <= limit ? weight / pairs.weights()[i] : T(0);
     all += distances_sq[i] <= 9 * limit ? weight : T(0);
   }
   const T per_weight = n / squares;
   near *= per_weight, all *= per_weight, n *= per_weight;
-  return near >= least && 3 * near > all && binomial_nats(near, all, T(1) / 3) > 7 * std::log((n - 3) / T(3.38));
+  return near >= least && distinct >= least && 3 * near > all &&
+         binomial_nats(near, all, T(1) / 3) > 7 * std::log((n - 3) / T(3.38));
 }
 
 }  // namespace CFP_ISA
