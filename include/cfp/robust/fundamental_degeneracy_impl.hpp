@@ -53,9 +53,6 @@ struct DegeneracyCheck {
     sample_homographies(thinned_columns(pairs), samples, [this] { return drawn(); });
     double weight = 0, explained = 0;
     for (const std::uint32_t i : search.list) weight += search.weights()[i];
-    // A few noisy points carry a homography only so far: a sixth of the support is enough to go on and refine.
-    const double cost = transfer_cost(fast_columns(pairs), H, transfer_limit());
-    if (!(search.total_weight() - cost > weight / 6)) return;
     refine_homography(thinned_columns(pairs), 4 * transfer_limit(), 5, H);
     refine_homography(exact_columns(pairs), transfer_limit(), 3, H);
     for (const std::uint32_t i : search.list)
