@@ -181,6 +181,26 @@ TEST_CASE("What neighbours err by together is measured under F, too, and a pair 
   }
 }
 
+TEST_CASE("Pairs in five parts of the image tell their motion, but not what neighbours err by together", "[frame]") {
+  constexpr double noise = 0.2;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    CAPTURE(seed);
+    cfp::Random random(seed, "few parts");
+    const cfp::SE3<double> T = motion(0.02, 0.02);
+    Room room(T, noise, seed);
+    const std::vector<double> depths = room.err_by_parts(T, {4, 3}, 0, noise, random);
+    for (std::size_t i = 0; i < room.outside.size(); ++i) {
+      const auto part = static_cast<int>(room.previous[i][0] / 160) + 4 * static_cast<int>(room.previous[i][1] / 160);
+      room.outside[i] = part == 0 || part == 3 || part == 5 || part == 8 || part == 11 ? 1 : 0;
+    }
+    cfp::FlowModelWorkspace<double> workspace;
+    const auto model = cfp::estimate_flow_model<double>({room.previous, room.current, depths}, room.outside,
+                                                        room.camera, cfp::FlowModelOptions{}, workspace);
+    REQUIRE(model.kind == cfp::FlowModelKind::motion);
+    CHECK(model.shared_error_px == 0);
+  }
+}
+
 TEST_CASE("Depths that are too few for a motion do not enter one without scale", "[frame]") {
   const Room room(motion(0, 0.02), 0.2, 7);
   cfp::FlowModelWorkspace<double> workspace;

@@ -62,11 +62,12 @@ struct ResidualPart {
 /// variance sigma^2 / n + e^2 per coordinate; e is had from the upper quartile of the parts, as what errs may be a part
 /// of the image, and what moves there may be another. To n parts, each of which tells two coordinates, or one where a
 /// depth may be anything, so many parameters were fitted: e^2 is n / (n - parameters / coordinates) times what is left
-/// of it, and n times at most. Not known of fewer than four parts with five pairs that agree.
+/// of it, and n times at most. Not known of fewer than six parts with five pairs that agree: with six parameters that
+/// is hardly more than chance, three times as large, and whoever gets up behind it looks at rest for some frames.
 template <typename Scalar, typename Tells, typename Residual>
 [[nodiscard]] SharedError shared_error(const FlowPairs<Scalar>& flow, Scalar sigma_px, int parameters, Tells&& tells,
                                        Residual&& residual) noexcept {
-  constexpr std::size_t columns = 4, rows = 3, fewest_parts = 4;
+  constexpr std::size_t columns = 4, rows = 3, fewest_parts = 6;
   constexpr double fewest_pairs = 5, upper_quartile = 1.386;  // of half a chi-squared with two degrees of freedom
   const auto extent = [&](int axis) {
     return extent_of_most<Scalar>(flow.previous.size(), [&](std::size_t i) {
