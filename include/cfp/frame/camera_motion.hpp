@@ -1,7 +1,7 @@
 /// @file camera_motion.hpp
 /// The camera's motion between two frames from optical-flow pairs whose depth is known, and the noise of the flow. Not
-/// in the paper, which judges objects by a fundamental matrix: that has nothing to say of planes, rotations and cameras
-/// at rest, and is blind along its lines.
+/// in the paper, which judges objects by a fundamental matrix: which does not exist for planes, rotations and cameras
+/// at rest, and cannot see motion along its lines.
 #pragma once
 
 #include <algorithm>
@@ -22,8 +22,8 @@ namespace cfp {
 namespace detail {
 inline namespace CFP_ISA {
 
-/// The noise of the flow by robust_sigma, within the bounds of the options: so many parameters were fitted to the pairs
-/// that have a distance, which tell `coordinates` each.
+/// The noise of the flow by robust_sigma, within the bounds of the options, corrected for the degrees of freedom:
+/// `parameters` were fitted to the pairs that have a distance, with `coordinates` measurements each.
 template <typename Scalar>
 [[nodiscard]] Scalar flow_sigma(span<Scalar> distances, int coordinates, int parameters,
                                 const CameraMotionOptions& options) noexcept {
@@ -33,7 +33,7 @@ template <typename Scalar>
   return std::clamp(free * robust_sigma(kept, coordinates), Scalar(options.min_sigma_px), Scalar(options.max_sigma_px));
 }
 
-/// The pairs that tell, those with a point in workspace.points, and what can be had of them.
+/// The usable pairs (those with a point in workspace.points) and what is computed from them.
 template <typename Scalar>
 struct PairsWithDepth {
   const FlowPairs<Scalar>& flow;
@@ -49,12 +49,12 @@ struct PairsWithDepth {
                                                             T, camera, options.distance, out);
   }
 
-  /// The noise of pair i's pixel: what is near is no lever.
+  /// The noise of pair i's pixel, inflated for near points to limit their leverage.
   [[nodiscard]] Scalar pixel_sigma_of(std::size_t i, Scalar sigma_px) const noexcept {
     return sigma_px * flow.relative_sigma(i) * (std::max)(Scalar(1), workspace.near_m / workspace.points[i][2]);
   }
 
-  /// The noise that they show under a motion.
+  /// The noise of the pairs, measured under a motion.
   [[nodiscard]] Scalar noise_under(const SE3<double>& T_cur_prev, Scalar sigma_px) const {
     std::vector<Scalar>& distances = workspace.distances;
     distances.clear();
@@ -68,14 +68,14 @@ struct PairsWithDepth {
     return flow_sigma(span<Scalar>(distances), 2, 6, options);
   }
 
-  /// What the error of its depth adds to its variance, which shows where the camera moves.
+  /// What the error of its depth adds to the variance of its pixel; 0 where the camera does not translate.
   [[nodiscard]] Scalar depth_variance_of(std::size_t i, const SE3<Scalar>& T) const noexcept {
     MotionResidual<Scalar> pair;
     if (T.translation.isZero(0) || !residual_of(i, T, pair)) return Scalar(0);
     return pair.sigma_z * pair.sigma_z * pair.along.squaredNorm();
   }
 
-  /// refine_pose from T at a noise; T becomes the result, and the motion has the noise that is left.
+  /// refine_pose from T at the given noise; T becomes the result, and the motion carries the noise measured under it.
   [[nodiscard]] CameraMotion<Scalar> refine(Scalar sigma_px, const PoseOptions& rounds, SE3<double>& T) const {
     const SE3<Scalar> so_far = T.template cast<Scalar>();
     workspace.sigmas.clear();
@@ -132,8 +132,8 @@ struct PairsWithDepth {
     return motion;
   }
 
-  /// The motion that most of them agree to; false, and T untouched, without one. Its threshold is below sigma_px, their
-  /// noise under a motion which what moves may have led astray: a wider one would hold both.
+  /// The motion with most support; false, and T untouched, if there is none. The threshold is below sigma_px, since
+  /// that noise was measured under a motion that moving pairs may have biased: a wider one would accept both.
   [[nodiscard]] bool search(Scalar sigma_px, SE3<double>& T) const {
     constexpr std::size_t most = 150;  // pairs; more take their time and find little more
     PnpRansacOptions ransac;
@@ -166,7 +166,7 @@ struct PairsWithDepth {
 inline namespace CFP_ISA {
 
 /// The motion of the camera from the pairs of the undistorted image that `outside` marks as on no object and whose
-/// depth is known and shared by neighbours. Unknown where too few pairs have such a depth or agree. O(pairs).
+/// depth is known and shared by neighbours. Unknown if too few pairs have such a depth or are inliers. O(pairs).
 ///  1. refine_pose from rest at the largest noise; then the noise that the pairs show is measured.
 ///  2. If that is at most search_above_px, or pnp_ransac finds nothing: refine_pose again, at the noise measured and
 ///     what the errors of the depths add to it under the motion so far.

@@ -15,19 +15,20 @@
 namespace cfp {
 
 struct CameraMotionOptions {
-  std::size_t min_pairs = 12;  ///< with depth, on no object: with fewer there is no motion, >= 3
-  /// of these, within the outlier threshold of `pose`: a motion that fewer agree to is none, in [0, 1]
+  std::size_t min_pairs = 12;  ///< pairs with depth on no object; with fewer the motion is unknown, >= 3
+  /// least share of them that are inliers by the threshold of `pose`; below it the motion is unknown, in [0, 1]
   double min_inlier_share = 0.5;
-  double min_sigma_px = 0.05;  ///< the noise of the flow is measured and kept in these bounds, > 0
-  double max_sigma_px = 1;     ///< >= min_sigma_px
-  /// More noise than this may be something that moves and no box holds: the motion is then searched by pnp_ransac,
-  /// which a third of such pairs seldom mislead (cfp_camera_motion_study); px, > 0.
+  double min_sigma_px = 0.05;  ///< lower bound of the measured noise of the flow, > 0
+  double max_sigma_px = 1;     ///< upper bound of the same, >= min_sigma_px
+  /// More noise than this may come from something that moves outside all boxes. The motion is then searched by
+  /// pnp_ransac, which is seldom misled by a third of such pairs (cfp_camera_motion_study); px, > 0.
   double search_above_px = 0.25;
-  /// A depth that fewer than two of some seven neighbours in the image share to this ratio takes no part, unless that
-  /// is over three eighths of them; a ratio without unit, >= 0. 0: all take part (cfp_object_motion_study).
+  /// Rejects isolated depths: a depth counts only if at least two of about seven neighbours in the image agree with it
+  /// within this ratio (no unit, >= 0), unless that would reject more than three eighths of the pairs. 0: all are used
+  /// (cfp_object_motion_study).
   double shared_depth_ratio = 0.12;
-  /// A pair tells no more of the translation than if it were as far as this share of them, in [0, 1]: few near ones are
-  /// a lever that a wrong depth would move. 0: each tells what it can (cfp_object_motion_study).
+  /// Limits the influence of near pairs on the translation, where one wrong depth has much leverage: a pair nearer than
+  /// this quantile of the depths, in [0, 1], counts as if it were at that depth. 0: no limit (cfp_object_motion_study).
   double nearest_share = 0.2;
   MotionDistanceOptions distance;
   PoseOptions pose;
@@ -37,7 +38,7 @@ template <typename Scalar>
 struct CameraMotion : UncertainMotion<Scalar> {
   bool known = false;
   Scalar sigma_px = Scalar(1);  ///< standard deviation of one coordinate of a static flow pair, robust
-  int coordinates = 2;          ///< of a pixel that most distances see: one where a depth is unknown and counts
+  int coordinates = 2;          ///< degrees of freedom of most distances: 1 where an unknown depth counts
 
   CFP_INLINE CameraMotion() noexcept {}  // NOLINT(modernize-use-equals-default): inline
 };
@@ -45,9 +46,9 @@ struct CameraMotion : UncertainMotion<Scalar> {
 /// Scratch memory, reused: after a call with depths and one without, calls of at most the same sizes allocate nothing.
 template <typename Scalar>
 struct CameraMotionWorkspace {
-  std::vector<std::array<Scalar, 3>> points;  // of the pairs, in the previous camera; NaN: takes no part
+  std::vector<std::array<Scalar, 3>> points;  // of the pairs, in the previous camera; NaN: not used
   std::size_t taken = 0;                      // of them
-  Scalar near_m{};  // a point nearer than that tells no more of the translation than one there
+  Scalar near_m{};                            // nearer points count for the translation as if they were there
   detail::PointGrid<Scalar> grid;
   std::vector<Scalar> sigmas, distances;
   PoseWorkspace<Scalar> pose;

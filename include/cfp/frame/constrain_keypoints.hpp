@@ -22,7 +22,7 @@ namespace cfp {
 namespace detail {
 inline namespace CFP_ISA {
 
-/// What was fitted to the distances of one constraint, and how far it is believed.
+/// The sigmoid fitted to the distances of one constraint, and its confidence.
 template <typename Scalar>
 struct FittedConstraint {
   ConstraintModel<Scalar> model;
@@ -64,8 +64,8 @@ struct FrameConstraints {
     }
   }
 
-  /// The distances of all matches from the epipolar lines of the pose, in the undistorted image, on the scale of its
-  /// middle.
+  /// The distances of all matches from the epipolar lines of the pose, in the undistorted image, scaled to the noise at
+  /// its centre.
   template <typename Camera>
   void measure_epipolar(const Camera& camera) {
     const auto previous = undistorted(camera, PointSpan<Scalar, 2>(scratch.points), scratch.undistorted_previous);
@@ -77,8 +77,8 @@ struct FrameConstraints {
     epipolar_distances(F, {previous, current, {}, sigmas}, scratch.epipolar);
   }
 
-  /// One constraint, fitted to the distances of the keypoints outside all boxes. Too few of those: to what is more
-  /// likely static than not as well, by the coarse stage's weights (not in the paper, whose stage then gives up).
+  /// One constraint, fitted to the distances of the keypoints outside all boxes. If those are too few, also to the
+  /// keypoints in boxes with a coarse weight of 1/2 or more (not in the paper, whose stage then gives up).
   [[nodiscard]] FittedConstraint<Scalar> fit_to_static(const std::vector<Scalar>& distances) {
     scratch.samples.resize(distances.size());
     scratch.values.resize(distances.size());
@@ -119,7 +119,7 @@ struct FrameConstraints {
     if (!moved) state.report.epipolar.status = Status::degenerate;
   }
 
-  /// How much of somebody's motion shows who goes way_px in the image: all of it from D_Th on, its square below.
+  /// How visible a motion of way_px in the image is: 1 from D_Th on, (way_px / D_Th)^2 below.
   [[nodiscard]] Scalar visibility_of(Scalar way_px) const noexcept {
     const Scalar threshold_px = (projection.fitted() ? projection : epipolar).model.threshold_px;
     const Scalar share = way_px < threshold_px ? way_px / threshold_px : Scalar(1);
@@ -154,12 +154,11 @@ inline namespace CFP_ISA {
 /// FineOptions::min_translation_m) of all matches; a
 /// sigmoid for each from the keypoints outside all boxes; second_stage_probability for those inside. M is that of
 /// before this frame, negative where there is no map point; empty for a host that keeps none. With
-/// WeightRule::posterior a keypoint that neither constraint judges, for want of a match, a depth or a translation, gets
-/// 1/2: its weight is what was known before; K counts as much as a walker's motion would show at its depth
-/// (FineOptions::least_speed_m_s); and a box that was not there before is as any: the paper's 0 in it takes the wall in
-/// a false box, and somebody's second one, where a false match's distance shows it anyway (examples/slam/WEIGHTS.md).
-/// When neither sigmoid has enough samples, the coarse K stays; a pose that is not finite has that effect.
-/// O(keypoints).
+/// WeightRule::posterior a keypoint that neither constraint can judge (no match, depth or translation) gets 1/2, so
+/// that its weight is what was known before; K counts only as far as a walker's motion would be visible at its depth
+/// (FineOptions::least_speed_m_s); and a new box is treated as any other: the paper's K = 0 in it removes the wall in a
+/// false box, while a false match is found by its distance anyway (examples/slam/WEIGHTS.md). If neither sigmoid has
+/// enough samples, the coarse K stays; so it does for a pose that is not finite. O(keypoints).
 template <typename Scalar, typename Camera>
 void constrain_keypoints(const PoseEstimate& pose, span<const non_deduced<Scalar>> map_point_probability,
                          const Camera& camera, const FrameOptions& options, FrameState<Scalar>& state) {

@@ -16,9 +16,9 @@ namespace cfp {
 
 struct DetectorHealthOptions {
   int silent_after = 3;         ///< frames in a row without a box, after boxes that did not leave the view; >= 1
-  int believed_after = 90;      ///< frames of silence after which there is nothing to be seen, >= silent_after
+  int believed_after = 90;      ///< frames of silence after which the scene counts as empty, >= silent_after
   int stuck_after = 3;          ///< repetitions of the same boxes and scores to the last bit, >= 1
-  int confirmed_after = 10;     ///< frames with a box before its absence is silence; false boxes are shorter; >= 1
+  int confirmed_after = 10;     ///< frames with a box before its absence counts as silence; false boxes last less; >= 1
   double border_share = 0.03;   ///< of the width: a box so near to the left or right border, and
   double leaving_share = 0.15;  ///< narrower than this share of it, is of somebody who leaves; both in [0, 0.5]
   double max_box_share = 0.9;   ///< of the image: a larger box is absurd, > 0
@@ -29,9 +29,9 @@ struct DetectorHealthOptions {
 enum class DetectorStatus : std::uint8_t {
   ok,
   idle,    ///< it did not run on this frame
-  silent,  ///< it sees nothing any more of what cannot have left the view: take it for one that did not run
-  stuck,   ///< it repeats its boxes: take it for one that did not run
-  absurd   ///< it gave boxes that are none, or as large as the image: leave those out (is_absurd)
+  silent,  ///< no boxes any more though the objects cannot have left the view: treat as not run
+  stuck,   ///< it repeats its boxes: treat as not run
+  absurd   ///< improper boxes, or boxes as large as the image: leave those out (is_absurd)
 };
 
 inline namespace CFP_ISA {
@@ -54,7 +54,7 @@ inline namespace CFP_ISA {
   return {};
 }
 
-/// Whether the box of a detection is none, or has most of the image in it, or its score is no number.
+/// Whether the box of a detection is improper or covers most of the image, or its score is NaN.
 template <typename Scalar>
 [[nodiscard]] bool is_absurd(const Detection<Scalar>& detection, const DetectorHealthOptions& options) noexcept {
   if (!is_proper(detection.box) || !(detection.score == detection.score)) return true;

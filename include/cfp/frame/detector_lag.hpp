@@ -1,7 +1,7 @@
 /// @file detector_lag.hpp
-/// Whether the boxes of a detector lag behind the images: results of an older image than the host believes. Nothing in
-/// the boxes alone would tell, since they move as the objects do. The flow tells: pairs that move lie ahead of boxes
-/// that lag, and pairs at rest where the object has been. Not in the paper.
+/// Whether the boxes of a detector lag behind the images: results of an older image than the host believes. The boxes
+/// alone do not reveal it, since they move as the objects do. The flow does: moving pairs lie ahead of boxes that lag,
+/// and static pairs where the object has been. Not in the paper.
 #pragma once
 
 #include <algorithm>
@@ -15,13 +15,12 @@ namespace cfp {
 
 /// Defaults: examples/slam/RESULTS.md, "A detector that is late".
 struct DetectorLagOptions {
-  double max_lag_s = 0.6;  ///< the longest that is looked for, > 0
+  double max_lag_s = 0.6;  ///< the longest lag that is searched for, > 0
   double memory_s = 3;     ///< time constant with which frames are forgotten, s, > 0
-  double min_boxes = 30;   ///< that move, as far as remembered: with fewer the lag is not known, > 0
-  double min_rate = 0.3;   ///< of such a box in the image, in widths per second, >= 0
-  double min_gain = 0.05;  ///< of the mean score in the boxes, in [-1, 1], over that without lag: less is none, >= 0
-  double image_width = 0;  ///< px, >= 0: boxes at the left or right border, which show a part of somebody, are not
-                           ///< asked; 0: unknown
+  double min_boxes = 30;   ///< moving boxes (decayed count); with fewer the lag is unknown, > 0
+  double min_rate = 0.3;   ///< least speed of a moving box in the image, in widths per second, >= 0
+  double min_gain = 0.05;  ///< least gain of the mean score, in [-1, 1], over that of lag 0, >= 0
+  double image_width = 0;  ///< px, >= 0; 0: unknown. Boxes cut by the left or right border are not used
 };
 
 inline namespace CFP_ISA {

@@ -61,7 +61,8 @@ template <typename Scalar>
   return scored;
 }
 
-/// Sets O of every box from the distances of the pairs on its object and, where depths are known, from what they share.
+/// Sets O of every box from the distances of the pairs on its object and, where depths are known, from their common
+/// shift.
 template <typename Scalar>
 void score_objects(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow, const PinholeCamera<Scalar>& camera,
                    const CoarseOptions& coarse, FrameState<Scalar>& state) {
@@ -102,11 +103,11 @@ void score_objects(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow
 
 inline namespace CFP_ISA {
 
-/// Sets state.objects: O of every box from the flow pairs whose current point lies in it, one by one and, where depths
-/// are known, together: the lower of the two. Without flow, without a model or with too few pairs in the box, O is
-/// unknown and counts as unknown_object_probability. A model of the flow's own under which most of what rested
-/// a frame ago would move, several objects and more pairs than support it, is none: not in the paper, whose F then
-/// follows a walker.
+/// Sets state.objects: O of every box from the flow pairs whose current point lies in it. Pairs are scored one by one
+/// and, where depths are known, also by their common shift; the lower O counts. Without flow, without a model or with
+/// too few pairs in the box, O is unknown and counts as unknown_object_probability. A model estimated from the flow is
+/// rejected if several objects that rested a frame ago, with more pairs than support the model, would all move under
+/// it: it then follows what moves. Not in the paper, whose F then fits a walker.
 template <typename Scalar, typename Camera>
 void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const FrameOptions& options,
                       FrameState<Scalar>& state) {
@@ -151,7 +152,7 @@ void estimate_objects(const Frame<Scalar>& frame, const Camera& camera, const Fr
   detail::score_objects(model, flow, pinhole, coarse, state);
 }
 
-/// Adds what is remembered of every object from the frames before, by the id of its box, and remembers this frame.
+/// Combines O of every object with the evidence of earlier frames, by the id of its box, and stores the result.
 template <typename Scalar>
 void remember_objects(const FrameOptions& options, FrameState<Scalar>& state) {
   if (!options.coarse.use_object_probability) return;

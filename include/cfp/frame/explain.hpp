@@ -1,6 +1,5 @@
 /// @file explain.hpp
-/// Why a keypoint has the weight that it has: the decisions of one frame about it in their order, as a struct and as
-/// text.
+/// Why a keypoint has its weight: the decisions of one frame about it, in order, as a struct and as text.
 #pragma once
 
 #include <cmath>
@@ -33,7 +32,7 @@ struct ConstraintExplanation {
 
 struct KeypointExplanation {
   std::size_t keypoint = 0;
-  Stage stage = Stage::coarse;  ///< coarse: the constraints were not asked, or had nothing to say
+  Stage stage = Stage::coarse;  ///< coarse: the constraints were not evaluated, or could not be fitted
   KeypointLabel label = KeypointLabel::outside;
   // The box that decides; nothing of it, and none of the constraints, for a keypoint in no box.
   std::int32_t box = no_box;
@@ -43,13 +42,13 @@ struct KeypointExplanation {
   ObjectProbability object;                        ///< O, its pairs, and whether it is known
   FlowModelKind flow_model = FlowModelKind::none;  ///< what those pairs were judged by
   double flow_sigma_px = 0;                        ///< their noise; 0: not measured
-  double flow_probability = -1;  ///< what stands for O in its weight: score of the flow at its place, or of its
-                                 ///< object's pairs together (ObjectProbability::together)
+  double flow_probability = -1;   ///< what stands for O in its weight: score of the flow at its place, or of its
+                                  ///< object's pairs together (ObjectProbability::together)
   bool placed = false;            ///< O counts beside it: by depth the keypoint is on the object
   double coarse_probability = 1;  ///< K of the first stage
   std::int32_t match = no_match;
   ConstraintExplanation projection, epipolar;
-  double visibility = 1;                               ///< how much of a walker's motion would show at its depth
+  double visibility = 1;  ///< how visible a walker's motion would be at its depth, in [0, 1]
   SecondStageRule rule = SecondStageRule::new_object;  ///< in the fine stage: what K follows
   double static_probability = 1;                       ///< K
   double map_point_probability = -1;                   ///< M as handed over, negative: none

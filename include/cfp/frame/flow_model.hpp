@@ -26,7 +26,7 @@ template <typename Scalar>
   return model.sigma_px > Scalar(0) ? model.sigma_px : Scalar(options.motion.min_sigma_px);
 }
 
-/// A motion that is known as a model of the given kind.
+/// The model of the given kind that a known motion makes.
 template <typename Scalar>
 [[nodiscard]] FlowModel<Scalar> model_of(FlowModelKind kind, FlowSupport support, const CameraMotion<Scalar>& motion) {
   FlowModel<Scalar> model;
@@ -37,7 +37,7 @@ template <typename Scalar>
   return model;
 }
 
-/// Makes the covariance of the model count what neighbours err by together.
+/// Inflates the model's covariance for the error that neighbouring pairs share (correlated error).
 template <typename Scalar>
 void count_shared_error(const SharedError& shared, FlowModel<Scalar>& model) noexcept {
   const double error_sq = (std::max)(shared.error_sq, 0.0), sigma_px = static_cast<double>(model.sigma_px);
@@ -47,7 +47,7 @@ void count_shared_error(const SharedError& shared, FlowModel<Scalar>& model) noe
   model.motion.covariance *= static_cast<Scalar>(model.shared_factor);
 }
 
-/// The same of a motion that was fitted to the pairs, with what these err by together.
+/// The model of a motion fitted to the pairs, its covariance inflated for their shared error.
 template <typename Scalar>
 [[nodiscard]] FlowModel<Scalar> model_of(const CameraMotion<Scalar>& motion, const SharedError& shared) {
   FlowModel<Scalar> model = model_of(FlowModelKind::motion, FlowSupport::outside_pairs, motion);
@@ -75,7 +75,8 @@ template <typename Scalar>
   return model;
 }
 
-/// The fundamental matrix of the pairs marked in `outside` and their noise; none of too few, or if they have none.
+/// The fundamental matrix of the pairs marked in `outside` and their noise; kind none if they are too few or determine
+/// no F.
 template <typename Scalar>
 FlowModel<Scalar> estimate_fundamental(const FlowPairs<Scalar>& flow, span<const char> outside,
                                        const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
@@ -101,9 +102,8 @@ FlowModel<Scalar> estimate_fundamental(const FlowPairs<Scalar>& flow, span<const
   return model;
 }
 
-/// F or, without one, the motion up to scale of the pairs as if all were at the depth of the room. Before that is a
-/// model, `straighten(pairs, motion)` may take out of both what is no motion; it returns how many parameters were
-/// fitted.
+/// F or, without one, the motion up to scale, with all pairs at the depth of the room. `straighten(pairs, motion)` may
+/// first remove the smooth image error from both; it returns how many parameters were fitted.
 template <typename Scalar, typename Straighten>
 FlowModel<Scalar> estimate_without_depths(const FlowPairs<Scalar>& flow, span<const char> outside,
                                           const PinholeCamera<Scalar>& camera, const FlowModelOptions& options,
@@ -129,16 +129,15 @@ FlowModel<Scalar> estimate_without_depths(const FlowPairs<Scalar>& flow, span<co
 
 inline namespace CFP_ISA {
 
-/// Whether the model errs by what displaces neighbours alike: without depths F does, and a motion up to scale by what
-/// pairs err by together. Whether an object rests depends on it, but not how a keypoint differs from the wall beside
-/// it.
+/// Whether the model includes an error that neighbouring pairs share: F without depths, and a motion up to scale with a
+/// shared error. It matters for whether an object rests, but not for how a keypoint differs from the wall beside it.
 template <typename Scalar>
 [[nodiscard]] bool neighbours_share_its_error(const FlowModel<Scalar>& model) noexcept {
   if (model.kind == FlowModelKind::fundamental) return !model.F_covariance.isZero(0);
   return model.kind == FlowModelKind::motion_up_to_scale && model.shared_factor != 1;
 }
 
-/// The model without that error: as how neighbours differ is judged by it.
+/// The model without that error, for comparing neighbouring pairs.
 template <typename Scalar>
 [[nodiscard]] FlowModel<Scalar> among_neighbours(FlowModel<Scalar> model) noexcept {
   model.F_covariance.setZero();

@@ -1,6 +1,6 @@
 /// @file frame.hpp
-/// What a host hands over for one frame, and the words that the frame's steps share. Everything is a view of the host's
-/// own arrays; everything but the keypoints may be missing.
+/// What a host hands over for one frame, and the types that the steps of a frame share. Everything is a view of the
+/// host's own arrays; everything but the keypoints may be missing.
 #pragma once
 
 #include <optional>
@@ -16,7 +16,7 @@
 
 namespace cfp {
 
-/// How a keypoint stands to the objects of its frame.
+/// Where a keypoint lies relative to the objects of its frame.
 enum class KeypointLabel : std::uint8_t {
   outside,     ///< on no object that was reported: K = 1, never changed
   foreground,  ///< on the object of its box
@@ -41,28 +41,28 @@ struct Frame {
   /// Of the object detector, all classes. Not set: it did not run on this frame. Set and empty: it saw nothing.
   std::optional<span<const Detection<Scalar>>> detections;
   FlowPairs<Scalar> flow;  ///< empty: the objects are unknown
-  /// For hosts that segment: per keypoint, the index of the detection it lies on, or no_object. What in a box lies on
-  /// the object then comes from it, not from depths. A detection that it never names, and a compensated box, are as
-  /// without.
+  /// For hosts that segment: per keypoint, the index of the detection it lies on, or no_object. It then decides what in
+  /// a box lies on the object, in place of the depths. A detection that it never names, and a compensated box, are
+  /// treated as if there were no mask.
   span<const std::int32_t> object_of_keypoint;
-  /// The same as an image, and then for the flow pairs, too: label v belongs to detection v - 1.
+  /// The same as an image, which also labels the flow pairs: label v belongs to detection v - 1.
   LabelImage labels;
   DescriptorSpan descriptors;  ///< binary, one per keypoint: `fine` then matches what lies in boxes by itself
   span<const Scalar> map_point_probability;  ///< M per keypoint if matches are known by now, negative: no map point
   /// The camera's motion since frame k-1, if the host knows it by now, and its standard deviations in metres and
-  /// radians: {T, 0.003, 0.001}. Flow with depths is joined with it, flow without refines it (refine_camera_motion),
-  /// and either refuses it (FrameReport::motion_refused) where the two differ by more than they may; the host's F comes
-  /// before it unless it is exact. {T, 0, 0} is exact: a millimetre that it errs then counts as the motion of whoever
-  /// stands near. Not set: the motion of the frame before is carried on, see
-  /// FlowModelOptions::camera_acceleration_m_s2.
+  /// radians: {T, 0.003, 0.001}. Flow with depths is fused with it; flow without depths refines it
+  /// (refine_camera_motion). Either rejects it (FrameReport::motion_refused) if the two differ by more than their
+  /// covariances allow. The host's F takes precedence over it unless it is exact. {T, 0, 0} means exact: an error of a
+  /// millimetre then looks like motion of whoever stands nearby. Not set: the motion of the previous frame is
+  /// extrapolated, see FlowModelOptions::camera_acceleration_m_s2.
   std::optional<UncertainMotion<double>> T_cur_prev;
   std::optional<Matrix3<Scalar>> fundamental;  ///< F of the undistorted flow pairs, if the host has an exact one
-  /// Homography from the previous image, moves the predicted boxes (rotation_homography). Not set: what the flow
-  /// outside of the boxes tells (image_motion.hpp); the identity: they move as they did.
+  /// Homography from the previous image to this one, applied to the predicted boxes (rotation_homography). Not set:
+  /// estimated from the flow outside the boxes (image_motion.hpp). Identity: the boxes follow their own motion only.
   std::optional<Matrix3<Scalar>> image_motion;
 };
 
-/// What the host's optimiser made of the coarse weights.
+/// The pose that the host's optimiser found with the coarse weights.
 struct PoseEstimate {
   SE3<double> T_cur_prev;   ///< maps points of camera k-1 into camera k
   std::size_t inliers = 0;  ///< N_BA: observations that the pose rests on; of a filter: the tracks that it weighed

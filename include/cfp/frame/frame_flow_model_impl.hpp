@@ -1,6 +1,6 @@
 /// @file frame_flow_model_impl.hpp
-/// What the flow pairs of a frame are judged by: the flow's own model, what the host knows of the camera's motion, and
-/// what the frame before lets expect. Not an interface.
+/// The model that the flow pairs of a frame are judged by, from the flow itself, the host's motion and the prediction
+/// from the frame before. Not an interface.
 #pragma once
 
 #include <algorithm>
@@ -42,9 +42,8 @@ void find_flow_depths(const Frame<Scalar>& frame, const CoarseOptions& coarse, F
   }
 }
 
-/// Joins the flow's motion with the host's. Where they disagree, one is wrong: the flow's if most of the pairs on no
-/// object that it leaves unexplained agree to the host's, for then something that nobody reported took it along; the
-/// host's if not, and false.
+/// Fuses the flow's motion with the host's. If they disagree, one is wrong: the flow's if the host's motion explains
+/// most of its outliers on no object, since an unreported mover then biased it; otherwise the host's (false).
 template <typename Scalar>
 [[nodiscard]] bool join_with_given(const UncertainMotion<double>& given, const FlowPairs<Scalar>& flow,
                                    span<const char> outside, const PinholeCamera<Scalar>& camera,
@@ -70,8 +69,8 @@ template <typename Scalar>
   return true;
 }
 
-/// What the pairs err by together in this frame or, if it is more, in the mean of the last third of a second: what
-/// makes it lasts, and a dozen parts of one image hardly measure it (examples/slam/WEIGHTS.md).
+/// The shared error of the pairs in this frame or, if larger, its mean over the last third of a second: its causes
+/// persist, and a dozen parts of one image measure it poorly (examples/slam/WEIGHTS.md).
 template <typename Scalar>
 [[nodiscard]] SharedError remember_shared_error(SharedError shared, FrameState<Scalar>& state) noexcept {
   constexpr double memory_s = 0.3;
@@ -82,9 +81,10 @@ template <typename Scalar>
   return shared;
 }
 
-/// The model by the pairs' depths, joined with the host's motion or what the frame before lets expect; none where they
-/// do not tell. Without boxes few depths are left out: see UnreportedOptions::min_known_depths. The pairs become those
-/// that it judges: without their smooth error, unless the host's motion tells of the turn that is part of it.
+/// The model from the pairs' depths, fused with the host's motion or the prediction from the frame before; kind none if
+/// they do not determine it. Without boxes, too few depths are ignored: see UnreportedOptions::min_known_depths. The
+/// pairs become those to be judged: without their smooth error, unless the host gives its motion, whose turn that error
+/// is part of.
 template <typename Scalar>
 [[nodiscard]] FlowModel<Scalar> model_by_depths(const std::optional<UncertainMotion<double>>& given,
                                                 const PinholeCamera<Scalar>& camera, const CoarseOptions& coarse,

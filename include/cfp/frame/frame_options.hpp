@@ -1,5 +1,5 @@
 /// @file frame_options.hpp
-/// Every choice of a frame's steps in one struct, and the paper's ablation as settings of it.
+/// All options of the steps of a frame in one struct, and the variants of the paper's ablation.
 #pragma once
 
 #include <algorithm>
@@ -21,33 +21,35 @@ namespace cfp {
 /// A detector class whose objects can move.
 struct ObjectClass {
   int class_id = 0;
-  bool non_rigid = true;  ///< people, animals: told from the background by depth; rigid: all inside is foreground
+  bool non_rigid = true;  ///< people, animals: foreground by depth; false: all of the box
   /// M of a new map point on it, in (0, 1); not set: MapPointOptions::foreground_prior, that of people. Most cars are
   /// parked: 0.5.
   std::optional<double> prior = {};
 };
 
-/// The search for what moves and no detector reports, or a box holds in part, under WeightRule::posterior. A keypoint
-/// in no box counts as on a moving object where, of the flow pairs near it and at its depth, in boxes or not, `pairs`
-/// that move are nearer than as many that rest. Without depths all near it and on no object are asked. Not in the
-/// paper, for which all outside of boxes is static.
+/// The search for moving objects that no detector reports or that a box covers only in part; used with
+/// WeightRule::posterior. A keypoint outside all boxes counts as on a moving object if, among the flow pairs near it
+/// and at its depth (inside boxes or not), `pairs` moving ones are nearer than as many static ones. Without depths, all
+/// pairs near it and on no object are used. Not in the paper, where everything outside the boxes is static.
 struct UnreportedOptions {
-  double radius_px = 60;     ///< around the keypoint, >= 0; 0: nothing of this
-  double depth_share = 0.1;  ///< of the keypoint's depth: a pair farther from it in depth is not asked, >= 0
-  std::size_t pairs = 3;     ///< that move, >= 1
-  /// Of the pairs on no object, and of the keypoints: if more move, or half as many that lie farther than the rest,
-  /// nothing is said of any, since it may as well be the room behind something large. In [0, 1].
+  double radius_px = 60;     ///< around the keypoint, >= 0; 0: no search
+  double depth_share = 0.1;  ///< pairs whose depth differs by more than this share of the keypoint's are not used, >= 0
+  std::size_t pairs = 3;     ///< moving pairs needed, >= 1
+  /// Largest share of the pairs on no object, and of the keypoints outside boxes, that may move; half of it for
+  /// keypoints that lie farther away than the rest. With more, nothing is reported, since what moves may be the room
+  /// seen behind something large. In [0, 1].
   double max_share = 0.4;
-  /// Beyond a depth camera's range somebody near may hold all depths, and be taken for the room by them. Where a
-  /// smaller share of the pairs on no object have one, the motion of a frame without boxes is not estimated by depth;
-  /// in one with boxes, where it is less than half of that, nothing is said. In [0, 1]; 0: depths always count
-  /// (cfp_unreported_study).
+  /// If the room is beyond the depth camera's range, a person nearby may hold all valid depths and be taken for the
+  /// room. If a smaller share of the pairs on no object have a depth, a frame without boxes does not estimate the
+  /// camera's motion from depths; below half of this share, a frame with boxes reports nothing. In [0, 1]; 0: depths
+  /// are always used (cfp_unreported_study).
   double min_known_depths = 0.5;
-  /// Where the motion is known up to scale only: how much nearer than the room what is at rest may be, as
-  /// FlowModelOptions::nearer_than_room of what is in boxes.
+  /// If the motion is known only up to scale: how much nearer than the room static points outside boxes may be.
+  /// FlowModelOptions::nearer_than_room is the same for points in boxes.
   UnknownDepth nearer_than_room{1, 2.5};
-  /// There, too: of the flow's noise. Where the motion shifts the room by more, nothing is said, since what stands
-  /// before a plane, which has no F, and what moves are one (cfp_unreported_study). >= 0.
+  /// Also for a motion up to scale: largest parallax of the room, as a multiple of the flow's noise, >= 0. Above it
+  /// nothing is reported, since a static point in front of a plane, which gives no F, cannot be distinguished from a
+  /// moving one (cfp_unreported_study).
   double max_parallax = 3;
 };
 
@@ -56,11 +58,12 @@ struct CoarseOptions {
   bool use_object_probability = true;  ///< false: O of every object is unknown (the paper's CFP-SLAM-)
   bool use_depth_foreground = true;    ///< false: all keypoints in a box are its foreground (W/O-DBS)
   bool soft_background = true;         ///< false: background keypoints keep K = 1, as do all outside (W/O-KSP)
-  /// WeightRule::posterior: a keypoint in a box is judged by the flow pair nearest to it, if one lies within and is at
-  /// its depth where both have one (unreported.depth_share); by its object else. >= 0; 0: always by its object.
+  /// WeightRule::posterior: a keypoint in a box is judged by the nearest flow pair within this radius, which must be at
+  /// its depth if both have one (unreported.depth_share); without such a pair, by its object. >= 0; 0: always by its
+  /// object.
   double flow_radius_px = 10;
-  /// Flow that comes without depths, and without an F of the host, takes them from the frame before: each pair that of
-  /// the nearest keypoint which has one, within this. >= 0; 0: it has none (cfp_object_flow_study).
+  /// If the flow has no depths and the host gives no F, each pair takes the depth of the nearest keypoint of the
+  /// previous frame that has one, within this radius. >= 0; 0: pairs take no depth (cfp_object_flow_study).
   double flow_depth_radius_px = 5;
   UnreportedOptions unreported;
   FlowModelOptions flow;
@@ -73,15 +76,15 @@ struct CoarseOptions {
 struct FineOptions {
   bool enabled = true;           ///< false: K of the coarse stage is final (W/O-KSP, Only-YOLO)
   double min_pose_inliers = 10;  ///< Th_BA: least inliers a pose may rest on (ORB-SLAM2's 10), >= 0
-  /// t_Th in metres: |t| at or below it skips the epipolar constraint, >= 0. No source in the paper. With
-  /// WeightRule::posterior only beside a projection constraint: where that has nothing to say, as with one camera, the
-  /// other is asked of any motion, since what stands is near every line.
+  /// t_Th in metres, >= 0: the epipolar constraint is skipped if |t| is at or below it. No value in the paper. With
+  /// WeightRule::posterior this holds only if the projection constraint could be fitted: otherwise, as with one camera,
+  /// the epipolar constraint is used for any motion, since static points lie near every line.
   double min_translation_m = 0.005;
-  /// WeightRule::posterior: how slow those may be who count as moving. Where depths tell that somebody of this speed
-  /// goes less than D_Th from one image to the next, K says as much less (second_stage_evidence): far away and at
-  /// high frame rates who walks looks as who stands. m/s, >= 0; 0: K is as printed.
+  /// WeightRule::posterior: the slowest speed that has to be detected, m/s, >= 0. If a point at the keypoint's depth
+  /// that moves at this speed shifts by less than D_Th between two images, K is weaker evidence
+  /// (second_stage_evidence): far away and at high frame rates a walker looks static. 0: K is as printed.
   double least_speed_m_s = 0.5;
-  ConstraintOptions constraint;     ///< of the projection and of the epipolar lines alike
+  ConstraintOptions constraint;     ///< of both constraints
   DescriptorMatchOptions matching;  ///< of the keypoints in boxes that the host left unmatched
 };
 
@@ -94,7 +97,7 @@ struct FrameOptions {
   FineOptions fine;
   MapPointOptions map_point;
   HealthOptions health;
-  double min_creation_probability = 0.3;  ///< keypoints of which less is known should make no map point, in [0, 1]
+  double min_creation_probability = 0.3;  ///< least K for may_create_map_point, in [0, 1]
 };
 
 /// The systems of the paper's Table IV, and plain SLAM.
@@ -104,7 +107,7 @@ enum class Variant : std::uint8_t {
   no_mdc,        ///< W/O-MDC: without missed-detection compensation
   no_dbscan,     ///< W/O-DBS: without depth clustering, all in a box is foreground
   no_ksp,        ///< W/O-KSP: foreground keypoints are removed, all others count fully
-  no_posterior,  ///< not in the paper: K and M multiplied as weight, by its words
+  no_posterior,  ///< not one of the paper's: the weight is K times M, as its text says
   only_boxes,    ///< Only-YOLO: all keypoints in detected boxes are removed
   plain          ///< no dynamic handling at all
 };
@@ -153,7 +156,7 @@ inline namespace CFP_ISA {
   return nested("health", invalid_field(o.health));
 }
 
-/// What is known of a class of the detector; null: its objects cannot move.
+/// The entry of a detector class; null: its objects cannot move.
 [[nodiscard]] inline const ObjectClass* find_class(int class_id, const FrameOptions& options) noexcept {
   for (const ObjectClass& c : options.classes) {
     if (c.class_id == class_id) return &c;
@@ -175,7 +178,8 @@ inline namespace CFP_ISA {
 }
 
 /// The options of a variant: `base` with that variant's parts switched off, nothing else changed. A variant without the
-/// object stage rests on unknown objects being high dynamic, and lowers unknown_object_probability to O_Th if need be.
+/// object stage relies on unknown objects being high dynamic, and lowers unknown_object_probability to O_Th if
+/// necessary.
 [[nodiscard]] inline FrameOptions variant_options(Variant variant, FrameOptions base = {}) {
   const bool removes = variant == Variant::no_ksp || variant == Variant::only_boxes;
   if (variant == Variant::cfp_minus || removes) {

@@ -1,6 +1,6 @@
 /// @file frame_state.hpp
-/// Everything that is known of a frame between the steps, and of the frame before: the one place that the steps read
-/// and write. Per-keypoint arrays have the size and order of the frame's keypoints.
+/// Everything that the steps know of a frame and of the one before it: the only state that they read and write.
+/// Per-keypoint arrays have the size and order of the frame's keypoints.
 #pragma once
 
 #include <algorithm>
@@ -22,15 +22,15 @@ enum class Stage : std::uint8_t { coarse, fine };
 
 /// What a constraint was fitted to in this frame.
 struct ConstraintReport {
-  Status status = Status::not_enough_data;  ///< not_enough_data: it had nothing to say; degenerate: it is a step, or,
+  Status status = Status::not_enough_data;  ///< not_enough_data: it was not fitted; degenerate: it is a step, or,
                                             ///< with a confidence of 0, |t| was at or below t_Th
   double threshold_px = 0;                  ///< D_Th
   double confidence = 0;                    ///< C_s C_c
 };
 
-/// What a user must notice of a frame, step by step.
+/// Diagnostics of a frame, step by step.
 struct FrameReport {
-  Stage stage = Stage::coarse;  ///< fine: the constraints were asked
+  Stage stage = Stage::coarse;  ///< fine: the constraints were evaluated
   // boxes
   Status time = Status::ok;                   ///< invalid_input: the time stamp did not grow, and the boxes stayed
   bool after_gap = false;                     ///< of more than tracker.max_gap_s: all tracks ended (stamps in seconds?)
@@ -44,8 +44,8 @@ struct FrameReport {
   RansacStatus flow_status = RansacStatus::not_enough_data;  ///< and how its estimation ended
   bool motion_refused = false;      ///< T_cur_prev: not finite, no covariance, or the flow contradicts it
   double flow_sigma_px = 0;         ///< noise of the flow as measured; 0: not
-  double flow_shared_px = 0;        ///< what neighbours err by together beside it, as judged; 0: not known
-  int flow_coordinates = 2;         ///< of a pixel that most of its distances see: 1 across lines
+  double flow_shared_px = 0;        ///< error shared by neighbouring pairs, besides the noise; 0: unknown
+  int flow_coordinates = 2;         ///< degrees of freedom of most distances: 1 across lines
   std::size_t unknown_objects = 0;  ///< boxes whose O is not known
   // keypoints
   std::size_t outside = 0, foreground = 0, background = 0, invalid = 0;  ///< by label
@@ -64,14 +64,14 @@ struct FrameReport {
   FrameHealth health;          ///< of the weights, fallback included
 };
 
-/// What is known of the object of a track.
+/// A value that belongs to the object of a track.
 template <typename T>
 struct OfTrack {
   std::int64_t id = 0;  ///< of the track
   T value{};
 };
 
-/// What the next frame has to know of a frame.
+/// What is kept of a frame for the next one.
 template <typename Scalar>
 struct FrameMemory {
   bool known = false;  ///< false: there was no such frame
@@ -91,7 +91,7 @@ struct FrameMemory {
 
 namespace detail {
 
-/// How a flow pair stands to the object of a box.
+/// Where a flow pair lies relative to the object of a box.
 enum class PairLabel : std::uint8_t {
   outside,     // not in its box
   foreground,  // on the object
@@ -152,7 +152,7 @@ template <typename Scalar>
   return state.previous.known ? state.current.timestamp_s - state.previous.timestamp_s : 0;
 }
 
-/// The flow of a frame with the depths that are known of it; after find_flow_depths.
+/// The flow of a frame with its known depths; after find_flow_depths.
 template <typename Scalar>
 [[nodiscard]] FlowPairs<Scalar> flow_with_depths(const Frame<Scalar>& frame, const FrameState<Scalar>& state) noexcept {
   return {frame.flow.previous, frame.flow.current, state.flow_depths};
@@ -175,7 +175,7 @@ template <typename Scalar>
 
 inline namespace CFP_ISA {
 
-/// What is known of a track: T{}, of a depth 0, if nothing is.
+/// The value stored for a track; T{}, for a depth 0, if there is none.
 template <typename T>
 [[nodiscard]] T of_track(const std::vector<OfTrack<T>>& known, std::int64_t id) noexcept {
   const auto found = std::find_if(known.begin(), known.end(), [id](const auto& object) { return object.id == id; });

@@ -1,6 +1,6 @@
 /// @file health.hpp
-/// Whether the weights of a frame can carry a pose, and what to do when they cannot: with the probabilities on, a scene
-/// that needs none of them must not get worse.
+/// Whether the weights of a frame can support a pose, and a fallback if they cannot: the probabilities must not make a
+/// static scene worse.
 #pragma once
 
 #include "cfp/core/options.hpp"
@@ -10,9 +10,9 @@
 namespace cfp {
 
 struct HealthOptions {
-  /// fewer effective observations than this are no base for a pose (ORB-SLAM2's 10), >= 0; 0: no fallback
+  /// least effective observations for a pose; with fewer the fallback acts (ORB-SLAM2's 10), >= 0; 0: no fallback
   double min_effective_points = 10;
-  /// weights of at most this carry no pose, alike as they may be: inliers of such should not count as any, in [0, 1)
+  /// observations of at most this weight do not support a pose, however many: they do not count as inliers, in [0, 1)
   double min_inlier_weight = 0.1;
 };
 
@@ -25,7 +25,7 @@ enum class WeightFallback : std::uint8_t {
 struct FrameHealth {
   std::size_t observations = 0;  ///< keypoints with a map point
   double weight = 0;             ///< sum of their weights
-  double effective_points = 0;   ///< (sum w)^2 / sum w^2 over those that carry: as much as so many equal weights
+  double effective_points = 0;   ///< (sum w)^2 / sum w^2 over those that support a pose: the number of equal weights
   double box_share = 0;          ///< share of the weight that lies inside boxes, in [0, 1]
   WeightFallback fallback = WeightFallback::none;
 };
@@ -38,7 +38,7 @@ inline namespace CFP_ISA {
   return {};
 }
 
-/// Whether a weight carries a pose.
+/// Whether an observation of this weight supports a pose.
 [[nodiscard]] constexpr bool carries_pose(double weight, const HealthOptions& options) noexcept {
   return weight > options.min_inlier_weight;
 }

@@ -1,6 +1,6 @@
 /// @file label_keypoints.hpp
 /// The step from boxes and depths to the coarse K of every keypoint (paper section IV-C): foreground and background of
-/// each object, and K by the first stage's rule. And what the flow says of the keypoint alone, in boxes and outside.
+/// each object, and K by the first stage's rule; also the flow score at each keypoint, inside boxes and outside.
 #pragma once
 
 #include <algorithm>
@@ -20,9 +20,9 @@ namespace detail {
 inline namespace CFP_ISA {
 
 /// Sets state.flow_probability: the score of the flow pair next to the keypoint, among the pairs in its box and, where
-/// both have one, at its depth: what stands beside somebody's silhouette is no part of him. On an object whose pairs
-/// only show together that it moves, no single one can say that it rests: ObjectProbability::together, if that is less.
-/// After estimate_objects.
+/// both have one, at its depth: a pair beside a person's silhouette is not on him. If an object's pairs reveal its
+/// motion only by their common shift, no single pair may show it static: the score is then at most
+/// ObjectProbability::together. After estimate_objects.
 template <typename Scalar>
 void score_flow_at_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   const Scalar radius_px = static_cast<Scalar>(options.coarse.flow_radius_px);
@@ -119,12 +119,11 @@ template <typename Scalar>
 inline namespace CFP_ISA {
 
 /// Sets K, label and box of every keypoint from state.boxes and state.objects. A keypoint on several objects takes the
-/// smallest of their K, and that box decides for it from then on (ties: foreground before background, then the lower
-/// index). Keypoints on no object keep K = 1. What a mask or object_of_keypoint gives an object is its foreground;
-/// depth then only tells where it stands, and what lies in its box and on no object's mask is background: masks leave
-/// out hands and feet, which the flow at their place tells (cfp_posterior_study). In a box for which nothing is named
-/// depth decides. O(keypoints x boxes), and flow pairs near each keypoint. Outside of boxes the flow is asked as
-/// UnreportedOptions say.
+/// smallest of their K, and belongs to that box from then on (ties: foreground before background, then the lower
+/// index). Keypoints on no object keep K = 1. If a mask or object_of_keypoint names keypoints of an object, these are
+/// its foreground, depth only gives its distance, and keypoints in its box on no object's mask are background: masks
+/// miss hands and feet, which the flow there reveals (cfp_posterior_study). In a box without named keypoints depth
+/// decides. O(keypoints x boxes), and flow pairs near each keypoint. Outside boxes see UnreportedOptions.
 template <typename Scalar>
 void label_keypoints(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   CFP_ASSERT(state.objects.size() == state.boxes.size());

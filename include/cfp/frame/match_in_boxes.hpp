@@ -1,7 +1,7 @@
 /// @file match_in_boxes.hpp
-/// The matches between a frame and the one before: the host's, by the map points that both observe, and by descriptors
-/// those of keypoints in boxes that it left alone. A host that matches map points only has none on a person, and an
-/// unmatched foreground keypoint is not trusted.
+/// The matches between a frame and the one before: the host's, by the map points that both observe, and matches by
+/// descriptor of the keypoints in boxes that it left unmatched. A host that matches map points only has none on a
+/// person, and an unmatched foreground keypoint is not trusted.
 #pragma once
 
 #include <algorithm>

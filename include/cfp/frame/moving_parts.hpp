@@ -1,7 +1,7 @@
 /// @file moving_parts.hpp
-/// The camera's motion without the parts of the image that ask for another one than the rest. What moves slowly and
-/// lies in no box bends the motion until none of its pairs stands out; together they still pull more than noise does.
-/// Not in the paper, whose camera's motion follows whatever is in no box.
+/// The camera's motion without the parts of the image that disagree with the rest. Something slow outside all boxes
+/// biases the motion until none of its pairs is an outlier; as a group they still pull more than noise does. Not in the
+/// paper, where everything outside the boxes supports the motion.
 #pragma once
 
 #include <algorithm>
@@ -81,7 +81,7 @@ struct ImageParts {
   }
 };
 
-/// The pairs that tell, by the part of the image that they are in.
+/// The usable pairs, by the part of the image that they are in.
 template <typename Scalar>
 [[nodiscard]] ImageParts parts_of(const PairsWithDepth<Scalar>& pairs, const CameraMotion<Scalar>& motion) noexcept {
   ImageParts parts;
@@ -94,8 +94,8 @@ template <typename Scalar>
   return parts;
 }
 
-/// Whether the pairs that tell err by more than noise under their motion: by a smooth error, or by what neighbours err
-/// by together, over a tenth of the noise.
+/// Whether the usable pairs show more than independent noise under their motion: a smooth error, or a shared error of
+/// neighbouring pairs above a tenth of the noise.
 template <typename Scalar>
 [[nodiscard]] bool err_together(const PairsWithDepth<Scalar>& pairs, const CameraMotion<Scalar>& motion) noexcept {
   SmoothErrorFit<Scalar> smooth{pairs, motion.T_cur_prev.template cast<double>(), false};
@@ -109,14 +109,15 @@ template <typename Scalar>
 
 inline namespace CFP_ISA {
 
-/// After estimate_camera_motion, of the same pairs: the motion without the parts of the image that ask for another one.
-/// What moves slowly and is on no object bends the motion until none of its pairs stands out, and makes what rests seem
-/// to move (cfp_camera_motion_study). The pairs in each of 4 x 4 parts have the normal equations g_k, H_k at the motion
-/// and would alone go on by xi_k = -H_k^-1 g_k. Of (xi - xi_k)^T H_k (xi - xi_k), xi the step of the parts that count,
-/// the largest one's part is left out, as long as that exceeds 22.5, of six degrees of freedom one in a thousand, and
-/// at most a quarter of the parts; then refine_pose by the last round of `pose`. The motion as it came where no part
-/// pulls, or where the rest errs together all the same: then nothing moves but the image errs, as a lens makes it
-/// (examples/slam/WEIGHTS.md). The pairs left out take no part in what `workspace` is used for later. O(pairs).
+/// To be called after estimate_camera_motion with the same pairs: the motion without the parts of the image that
+/// disagree with it. Something slow on no object biases the motion until none of its pairs is an outlier, and makes
+/// static objects seem to move (cfp_camera_motion_study). The pairs in each of 4 x 4 parts have the normal equations
+/// g_k, H_k at the motion and would alone take the step xi_k = -H_k^-1 g_k. With xi the step of the remaining parts,
+/// the part of the largest (xi - xi_k)^T H_k (xi - xi_k) is removed as long as that exceeds 22.5 (chi-squared of six
+/// degrees of freedom, one in a thousand), at most a quarter of the parts; then refine_pose by the last round of
+/// `pose`. The motion is returned unchanged if no part pulls, or if the remaining pairs still share an error: then
+/// nothing moves, but the image has a correlated error, such as a lens makes (examples/slam/WEIGHTS.md). The pairs
+/// removed are not used in later uses of `workspace`. O(pairs).
 template <typename Scalar>
 [[nodiscard]] CameraMotion<Scalar> leave_out_moving_parts(const CameraMotion<Scalar>& motion,
                                                           const FlowPairs<Scalar>& flow,

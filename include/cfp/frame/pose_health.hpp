@@ -1,7 +1,7 @@
 /// @file pose_health.hpp
-/// Whether a pose may be believed, and may go into the map: a robust refinement always returns something, and from
-/// wrong matches a wrong pose with a dozen inliers. What tells it are its information, the share of the observations
-/// that agree, how they are spread over the image, and the step that it means since the last pose.
+/// Whether a pose may be trusted and may enter the map: a robust refinement always returns something, and from wrong
+/// matches a wrong pose with a dozen inliers. It is judged by its information, the share and the spread of its inliers,
+/// and the step since the last pose.
 #pragma once
 
 #include <algorithm>
@@ -44,7 +44,7 @@ enum class PoseHealth : std::uint8_t {
 
 /// What a pose looks like. Figures that could not be computed are infinite (uncertainties) or 0 (all others).
 struct PoseAssessment {
-  PoseHealth status = PoseHealth::not_solved;  ///< the first of its list that holds
+  PoseHealth status = PoseHealth::not_solved;  ///< the first in the enum's order that holds
   double inliers = 0;                          ///< sum of their weights
   double inlier_share = 0;                     ///< of the weight of all observations, in [0, 1]
   double spread = 0;                           ///< share of the image's cells with an inlier of weight > 0.1, in [0, 1]

@@ -1,6 +1,6 @@
 /// @file refine_motion.hpp
 /// The camera's motion that a host knows, from an IMU or odometry, refined by flow pairs of which few or none have a
-/// depth. Not in the paper, whose fundamental matrix forgets what the host knows, and follows whoever holds most pairs.
+/// depth. Not in the paper, whose fundamental matrix ignores the host's motion and fits whatever holds most pairs.
 #pragma once
 
 #include <algorithm>
@@ -19,8 +19,8 @@ namespace cfp {
 
 template <typename Scalar>
 struct RefinedMotion : CameraMotion<Scalar> {
-  double apart_sq = 0;        ///< from the host's motion, in squares of its sigmas
-  bool contradicted = false;  ///< by enough pairs: the host's motion is less certain than its covariance says
+  double apart_sq = 0;        ///< squared Mahalanobis distance from the host's motion
+  bool contradicted = false;  ///< by enough pairs: the host's covariance is too small for the error of its motion
 
   CFP_INLINE RefinedMotion() noexcept {}  // NOLINT(modernize-use-equals-default): inline
 };
@@ -133,14 +133,14 @@ inline namespace CFP_ISA {
 ///   (xi - xi_0)^T C^-1 (xi - xi_0) + sum of rho(r_i^T (sigma^2 I + sigma_z^2 J_i J_i^T)^-1 r_i)
 ///
 /// over the pairs of the undistorted image that `outside` marks as on no object: xi_0 and C the host's motion and its
-/// covariance, r, J and sigma_z of motion_distance, where a depth is unknown at the one that fits best, rho Geman and
-/// McClure's loss at four times the noise, which is measured. The length of the translation is then the host's, as one
-/// camera cannot tell it. A result that is farther from the host's motion than one in a thousand may follow what moves
-/// and nobody reported: if the host's leaves at most 1.2 times its noise, the host's is returned as it came
-/// (cfp_unreported_study). If not, C grows until they agree (apart_sq / 6 times), and all begins again: `contradicted`.
-/// Unknown with fewer than options.min_pairs pairs, where less than min_inlier_share of them agree, where C has no
-/// inverse, or if even the larger C is contradicted. An exact motion (C = 0) stays, and the noise of the pairs is
-/// measured. O(pairs); allocates `distances` alone. Not in the paper (cfp_object_motion_study).
+/// covariance, r, J and sigma_z of motion_distance, an unknown depth at its best fit, rho the Geman-McClure loss at
+/// four times the measured noise. The length of the translation is the host's if no depth is known, as one camera
+/// cannot observe it. A result outside the 99.9 % bound of C may have followed an unreported mover: if the host's
+/// motion leaves at most 1.2 times its noise, it is returned unchanged (cfp_unreported_study). Otherwise C is inflated
+/// until they agree (by apart_sq / 6), and the fit is repeated: `contradicted`. Unknown with fewer than
+/// options.min_pairs pairs, if less than min_inlier_share of them are inliers, if C has no inverse, or if even the
+/// inflated C is contradicted. An exact motion (C = 0) stays, and the noise of the pairs is measured. O(pairs);
+/// allocates `distances` alone. Not in the paper (cfp_object_motion_study).
 template <typename Scalar>
 [[nodiscard]] RefinedMotion<Scalar> refine_camera_motion(const UncertainMotion<double>& prior,
                                                          const FlowPairs<Scalar>& flow, span<const char> outside,

@@ -1,6 +1,6 @@
 /// @file static_probability.hpp
-/// CFP-SLAM for a host that keeps its own features, map, optimiser and order of things: two calls per frame, each of
-/// which gives the weights for the host's next pose optimisation.
+/// CFP-SLAM for a host that keeps its own features, map, optimiser and control flow: two calls per frame, each of which
+/// returns the weights for the host's next pose optimisation.
 ///
 ///   const auto coarse = probability.coarse(frame);               // stage 1: boxes, objects, depth
 ///   pose = optimise(coarse.weight);                              // the host's own
@@ -8,7 +8,7 @@
 ///   pose = optimise(fine.weight);
 ///   probability.update_map_points(m);                            // M of all that the frame saw
 ///
-/// Who wants another order calls the steps themselves: begin_frame, track_boxes, estimate_objects, remember_objects,
+/// For another order, call the steps directly: begin_frame, track_boxes, estimate_objects, remember_objects,
 /// label_keypoints, match_in_boxes, constrain_keypoints, weigh_keypoints, update_map_points.
 ///
 /// A unit that calls `coarse` compiles all engines. A host whose units are compiled often keeps them in one file:
@@ -53,36 +53,36 @@ class StaticProbability {
     CFP_ASSERT(!invalid_field(options));
   }
 
-  /// Stage 1, once per frame, first of all. Without frame.map_point_probability every keypoint counts as an observation
-  /// of a map point of which nothing is known; see `weights` for matches that are made later.
+  /// Stage 1, the first call of every frame. Without frame.map_point_probability every keypoint counts as an
+  /// observation of a new map point; see `weights` for matches that are made later.
   StageResult<Scalar> coarse(const Frame<Scalar>& frame);
 
-  /// Stage 2, at most once per frame, with the pose that stage 1's weights led to; left out when there is none. match:
-  /// per keypoint the index among the keypoints of the frame of the `coarse` call before, or no_match; may be empty.
-  /// map_point_probability: M per keypoint, negative where there is no map point; empty for a host that keeps none. In
-  /// the frame after a reset nothing is matched: K stays, and the weights are stage 1's.
+  /// Stage 2, at most once per frame, with the pose that was optimised with stage 1's weights; not called if there is
+  /// none. match: per keypoint the index among the keypoints of the frame of the `coarse` call before, or no_match; may
+  /// be empty. map_point_probability: M per keypoint, negative where there is no map point; empty for a host that keeps
+  /// none. In the first frame after a reset nothing is matched: K and the weights stay those of stage 1.
   StageResult<Scalar> fine(const PoseEstimate& pose, span<const std::int32_t> match,
                            span<const Scalar> map_point_probability = {});
 
   /// The weights of the stage that ran last, for matches made since (motion model, then local map): M per keypoint as
   /// it was before this frame, negative where there is no map point.
   span<const Scalar> weights(span<const Scalar> map_point_probability) { return result(map_point_probability).weight; }
-  /// The same for one keypoint that joins later, under the fallback that the last of these calls decided on: after many
-  /// new matches ask for all weights anew. M negative: it has no map point.
+  /// The same for one keypoint that is matched later, under the fallback that the last of these calls decided on: after
+  /// many new matches call `weights` again. M negative: it has no map point.
   [[nodiscard]] Scalar weight(std::size_t keypoint, Scalar map_point_probability) const noexcept {
     return keypoint_weight(keypoint, map_point_probability, options_, state_);
   }
 
-  /// What is known of one keypoint with a map point of probability M: by Bayes' rule its weight before any fallback, by
-  /// the printed rules K.
+  /// The static probability of one keypoint with a map point of probability M: with WeightRule::posterior its weight
+  /// before any fallback, otherwise K.
   [[nodiscard]] Scalar static_probability(std::size_t keypoint, Scalar map_point_probability) const noexcept {
     return options_.map_point.weight == WeightRule::posterior
                ? model_weight(keypoint, map_point_probability, options_, state_)
                : state_.static_probability[keypoint];
   }
 
-  /// The last call of a frame, with all matches that it had: M per keypoint learns from the constraints; it stays when
-  /// `fine` was not called. The frame's weights have M of before as their prior, so that nothing counts twice.
+  /// The last call of a frame, with all its matches: updates M per keypoint from the constraints; without `fine`, M
+  /// stays. It comes last because the frame's weights use the M of before as their prior: nothing is counted twice.
   void update_map_points(span<Scalar> map_point_probability) noexcept {
     cfp::update_map_points(options_, state_, map_point_probability);
   }
@@ -95,8 +95,8 @@ class StaticProbability {
     return cfp::may_create_map_point(static_probability(keypoint, Scalar(-1)), options_);
   }
 
-  /// Forgets tracks and frames: after a jump in time or of the camera. The keypoints of the frame that was the last one
-  /// keep what is known of them until the next.
+  /// Forgets tracks and frames: call it after a jump in time or of the camera. The state of the last frame's keypoints
+  /// stays readable until the next frame.
   void reset() noexcept {
     tracker_.reset();
     state_.previous.known = state_.current.known = false;

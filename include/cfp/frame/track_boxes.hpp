@@ -1,6 +1,6 @@
 /// @file track_boxes.hpp
 /// The step from detections to the boxes of a frame (paper section IV-A): missed detections are compensated, and every
-/// box knows whether its object had one in the frame before. Departure: they are predicted on an image that moves.
+/// box knows whether its object had one in the frame before. Departure: predictions include the motion of the image.
 #pragma once
 
 #include <algorithm>
@@ -16,9 +16,9 @@ namespace cfp {
 namespace detail {
 inline namespace CFP_ISA {
 
-/// Sets state.image_motion: the host's, else that of the flow outside of the boxes of the frame before, which move by
-/// themselves; 256 pairs tell as much as all. Without such boxes there is hardly anything to predict, and nothing is
-/// asked.
+/// Sets state.image_motion: the host's, else that of the flow outside the boxes of the frame before, whose objects move
+/// by themselves. 256 pairs are as good as all. Without such boxes nothing is estimated, as there is hardly anything to
+/// predict.
 template <typename Scalar>
 void find_image_motion(const Frame<Scalar>& frame, FrameState<Scalar>& state) {
   CFP_ASSERT(frame.flow.previous.size() == frame.flow.current.size());
@@ -50,8 +50,8 @@ void find_image_motion(const Frame<Scalar>& frame, FrameState<Scalar>& state) {
 inline namespace CFP_ISA {
 
 /// Sets state.boxes: what the tracker gives of the classes that can move. A frame whose detector did not run moves the
-/// tracks and misses nothing. A time stamp that did not grow or is not finite is reported, and the boxes stay; so is
-/// the frame after a first one of that kind, a gap that ended the tracks, and how many detections were none.
+/// tracks and misses nothing. A time stamp that did not grow or is not finite is reported, and the boxes stay; so are
+/// the frame after a first one of that kind, a gap that ended the tracks, and the number of improper detections.
 template <typename Scalar>
 void track_boxes(const Frame<Scalar>& frame, const FrameOptions& options, BoxTracker<Scalar>& tracker,
                  FrameState<Scalar>& state) {

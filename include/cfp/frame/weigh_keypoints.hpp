@@ -1,6 +1,6 @@
 /// @file weigh_keypoints.hpp
-/// The steps from K to what a host keeps and uses (paper section IV-D): M of its map points, and the weight of every
-/// observation. The rules stand here once, for whole frames and for single keypoints alike.
+/// The steps from K to the M of the host's map points and the weight of every observation (paper section IV-D). Whole
+/// frames and single keypoints share the rules.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@
 namespace cfp {
 inline namespace CFP_ISA {
 
-/// Whether a keypoint is in no box, and the flow around it moves all the same: something that nobody reported.
+/// Whether a keypoint is outside all boxes but the flow around it moves: something that no detector reported.
 template <typename Scalar>
 [[nodiscard]] bool is_unreported(std::size_t i, const FrameState<Scalar>& state) noexcept {
   return state.box[i] == no_box && state.flow_probability[i] >= Scalar(0);
@@ -29,8 +29,8 @@ template <typename Scalar>
   return state.label[i] == KeypointLabel::foreground || is_unreported(i, state);
 }
 
-/// Whether keypoint i lies behind the objects of two boxes: where these overlap depth takes the nearer object for both,
-/// and it may be on the other.
+/// Whether keypoint i is background in more than one box. Where boxes overlap, depth takes the nearer object for that
+/// of both, so the keypoint may lie on the farther one.
 template <typename Scalar>
 [[nodiscard]] bool is_behind_two(std::size_t i, const FrameState<Scalar>& state) noexcept {
   if (state.label[i] != KeypointLabel::background) return false;
@@ -39,8 +39,8 @@ template <typename Scalar>
   return std::count_if(state.boxes.begin(), state.boxes.end(), holds) > 1;
 }
 
-/// Whether its depth puts keypoint i on an object of known O. Without depths, and in boxes of rigid classes, the wall
-/// counts as foreground, too.
+/// Whether the depth of keypoint i places it on an object of known O. The label is not enough: without depths, and in
+/// boxes of rigid classes, the wall is foreground, too.
 template <typename Scalar>
 [[nodiscard]] bool is_placed(std::size_t i, const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
   if (state.label[i] != KeypointLabel::foreground || i >= state.current.depths.size()) return false;
@@ -70,9 +70,8 @@ template <typename Scalar>
   return known != nullptr ? known->prior.value_or(of_any) : of_any;
 }
 
-/// M of a map point of which nothing is known when keypoint i observes it: 1 outside all boxes where nothing moves and
-/// by the printed rules, else the prior of its label, of an object where it is_behind_two, which what is shown static
-/// raises.
+/// M of a new map point that keypoint i observes. 1 outside all boxes where nothing moves, and by the printed rules.
+/// Otherwise the prior of its label (that of an object if it is_behind_two), raised by evidence for static.
 template <typename Scalar>
 [[nodiscard]] Scalar unknown_map_point(std::size_t i, const FrameOptions& options,
                                        const FrameState<Scalar>& state) noexcept {
@@ -84,9 +83,9 @@ template <typename Scalar>
   return posterior_probability(Scalar(0.5), e, Scalar(prior), o);
 }
 
-/// The weight by Bayes' rule, before any fallback. Outside all boxes it is M. In one, and for what is_unreported, E can
-/// only lower it, because what rests may move in the next frame; K counts once the constraints were asked, as
-/// keypoint_evidence has it.
+/// The weight by Bayes' rule, before any fallback. Outside all boxes it is M. Inside a box, and where it is_unreported,
+/// E can only lower it, because what rests may move in the next frame; K counts, limited by keypoint_evidence, once the
+/// constraints were evaluated.
 template <typename Scalar>
 [[nodiscard]] Scalar posterior_weight(std::size_t i, non_deduced<Scalar> map_point_probability,
                                       const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
@@ -99,8 +98,8 @@ template <typename Scalar>
   return posterior_probability(state.report.constrained > 0 ? k : Scalar(0.5), e, m, options.map_point);
 }
 
-/// Whether the printed weights leave the observation out because K and M are too far apart. In the coarse stage K is
-/// too rough for that, and a foreground point's 0 says nothing of its match.
+/// Whether WeightRule::product rejects the observation because K and M are too far apart. Not in the coarse stage,
+/// where K is too rough and a foreground point's 0 says nothing about its match.
 template <typename Scalar>
 [[nodiscard]] bool is_mismatched(std::size_t i, non_deduced<Scalar> map_point_probability, const FrameOptions& options,
                                  const FrameState<Scalar>& state) noexcept {
@@ -141,9 +140,10 @@ template <typename Scalar>
                                                     : model_weight(i, map_point_probability, options, state);
 }
 
-/// M of the map point that keypoint i observes, after this frame: it learns from K, once the constraints were asked,
-/// and by Bayes' rule from flow at its place that moves, beside which K is keypoint_evidence; from its object never. No
-/// map point (M negative or NaN) stays none, and a keypoint without a pixel says nothing.
+/// M of the map point that keypoint i observes, after this frame. It is updated by K once the constraints were
+/// evaluated and, with WeightRule::posterior, by moving flow at the keypoint, which also limits K (keypoint_evidence);
+/// never by its object. A negative or NaN M (no map point) is returned as it is; a keypoint without a finite pixel
+/// changes nothing.
 template <typename Scalar>
 [[nodiscard]] Scalar updated_map_point(std::size_t i, non_deduced<Scalar> map_point_probability,
                                        const FrameOptions& options, const FrameState<Scalar>& state) noexcept {
@@ -195,7 +195,7 @@ void weigh_keypoints(span<const non_deduced<Scalar>> map_point_probability, cons
       apply_fallback(span<const KeypointLabel>(state.label), observed, span<Scalar>(state.weight), options.health);
 }
 
-/// Whether a keypoint with this K may make a map point: one that moves would be a landmark that walks.
+/// Whether a keypoint with this K may become a map point: a moving one would corrupt the map.
 template <typename Scalar>
 [[nodiscard]] bool may_create_map_point(Scalar keypoint_probability, const FrameOptions& options) noexcept {
   return static_cast<double>(keypoint_probability) >= options.min_creation_probability;
