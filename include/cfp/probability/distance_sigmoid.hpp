@@ -18,7 +18,7 @@ namespace cfp {
 struct ConstraintOptions {
   double quantile = 0.8;  ///< position of D_Th among the ascending distances outside the boxes, in (0, 1]
   double steepness = 5;   ///< numerator of the sigmoid's slope, > 0: K is 0.5 at D_Th and logistic(5) = 0.9933 at d_min
-  /// fewer distances outside the boxes than this, and the constraint has nothing to say, >= 1
+  /// with fewer distances outside the boxes than this the constraint is not fitted, >= 1
   std::size_t min_samples = 10;
 };
 

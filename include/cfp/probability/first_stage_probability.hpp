@@ -39,12 +39,13 @@ template <typename Scalar>
   return clamp_probability(o * background_factor(o, o, object_threshold));
 }
 
-/// E, what the first stage says of a keypoint whose map point's M is the prior: on the object, O's odds against those
-/// of O_Th, so that an object at O_Th says nothing (1/2); behind it 1/2. Where the flow at the keypoint's own place was
-/// scored, that score stands for O, on the object and behind it (negative or NaN: it was not). If beside that its depth
-/// puts it on an object whose O is known (`placed`), what O says against it counts as well: near the centre of its
-/// expansion, what comes or goes looks at rest. In [0, 1], continuous and non-decreasing in O and in the score; 1/2
-/// where both are sure and disagree. NaN counts as O = 0. Not in the paper.
+/// E, the first stage's evidence for a keypoint, to be combined with the prior M of its map point. On the object it is
+/// the ratio of O's odds to those of O_Th, so that an object at O_Th gives 1/2 (no evidence); behind it 1/2. If the
+/// flow at the keypoint itself was scored (a negative or NaN score: it was not), that score takes the place of O, on
+/// the object and behind it. If in addition its depth places it on an object of known O (`placed`), an O below O_Th
+/// counts as well: near the focus of expansion, something that approaches or recedes looks static. In [0, 1],
+/// continuous and non-decreasing in O and in the score; 1/2 if both are certain and disagree. NaN counts as O = 0. Not
+/// in the paper.
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar first_stage_evidence(Scalar flow_probability, Scalar object_probability, bool foreground,
                                                     Scalar object_threshold, bool placed = false) noexcept {

@@ -16,9 +16,9 @@ enum class MapPointPolicy : std::uint8_t {
   copy  ///< K, the simplest reading of the paper: a static in-box point has P(K < 0.3) ~ 0.25 in each frame
 };
 
-/// What makes the weight of an observation.
+/// How the weight of an observation is formed.
 enum class WeightRule : std::uint8_t {
-  posterior,  ///< Bayes' rule: M of before, with what this frame says of object and keypoint. Not in the paper
+  posterior,  ///< Bayes' rule: M before the frame as prior, with the evidence of object and keypoint. Not in the paper
   product     ///< K M, and 0 where the two are mismatched (paper: "as weights")
 };
 
@@ -32,11 +32,11 @@ struct MapPointOptions {
   /// |K - M| above it: keypoint and map point are mismatched (no value in the paper), in (0, 1]; printed weights only.
   double mismatch_threshold = 0.5;
   WeightRule weight = WeightRule::posterior;
-  /// posterior only: power of K's odds in the weight, in (0, 1]. By construction of D_Th every fifth static point is
-  /// beyond it, so that a small K is weaker evidence than its odds.
+  /// posterior only: power of K's odds in the weight, in (0, 1]. By construction of D_Th every fifth static point
+  /// exceeds it, so a small K is weaker evidence than its odds suggest.
   double constraint_power = 0.5;
-  /// posterior only: M of which nothing is known yet, on an object that may move and behind one, in (0, 1); below
-  /// evidence_limit it counts as that. Depth tells the two apart well; a point on a person has to earn its weight.
+  /// posterior only: prior M of a new map point on an object that may move, and behind one, in (0, 1); raised to
+  /// evidence_limit if lower. Depth separates the two well; a point on a person has to earn its weight.
   double foreground_prior = 0.02;
   /// K = 0 has to take a weight below 1/2: odds of less than ((1 - limit) / limit)^constraint_power, here 7.
   double background_prior = 0.8;

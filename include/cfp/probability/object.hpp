@@ -1,6 +1,6 @@
 /// @file object.hpp
 /// Static probability O of a potentially moving object from the epipolar distances of the optical-flow pairs on it
-/// (paper section IV-B), and over time: an object has a track, and its evidence adds up over frames. Distances are in
+/// (paper section IV-B), and over time, as the evidence of a tracked object adds up over frames. Distances are in
 /// pixels; probabilities are P(static) in [0, 1].
 #pragma once
 
@@ -29,24 +29,24 @@ struct ObjectProbabilityOptions {
   ObjectScore score = ObjectScore::survival;
   /// k, in [1, 100]. The paper's 2; a distance from a line has statistically one degree of freedom.
   int degrees_of_freedom = 2;
-  /// Scale of the distances in pixels, > 0. With 1 (the paper) the score reaches 0.9 at 0.46 px and a static object
-  /// with unit noise scores 0.43 at the paper's positions: O is a score on a pixel scale, and sigma sets the scale.
+  /// Scale of the distances in pixels, > 0. With 1 (the paper) the score is 0.9 at 0.46 px, and a static object with a
+  /// noise of 1 px scores 0.43 at the paper's positions: O depends on the pixel scale, which sigma_px sets.
   double sigma_px = 1;
-  /// Where the noise of the flow has been measured, sigma_px is this many times its standard deviation, so that a
-  /// static object scores the same at any noise (0.96) and O_Th means the same; 0: sigma_px as it stands, and an F of
-  /// the flow is exact, as printed. >= 0.
+  /// If the noise of the flow has been measured, sigma_px is this multiple of its standard deviation, so that a static
+  /// object scores the same at any noise (0.96) and O_Th keeps its meaning. 0: sigma_px is used as it is and an F of
+  /// the flow counts as exact, as printed. >= 0.
   double noise_factor = 5.8;
   /// Positions of the ascending order statistics whose mean is O: shares of the number of pairs in (0, 1], ascending.
   /// The paper's are 0.1, 0.2, 0.3; a seventh of wrong depths or mismatches is then taken for motion
   /// (benchmarks/studies/object_motion_study).
   std::array<double, 3> positions = {0.2, 0.3, 0.4};
-  /// Mistracked pairs and wrong depths are no motion: the positions are those among the pairs that are left without as
-  /// large a share as scores below 1/2 of the pairs on no object, at most this, in [0, 1). 0: none is passed over, as
-  /// printed (cfp_object_motion_study).
+  /// Outliers (mistracked pairs, wrong depths) are no motion. Their share is estimated as that of the pairs on no
+  /// object which score below 1/2, at most this, in [0, 1); the same share of the object's lowest scores is skipped
+  /// before the positions are taken. 0: none is skipped, as printed (cfp_object_motion_study).
   double max_stray_share = 0.4;
-  /// Where depths are known, what the pairs share is judged, too (common_shift), beside what the image itself errs by
-  /// among neighbours: as the frame shows it, and at least this, px, >= 0 (cfp_object_motion_study). 0: the pairs are
-  /// judged one by one, as printed.
+  /// If depths are known, the common shift of an object's pairs is tested, too (common_shift). Neighbouring pairs also
+  /// share an error of the image itself; this is its lower bound where the frame shows less, px, >= 0
+  /// (cfp_object_motion_study). 0: no such test, pairs are scored one by one, as printed.
   double shared_error_px = 0.02;
   /// Fewer usable pairs than this, and O is unknown (>= 1; benchmarks/studies/object_motion_study).
   std::size_t min_pairs = 8;
@@ -59,16 +59,16 @@ struct ObjectProbability {
   double static_probability = 0;            ///< O in [0, 1]; unknown_object_probability when the status is not ok
   std::size_t pairs = 0;                    ///< usable pairs: finite, non-negative distances
   Status status = Status::not_enough_data;  ///< not_enough_data: O is unknown
-  double together = 1;  ///< O of this frame by what its pairs share, where one by one they look at rest; else 1
+  double together = 1;  ///< O of this frame from the pairs' common shift if one by one they look static; else 1
 };
 
 struct ObjectMemoryOptions {
-  double time_constant_s = 0.2;  ///< after it, evidence counts 1/e, >= 0; 0: no memory, as printed
+  double time_constant_s = 0.2;  ///< evidence decays to 1/e in this time, >= 0; 0: no memory, as printed
   /// log-odds that a frame may contribute and memory may hold, in (0, 100]: a start is seen at once
   double evidence_limit = 3;
 };
 
-/// What is remembered of one object.
+/// The accumulated evidence of one object.
 struct ObjectMemory {
   double evidence = 0;  ///< log-odds of static against moving, 0 at O_Th
   bool known = false;   ///< some frame had evidence
@@ -95,9 +95,9 @@ inline namespace CFP_ISA {
   return o.evidence_limit > 0 && o.evidence_limit <= 100 ? OptionPath() : "evidence_limit";
 }
 
-/// The options on the scale of a measured noise, one standard deviation in pixels of one coordinate; as they are where
-/// there is no measure (sigma 0) or noise_factor is 0. A distance from a line sees one of two coordinates and counts as
-/// if it saw both.
+/// The options scaled to a measured noise (standard deviation of one coordinate, px); unchanged if it was not measured
+/// (sigma 0) or noise_factor is 0. A distance from a line measures one of two coordinates and counts as if it measured
+/// both.
 [[nodiscard]] inline ObjectProbabilityOptions scaled_to_noise(ObjectProbabilityOptions options, double noise_sigma_px,
                                                               int coordinates) noexcept {
   const double scale = options.noise_factor * noise_sigma_px / std::sqrt(2.0 / coordinates);
@@ -139,13 +139,14 @@ template <typename Range, typename Scalar = range_value_t<Range>>
   return result;
 }
 
-/// O of pairs that have moved together as common_shift says: Q(chi_squared / 16; 3). An object at rest then scores
-/// above 0.9 in 97.5 % of its frames, if the noise is all there is. Not in the paper.
+/// O from the chi-squared of common_shift: Q(chi_squared / 16; 3). An object at rest scores above 0.9 in 97.5 % of its
+/// frames if there is no error but the noise. Not in the paper.
 [[nodiscard]] inline double shift_probability(double chi_squared) noexcept {
   return chi_squared_survival(chi_squared / 16, 3);
 }
 
-/// log(O / (1 - O)) - log(O_Th / (1 - O_Th)), within +-limit: what one frame says of an object, 0 at O_Th.
+/// log(O / (1 - O)) - log(O_Th / (1 - O_Th)), within +-limit: the evidence of one frame for an object being static, 0
+/// at O_Th.
 [[nodiscard]] inline double object_evidence(double object_probability, double object_threshold, double limit) noexcept {
   const double o = clamp_probability(object_probability);
   const double odds = o * (1 - object_threshold) / ((1 - o) * object_threshold);
@@ -153,9 +154,9 @@ template <typename Range, typename Scalar = range_value_t<Range>>
 }
 
 /// O with the memory of frames before, dt_s after the last: evidence <- exp(-dt / tau) evidence + that of this frame,
-/// within +-evidence_limit, and O so that O_Th is where nothing is remembered and the frame says nothing. A frame in
-/// which O is unknown only lets memory fade; O stays known while something is remembered. dt_s that is not positive
-/// counts as 0. Not in the paper, whose O forgets everything between frames.
+/// within +-evidence_limit; O follows from it, and is O_Th for evidence 0. A frame in which O is unknown only lets
+/// memory fade; O stays known while something is remembered. dt_s that is not positive counts as 0. Not in the paper,
+/// whose O forgets everything between frames.
 inline ObjectProbability remember_object(const ObjectProbability& object, double dt_s, double object_threshold,
                                          const ObjectMemoryOptions& options, ObjectMemory& memory) noexcept {
   if (!(options.time_constant_s > 0)) return object;

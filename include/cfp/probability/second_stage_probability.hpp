@@ -10,7 +10,7 @@
 
 namespace cfp {
 
-/// What one constraint says of one keypoint.
+/// The evidence of one constraint about one keypoint.
 template <typename Scalar>
 struct Evidence {
   Scalar static_probability = Scalar(0);  ///< K^T or K^F
@@ -18,7 +18,7 @@ struct Evidence {
   bool available = false;  ///< false: no depth, behind the camera, translation below t_Th, constraint not fitted
 };
 
-/// All that the second stage needs to know of one keypoint inside a box.
+/// The second stage's input for one keypoint inside a box.
 template <typename Scalar>
 struct SecondStageKeypoint {
   Evidence<Scalar> projection;               ///< K^T
@@ -27,8 +27,8 @@ struct SecondStageKeypoint {
   Scalar map_point_probability = Scalar(1);  ///< M of its map point; 1 where there is none
   bool foreground = true;                    ///< from the depth clustering
   bool matched = false;                      ///< has a match in frame k-1
-  bool box_associated = true;                ///< its box continues a box of frame k-1, or that is not asked
-  Scalar visibility = Scalar(1);             ///< of motion, in [0, 1]: how much second_stage_evidence may say
+  bool box_associated = true;                ///< its box continues a box of frame k-1, or this is not required
+  Scalar visibility = Scalar(1);             ///< of motion, in [0, 1]: weight of second_stage_evidence
 };
 
 /// The rules of the second stage, in the paper's order. A match without any available constraint (no depth and too
@@ -90,10 +90,10 @@ template <typename Scalar>
   return Scalar(0);
 }
 
-/// What the constraints say of a keypoint whose map point's M is the prior: K by the rules above, and 1/2, nothing, of
-/// one that no constraint judges. It counts as much as motion would show, and where it is near 0 in full: whoever moves
-/// fast shows. So by what cannot be seen nobody is learned to rest, nor a wall to move. In [0, 1]. Not in the paper,
-/// whose K is 0 or M without a constraint.
+/// The constraints' evidence for a keypoint, to be combined with the prior M of its map point: K by the rules above;
+/// 1/2 (no evidence) if no constraint can judge it. It is weakened where motion would hardly be visible, except near K
+/// = 0, where fast motion is visible anyway. So motion below the threshold is not learned as static, nor noise on a
+/// wall as motion. In [0, 1]. Not in the paper, whose K is 0 or M without a constraint.
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar second_stage_evidence(const SecondStageKeypoint<Scalar>& keypoint,
                                                      Scalar object_threshold) noexcept {
@@ -106,9 +106,10 @@ template <typename Scalar>
   return k + (half - k) * (Scalar(1) - (std::max)(clamp_probability(keypoint.visibility), surely));
 }
 
-/// K beside E of the same keypoint: at most 1/2 on an object that E says moves (E < 1/2). Both measure one motion, and
-/// what moves by less than a match errs has a K near 1, while the flow, ten times finer, sees it. In [0, 1] as K is,
-/// non-decreasing in both, with a step in E at 1/2; NaN stays NaN, and counts as 0 where K does. Not in the paper.
+/// K limited by E of the same keypoint: at most 1/2 on an object that moves according to E (E < 1/2). Both measure the
+/// same motion; a motion below the error of a match has a K near 1, while the flow, ten times finer, detects it. In [0,
+/// 1] as K is, non-decreasing in both, with a step in E at 1/2; NaN stays NaN, and counts as 0 where K does. Not in the
+/// paper.
 template <typename Scalar>
 [[nodiscard]] constexpr Scalar keypoint_evidence(Scalar keypoint_probability, Scalar first_stage_evidence,
                                                  bool foreground) noexcept {
