@@ -1,6 +1,6 @@
 /// @file fundamental_ransac.hpp
-/// The fundamental matrix of pairs with mismatches: seeded LO-RANSAC over seven-point samples, a score that
-/// rewards closeness, robust non-linear refinement, and a refusal instead of a wrong F when a rotation, a plane or no
+/// The fundamental matrix of pairs with mismatches: seeded LO-RANSAC over seven-point samples, a score that decreases
+/// with the distance, robust non-linear refinement, and a refusal instead of a wrong F if a rotation, a plane or no
 /// motion explains the pairs. F maps a pixel of the previous image to its line in the current one, x_cur^T F x_prev =
 /// 0. Distances in pixels.
 #pragma once
@@ -139,21 +139,21 @@ inline namespace CFP_ISA {
 /// score, sum w d^2 / (d^2 + T^2 / 4), and the refinement's loss, and steer the sampling; the inlier test sees the
 /// Sampson distance d alone. inlier_mask: empty or one per pair, 1 = inlier. Works in double, scores in float.
 ///
-/// A homography that holds most inliers is looked for first: with parallax beside it the F is completed from both.
-/// There is no F, and `status` says why, unless
-///  - more pairs lie near its lines than the best of all samples gathers by chance (30 true pairs among 300 are not
-///    told from that),
-///  - its lines explain the pairs better than chance does, beside that homography and beside no motion,
-///  - also without any part of the image that somebody near may fill,
+/// The homography with most inliers is searched first; if other pairs show parallax, F is completed from both. There is
+/// no F, and `status` says why, unless
+///  - more pairs lie near its lines than the best of all samples would gather by chance (30 true pairs among 300 cannot
+///  be distinguished from that),
+///  - its lines explain the pairs better than that homography and than no motion do, by more than chance,
+///  - this holds also without any one part of the image that a mover nearby may fill,
 ///  - and without any two lines of points (`degenerate`).
-/// Pairs that begin or end in one place (a cell of three thresholds) count as one there. Where most pairs are
-/// mismatches a moving region may still be taken for parallax; so may noise that is larger in one direction of the
-/// image, of all pairs alike (docs/limits.md). Lens distortion is to be taken out of the pixels before.
+/// Pairs that begin or end in the same cell of three thresholds count as one there. Where most pairs are mismatches a
+/// moving region may still be taken for parallax; so may noise that is larger in one image direction for all pairs
+/// (docs/limits.md). Pixels must be undistorted.
 ///
 /// The result is refined under a Geman-McClure loss of 2.25 standard deviations of the noise that the pairs themselves
-/// show, from several starts, as a short baseline gives the cost several minima. Cost per sample about 1 us plus 0.3 us
-/// per 200 pairs, and some 100 us at the end. Sources: Chum, Matas, Kittler: "Locally optimized RANSAC", DAGM 2003;
-/// Geman and McClure 1987 for score and loss; DEGENSAC (see fundamental_degeneracy_impl.hpp).
+/// show, from several starts, since the cost has several minima on a short baseline. Cost per sample about 1 us plus
+/// 0.3 us per 200 pairs, and some 100 us at the end. Sources: Chum, Matas, Kittler: "Locally optimized RANSAC", DAGM
+/// 2003; Geman and McClure 1987 for score and loss; DEGENSAC (see fundamental_degeneracy_impl.hpp).
 template <typename Scalar>
 [[nodiscard]] FundamentalResult<Scalar> fundamental_ransac(const PointPairs<Scalar>& pairs,
                                                            const FundamentalRansacOptions& options,
@@ -161,7 +161,8 @@ template <typename Scalar>
                                                            span<char> inlier_mask = {}) {
   return detail::fundamental_ransac<Scalar>(pairs, nullptr, options, workspace, inlier_mask);
 }
-/// The camera's intrinsics tell a rotation from a plane, and refuse the few F that a rotation explains as well.
+/// With the camera's intrinsics a rotation is distinguished from a plane, and an F that a rotation explains as well is
+/// refused.
 template <typename Scalar>
 [[nodiscard]] FundamentalResult<Scalar> fundamental_ransac(const PointPairs<Scalar>& pairs,
                                                            const PinholeCamera<Scalar>& camera,
@@ -172,8 +173,8 @@ template <typename Scalar>
   return detail::fundamental_ransac<Scalar>(pairs, &K, options, workspace, inlier_mask);
 }
 
-/// How well F is known, the result of the last call with this workspace: its covariance by the noise that its pairs
-/// show. Zero without F, and where they do not tell it. Allocates nothing; some 10 us for 500 pairs.
+/// The covariance of F, the result of the last call with this workspace, from the noise of its pairs. Zero without F,
+/// and if the pairs do not determine it. Allocates nothing; some 10 us for 500 pairs.
 template <typename Scalar>
 [[nodiscard]] FundamentalCovariance fundamental_covariance(const FundamentalResult<Scalar>& result,
                                                            const FundamentalRansacWorkspace& workspace) noexcept {

@@ -1,5 +1,5 @@
 /// @file pnp_ransac.hpp
-/// Camera pose of 3-D/2-D observations with mismatches and without a start: seeded LO-RANSAC over P3P samples that
+/// Camera pose of 3-D/2-D observations with mismatches, without an initial pose: seeded LO-RANSAC over P3P samples that
 /// follow the weights (map-point and keypoint static probabilities), MSAC score in pixels, any camera. Its pose starts
 /// the weighted refinement.
 #pragma once
@@ -15,9 +15,10 @@
 
 namespace cfp {
 
-/// The threshold is a reprojection distance: 2.45 sigma hold 95 %. At least 4 inliers: any three observations have a
-/// pose. Samples enough for nine mismatches in ten without weights (cfp_pnp_ransac_study); where the data hold no pose,
-/// all of them are drawn, about 2 us each for 300 observations: lower the limit when hopeless calls must be short.
+/// The threshold is a reprojection distance: 2.45 sigma contain 95 % of the inliers. At least 4 inliers: any three
+/// observations have a pose. Samples enough for nine mismatches in ten without weights (cfp_pnp_ransac_study); if the
+/// data support no pose, all of them are drawn, about 2 us each for 300 observations: lower the limit if such calls
+/// must be short.
 struct PnpRansacOptions : RansacOptions {
   constexpr PnpRansacOptions() noexcept {
     threshold_px = 2.5;
@@ -62,13 +63,13 @@ inline namespace CFP_ISA {
 /// first order in d for any other; the final inliers use the camera itself. The search stops early when the weighted
 /// share of inliers gives the confidence. Scores and optimises locally in float, the rest in double.
 ///
-/// A pose is found only where more observations lie near their projections than chance would put there: with nothing
-/// but mismatches on an object of 40 to 160 px, eight inliers or more come up by chance. More, too, than would if those
-/// within six thresholds exchanged their pixels: mismatches that crowd in a patch of the image have a camera far away
-/// that projects everything there. Where a pose is refused and more than three pixels lie in a cell of two thresholds,
-/// such a cell counts as one for the rest of the samples, which then follow the weights. Points on a line, or in one
-/// place, are degenerate, and so are inliers of which four or more, and all but two, lie on one to what threshold_px is
-/// at their depth; those in three places are no consensus, however many they are.
+/// A pose is accepted only if it has more inliers than chance would give: with nothing but mismatches on an object of
+/// 40 to 160 px, eight or more inliers occur by chance. It must also have more than if the pixels within six thresholds
+/// were permuted: mismatches that crowd in a small patch of the image fit a camera far away that projects everything
+/// there. If a pose is refused and more than three pixels lie in one cell of two thresholds, such a cell counts as one
+/// observation for the remaining samples, which then follow the weights. Points on a line, or in one place, are
+/// degenerate, and so are inliers of which four or more, and all but two, lie on one line to within threshold_px at
+/// their depth. Inliers in only three places are no consensus, however many.
 template <typename Camera, typename Scalar = typename Camera::ScalarType>
 [[nodiscard]] PnpRansacResult<Scalar> pnp_ransac(PointSpan<non_deduced<Scalar>, 3> world,
                                                  PointSpan<non_deduced<Scalar>, 2> pixels,
@@ -117,7 +118,7 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
       result.T_cam_world = pose;
   };
   conclude();
-  // Is something there beside what crowds in places?
+  // Is there support beside the crowded cells?
   if (result.found() || result.iterations >= options.max_iterations ||
       !detail::share_weights(pixels, 2 * options.threshold_px, observations, workspace.cells))
     return result;

@@ -1,5 +1,5 @@
 /// @file ransac.hpp
-/// The one locally optimised RANSAC of cfp: options, ways of ending, and the search that the fundamental matrix and the
+/// The locally optimised RANSAC of cfp: options, termination status, and the search that the fundamental matrix and the
 /// pose share. Source: Chum, Matas, Kittler: "Locally optimized RANSAC", DAGM 2003.
 #pragma once
 
@@ -24,7 +24,7 @@ struct RansacOptions {
   double confidence = 0.99;                ///< of having drawn a sample without mismatches, (0, 1)
   std::size_t min_iterations = 30;         ///< samples drawn at least
   std::size_t max_iterations = 1000;       ///< samples drawn at most, >= 1
-  std::size_t min_inliers = 12;            ///< fewer inliers are no consensus; more than a minimal sample
+  std::size_t min_inliers = 12;            ///< with fewer inliers there is no model; more than a minimal sample
   Sampling sampling = Sampling::weighted;  ///< how samples follow the weights
   std::uint64_t seed = 0;                  ///< same input and seed, same bits
 };
@@ -33,12 +33,12 @@ enum class RansacStatus : std::uint8_t {
   ok,               ///< model found with the asked confidence
   iteration_limit,  ///< model found, but max_iterations ended the search before the confidence was reached
   not_enough_data,  ///< fewer than min_inliers data are present
-  no_consensus,     ///< no model has min_inliers inliers, or more than chance gives
+  no_consensus,     ///< no model has min_inliers inliers, or more support than chance gives
   degenerate,       ///< the data determine no model: points on a line, or in one place
   no_motion,        ///< F only: the pairs do not move; no F, the homography is the identity
   pure_rotation,    ///< F only: a rotation of the camera explains the pairs; no F, see the homography
   planar,           ///< F only: a homography that is no rotation explains the pairs, a plane; no F, see the homography
-  homography        ///< F only: the same without intrinsics, where rotation and plane are not told apart
+  homography        ///< F only: the same without intrinsics, where rotation and plane cannot be distinguished
 };
 
 [[nodiscard]] constexpr const char* to_string(RansacStatus status) noexcept {
@@ -124,7 +124,7 @@ struct RansacCandidate {
   double cost = std::numeric_limits<double>::infinity();
 };
 
-/// What came of a search. No cost below the total weight: no model at all.
+/// Result of a search. A cost not below the total weight: no model.
 template <typename Model>
 struct RansacSearch {
   RansacCandidate<Model> best = {};
