@@ -149,10 +149,10 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
   }
 }
 
-/// The noise of points of the camera's undistorted image over that of its own pixels, of which one at the edge of a
-/// fisheye becomes many: root mean square over both directions, times `relative` where that is not empty. Kept in
-/// `storage`, which the returned view refers to; of a pinhole camera `relative` itself. 1 for a point that the camera
-/// does not see. Allocates only to grow storage.
+/// The noise of points in the undistorted image relative to that of the camera's own pixels, which undistortion
+/// magnifies at the edge of a fisheye: root mean square over both directions, times `relative` if that is not empty.
+/// Kept in `storage`, which the returned view refers to; for a pinhole camera `relative` itself. 1 for a point that the
+/// camera does not see. Allocates only to grow storage.
 template <typename Camera, typename Scalar = typename Camera::ScalarType>
 [[nodiscard]] span<const Scalar> undistorted_sigmas(const Camera& camera,
                                                     const PointSpan<non_deduced<Scalar>, 2>& undistorted_points,

@@ -1,6 +1,6 @@
 /// @file common_shift.hpp
-/// Whether flow pairs have moved together: each of them may lie within the noise, and what they share far outside of
-/// it. Not in the paper, whose O ranks the pairs one by one.
+/// Whether flow pairs share a motion: each pair may be within the noise while their common shift is far beyond it. Not
+/// in the paper, whose O ranks the pairs one by one.
 #pragma once
 
 #include <algorithm>
@@ -13,18 +13,17 @@ namespace cfp {
 
 inline namespace CFP_ISA {
 
-/// How much better `members`, indices of pairs, are explained by one translation D of what they show than by a world at
-/// rest: D^T Cov(D)^-1 D of the D that fits best, chi-squared with three degrees of freedom at rest. With r, M, J and
-/// the motion's covariance C of motion_distance,
+/// How much better a common translation D of the points of `members` (indices of pairs) explains them than a static
+/// world: D^T Cov(D)^-1 D at the best D, chi-squared with three degrees of freedom for a static object. With r, M, J
+/// and the motion's covariance C of motion_distance,
 ///
 ///   r_i = M_i (xi + (D, 0)) + J_i dz_i + noise,   xi ~ N(0, C) the same for all pairs, dz_i the error of a depth,
 ///
-/// so that what the motion's error explains is no evidence, however many the pairs. A robust fit: mismatches take no
-/// part, and of a shift far beyond the noise little is left, which the pairs' distances tell. Neighbours share errors
-/// that are no noise (rolling shutter, lens, focal length), of about `shared_error_px` >= 0, which no number of pairs
-/// makes smaller: n pairs count as n / (1 + n (shared_error_px / sigma_px)^2) independent ones. Pairs without a depth
-/// take no part; 0 where nothing can be fitted. sigma_px > 0, times each pair's relative_sigma. O(members), allocates
-/// nothing.
+/// so that a shift within the error of the motion is no evidence, however many the pairs. The fit is robust: mismatches
+/// are ignored, and so is most of a shift far beyond the noise, which the single pairs' distances reveal. Neighbouring
+/// pairs have a correlated error (rolling shutter, lens, focal length) of about `shared_error_px` >= 0, which does not
+/// average out: n pairs count as n / (1 + n (shared_error_px / sigma_px)^2) independent ones. Pairs without a depth are
+/// not used; 0 if nothing can be fitted. sigma_px > 0, times each pair's relative_sigma. O(members), allocates nothing.
 template <typename Camera, typename Scalar = typename Camera::ScalarType>
 [[nodiscard]] double common_shift(const FlowPairs<non_deduced<Scalar>>& pairs, span<const std::int32_t> members,
                                   const UncertainMotion<non_deduced<Scalar>>& motion, const Camera& camera,
@@ -33,7 +32,7 @@ template <typename Camera, typename Scalar = typename Camera::ScalarType>
   CFP_ASSERT(pairs.current.size() == pairs.previous.size());
   constexpr int passes = 2;
   const double shared = shared_error_px / static_cast<double>(sigma_px);
-  // A micrometre and a microradian of error are none, and give every covariance an inverse.
+  // A micrometre and a microradian are negligible, and make every covariance invertible.
   Matrix6<double> covariance = motion.template cast<double>().covariance, information, inverse;
   for (int k = 0; k < 6; ++k) covariance(k, k) += 1e-12;
   if (pairs.previous_depths.empty() || !invert_normal_equations<6>(covariance, 1e-14, information)) return 0;

@@ -1,13 +1,13 @@
 /// @file depth_noise.hpp
-/// How well a depth measurement is known, and what is assumed of a depth that was not measured.
+/// The noise of depth measurements, and the prior of a depth that was not measured.
 #pragma once
 
 #include "cfp/core/options.hpp"
 
 namespace cfp {
 
-/// One standard deviation of a depth measurement, in metres: constant + quadratic (z - nearest)^2. The bias of stereo,
-/// whose depth is one over a disparity, is not in it: the camera's motion from such depths is too sure of itself where
+/// One standard deviation of a depth measurement, in metres: constant + quadratic (z - nearest)^2. It does not model
+/// the bias of stereo, whose depth is one over a disparity: the motion from such depths has too small a covariance if
 /// most disparities are below ten times their noise (cfp_camera_motion_study).
 struct DepthNoise {
   double constant_m = 0.0012;  ///< >= 0
@@ -21,17 +21,17 @@ struct DepthNoise {
   }
 };
 
-/// A depth that was not measured: its inverse is mean +- sigma. The default covers everything beyond 0.7 m; a sigma
-/// of 1e6 leaves only the distance from the epipolar line.
+/// Prior of a depth that was not measured: inverse depth, mean +- sigma. The default covers everything beyond 0.7 m;
+/// with a sigma of 1e6 only the distance from the epipolar line remains.
 struct UnknownDepth {
   double inverse_mean = 0.5;   ///< 1/m, > 0
   double inverse_sigma = 0.5;  ///< 1/m, >= 0
 };
 
-/// What motion_distance takes the depth of a pair for.
+/// The depth model of motion_distance.
 struct MotionDistanceOptions {
   DepthNoise depth_noise;      ///< of a measured depth
-  UnknownDepth unknown_depth;  ///< of all others
+  UnknownDepth unknown_depth;  ///< prior of all others
 };
 
 inline namespace CFP_ISA {

@@ -1,5 +1,5 @@
 /// @file distance.hpp
-/// What all pixel distances of cfp share: the value that stands for "no distance", and the noise that they show.
+/// Common to all pixel distances of cfp: the value that stands for "no distance", and a robust estimate of their noise.
 #pragma once
 
 #include "cfp/core/span.hpp"
@@ -39,10 +39,10 @@ template <typename Scalar>
   return degrees_of_freedom == 1 ? 0.674489750196082 : 1.177410022515475;
 }
 
-/// The standard deviation of one coordinate, from distances of static points of which at least half are right: their
-/// median over that of the chi distribution; 7 % too large with a tenth of mismatches, 18 % with a fifth.
-/// degrees_of_freedom: 1 for distances from a line, 2 for distances from a point. Distances that are none are left out;
-/// none at all gives 0. `distances` is overwritten. O(n).
+/// The standard deviation of one coordinate, from distances of static points with at least half inliers: their median
+/// over that of the chi distribution; 7 % too large with a tenth of mismatches, 18 % with a fifth. degrees_of_freedom:
+/// 1 for distances from a line, 2 for distances from a point. Distances that are none are left out; none at all gives
+/// 0. `distances` is overwritten. O(n).
 template <typename Scalar>
 [[nodiscard]] Scalar robust_sigma(span<Scalar> distances, int degrees_of_freedom) noexcept {
   const std::size_t n = copy_distances(span<const Scalar>(distances), distances);

@@ -1,7 +1,7 @@
 /// @file epipolar.hpp
 /// Epipolar geometry of two views: F from a pose, epipolar lines and the distances of correspondences to them (paper
-/// sections IV-B and IV-D), and what is left of it when the camera only turns. Convention: x_cur^T F x_prev = 0, with
-/// pixels of an undistorted image.
+/// sections IV-B and IV-D), and the homography that remains if the camera only turns. Convention: x_cur^T F x_prev = 0,
+/// with pixels of an undistorted image.
 ///
 /// A distance is >= 0 and finite, or `no_distance` (-1) where there is none: the line is undefined (A = B = 0 up to
 /// rounding: the point is at the epipole, F is zero or not finite), or a coordinate is not finite. No distance depends
@@ -125,12 +125,12 @@ void epipolar_distances(const Matrix3<Scalar>& F, const FlowPairs<non_deduced<Sc
   for (std::size_t i = 0; i < pairs.relative_sigmas.size(); ++i) out[i] /= pairs.relative_sigmas[i];
 }
 
-/// The same under an F of unit norm that is not exact: what its error may have moved the line by does not count,
+/// The same under an F of unit norm with a covariance: a deviation within the error of the line does not count,
 ///
 ///   d / sqrt(1 + a^T C a / (sigma^2 (A^2 + B^2))),
 ///
-/// a the entries of x_cur x_prev^T row by row, C the covariance of F, sigma = sigma_px relative_sigma > 0. An F tells
-/// little where none of its pairs was: of what stands before them all, or beside them. Not in the paper.
+/// a the entries of x_cur x_prev^T row by row, C the covariance of F, sigma = sigma_px relative_sigma > 0. F is
+/// uncertain where it had no pairs: for points nearer than all of them, or beside them. Not in the paper.
 template <typename Scalar>
 void epipolar_distances(const Matrix3<Scalar>& F, const FundamentalCovariance& covariance,
                         const non_deduced<Scalar>& sigma_px, const FlowPairs<non_deduced<Scalar>>& pairs,

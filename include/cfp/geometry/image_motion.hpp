@@ -1,6 +1,6 @@
 /// @file image_motion.hpp
-/// How the image moved as a whole, told by optical flow. Not in the paper, whose boxes are predicted as if the camera
-/// were still: a shaken one moves all of them at once, and a prediction knows nothing of it.
+/// The motion of the image as a whole, from optical flow. Not in the paper, whose boxes are predicted as if the camera
+/// were still: a shaken camera moves all of them at once, which no box's own prediction contains.
 #pragma once
 
 #include <complex>
@@ -15,15 +15,15 @@ namespace cfp {
 inline namespace CFP_ISA {
 
 /// Sets `motion` to what moves pixels of the frame before to this one, for `warp_box`: a similarity, since a camera
-/// that turns shifts and rolls the image, fitted with Geman-McClure's weights in four passes. A camera that goes moves
-/// each pixel by its depth instead, and a box not as the room behind it: the more the pairs disagree, the less of the
-/// similarity is taken, 1 - 12 d^2 / D^2 of it, D the median of how far the pairs moved, d of how far they are from it
-/// (cfp_tracker_study). False, and `motion` stays, where that is nothing, where D is half a pixel or less, and below 12
-/// pairs.
+/// that turns shifts and rolls the image, fitted with Geman-McClure's weights in four passes. A translating camera
+/// moves each pixel according to its depth, and a box unlike the room behind it: the larger the residuals, the smaller
+/// the share of the similarity that is applied, 1 - 12 d^2 / D^2, with D the median displacement and d the median
+/// residual of the pairs (cfp_tracker_study). False, and `motion` stays, where that is nothing, where D is half a pixel
+/// or less, and below 12 pairs.
 ///
-/// The caller leaves out what moves by itself; of the rest, less than half may be wrong, less than a quarter where
-/// these stay in their place. Coordinates finite and within +-1e6 px. `distances` is scratch memory. O(pairs),
-/// allocates only while it grows.
+/// The caller leaves out moving objects; of the rest, less than half may be outliers, less than a quarter if these are
+/// stationary in the image. Coordinates finite and within +-1e6 px. `distances` is scratch memory. O(pairs), allocates
+/// only while it grows.
 template <typename Scalar>
 [[nodiscard]] bool image_motion(const PointSpan<Scalar, 2>& prev, const PointSpan<non_deduced<Scalar>, 2>& cur,
                                 std::vector<non_deduced<Scalar>>& distances, Matrix3<non_deduced<Scalar>>& motion) {

@@ -85,12 +85,12 @@ inline namespace CFP_ISA {
 ///   d = sigma sqrt(r^T (sigma^2 I + sigma_z^2 J J^T + M C M^T)^-1 r),
 ///
 /// r = pixel_cur - project(p), p = T_cur_prev X, X the previous pixel at its depth z, J = d project / d z,
-/// M = d project / d xi, C the motion's covariance. (d / sigma)^2 of a static point has two degrees of freedom. What an
-/// error of the depth explains, along the epipolar line, or of the motion, does not count; so a plane, a rotation or a
-/// resting camera is no special case. A depth that is not positive or not finite: see UnknownDepth; the nearer, the
-/// more a translation moves a point, so that the covariance of the translation then counts 1 + (sigma / mean)^2 times,
-/// at most twice (cfp_object_motion_study). no_distance for a pixel without a ray, a point behind the current camera,
-/// or anything not finite. sigma_px > 0. Not in the paper.
+/// M = d project / d xi, C the motion's covariance. (d / sigma)^2 of a static point has two degrees of freedom.
+/// Deviations within the error of the depth (along the epipolar line) or of the motion do not count; so a plane, a
+/// rotation or a resting camera is no special case. A depth that is not positive or not finite has the prior
+/// UnknownDepth. As a translation moves near points more, the covariance of the translation is then multiplied by 1 +
+/// (sigma / mean)^2, at most by 2 (cfp_object_motion_study). no_distance for a pixel without a ray, a point behind the
+/// current camera, or anything not finite. sigma_px > 0. Not in the paper.
 template <typename Camera, typename Scalar = typename Camera::ScalarType>
 [[nodiscard]] Scalar motion_distance(const Vector2<non_deduced<Scalar>>& pixel_prev,
                                      const non_deduced<Scalar>& depth_prev,
