@@ -29,10 +29,10 @@ class BoxTracker {
 
   /// The next frame, dt_s seconds after the one before (0 for the first). Every detection that counts is output, from
   /// its first frame on; a track with at least confirm_hits detections is compensated for up to max_coast such frames
-  /// in a row, those between on which the detector did not run apart; one with fewer ends with the first miss. A
-  /// detection that no track takes by its overlap, but that is within restart_gate of one without a detection, starts
-  /// that track anew, with its id. image_motion, when given, maps pixels of the frame before to this one (see
-  /// `warp_box`) and is applied to the predictions: hand it over when the camera turns fast.
+  /// in a row, not counting frames on which the detector did not run; one with fewer ends with the first miss. An
+  /// unassociated detection within restart_gate of a track without a detection restarts that track, with its id.
+  /// image_motion, when given, maps pixels of the frame before to this one (see `warp_box`) and is applied to the
+  /// predictions: hand it over when the camera turns fast.
   BoxTrackerResult<Scalar> track(span<const Detection<Scalar>> detections, Scalar dt_s,
                                  const Matrix3<Scalar>* image_motion = nullptr) {
     BoxTrackerResult<Scalar> result = advance(dt_s, image_motion);
@@ -47,9 +47,9 @@ class BoxTracker {
     return result;
   }
 
-  /// A frame on which the detector did not run: nothing was missed, so all tracks live on, those of one detection, too,
-  /// and are output as compensated up to max_idle (or max_coast) frames after their last one. For a detector that runs
-  /// on every n-th frame only.
+  /// A frame on which the detector did not run: nothing was missed, so all tracks continue, even those of one
+  /// detection, and are output as compensated up to max_idle (or max_coast) frames after their last one. For a detector
+  /// that runs on every n-th frame only.
   BoxTrackerResult<Scalar> coast(Scalar dt_s, const Matrix3<Scalar>* image_motion = nullptr) {
     BoxTrackerResult<Scalar> result = advance(dt_s, image_motion);
     output(result, false);

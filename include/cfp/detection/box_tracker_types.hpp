@@ -1,5 +1,5 @@
 /// @file box_tracker_types.hpp
-/// What goes into the box tracker and what comes out (paper IV-A).
+/// Input, options and output of the box tracker (paper IV-A).
 #pragma once
 
 #include "cfp/core/options.hpp"
@@ -15,7 +15,7 @@ template <typename Scalar>
 struct Detection {
   Box<Scalar> box;           ///< px; improper ones are skipped and counted
   int class_id = 0;          ///< boxes of different classes are never associated
-  Scalar score = Scalar(1);  ///< any scale on which more is surer; NaN: the detection is skipped
+  Scalar score = Scalar(1);  ///< on any scale, higher is more confident; NaN: the detection is skipped
 };
 
 /// One box of the tracker's output.
@@ -40,18 +40,18 @@ struct TrackedBox {
 struct BoxTrackerOptions {
   BoxMotionOptions motion;
   double min_iou = 0.3;  ///< gate of the association: a pair needs more than this IoU, in [0, 1)
-  /// gate of what starts a track anew: a detection that no track takes, and a track without one, closer than this by
-  /// `box_distance_sq`, in standard deviations, >= 0 (0: such a detection is somebody new)
+  /// gate of a restart: an unassociated detection restarts a track without detection if they are closer than this by
+  /// `box_distance_sq`, in standard deviations, >= 0 (0: it always starts a new track)
   double restart_gate = 4;
   double min_score = -1e300;  ///< detections below are ignored
   /// detections below extend a track but start none (and are not output when they extend none)
   double birth_threshold = -1e300;
   int confirm_hits = 2;  ///< detections before a missed one may be compensated, >= 1
   int max_coast = 6;     ///< misses in a row that are compensated, >= 0 (the paper's figure shows six)
-  /// the same while the detector does not run, for tracks of one detection, too; counts where it is more than
-  /// max_coast, >= 0. Longer a track goes on without a box, until the detector runs (cfp_posterior_study)
+  /// the same while the detector does not run, also for tracks of one detection; used if larger than max_coast, >= 0.
+  /// After it a track continues without a box until the detector runs (cfp_posterior_study)
   int max_idle = 30;
-  /// where the detector runs, at most this many missed frames per detection so far, > 0 (1: no longer than it was seen)
+  /// while the detector runs: misses compensated per detection so far, > 0 (1: no longer than it was seen)
   double coast_per_hit = 1.0;
   double min_visible = 0.25;  ///< a compensated box with a smaller share of its area in the image is dropped, in [0, 1]
   double max_gap_s = 2.0;     ///< after a longer dt the frames are not adjacent: all tracks are dropped, s, > 0
