@@ -1,7 +1,7 @@
 /// @file depth_foreground.hpp
-/// Which keypoints of a person's box lie on the person and which on what is behind or before (paper IV-C): by the
-/// window of depths whose points lie where people do, or, as printed, by clustering the depths. Depths in metres, one
-/// call per box.
+/// Which keypoints of a person's box lie on the person and which behind or in front (paper IV-C): by the depth window
+/// whose points are placed in the box as those of people are or, as printed, by clustering the depths. Depths in
+/// metres, one call per box.
 #pragma once
 
 #include <algorithm>
@@ -144,10 +144,10 @@ inline namespace CFP_ISA {
 /// that the nearest `near_share` reach, and then all that is nearer is the person's (an arm), else what is up to
 /// `before_m` nearer. The window ends at the widest gap between `first_gap_m` and `last_gap_m` behind the front that
 /// has more than a fiftieth of the points behind it; without a gap that is clear of noise and of evenly spread points,
-/// `behind_m` behind it; or `short_m` behind it. Of these windows the one is taken whose points lie most where people
-/// do (sum_place_odds); without pixels the previous, else the nearest. Points without a valid depth take no part and
-/// are foreground, the safe side. O(n log n); deterministic; permuting the points permutes the mask; allocates only
-/// when the workspace grows. Departure from the paper, which clusters: a window is better on every kind of scene of
+/// `behind_m` behind it; or `short_m` behind it. The window whose points are placed most like a person's is taken
+/// (sum_place_odds); without pixels the previous, else the nearest. Points without a valid depth are not used and count
+/// as foreground, the safe side. O(n log n); deterministic; permuting the points permutes the mask; allocates only when
+/// the workspace grows. Departure from the paper, which clusters: a window is better on every kind of scene of
 /// foreground_study.
 template <typename Scalar>
 ForegroundResult depth_foreground(const ForegroundInput<non_deduced<Scalar>>& in, const ForegroundOptions& options,

@@ -12,14 +12,14 @@
 
 namespace cfp {
 
-/// The keypoints of one box. What is not known stays as it is.
+/// The keypoints of one box. Leave unknown members at their defaults.
 template <typename Scalar>
 struct ForegroundInput {
   span<const Scalar> depths_m;  ///< not positive or not finite: no depth there
   PointSpan<Scalar, 2> pixels;  ///< one per depth, px, finite; empty: unknown. Of use only with `box`.
   Box<Scalar> box;              ///< px; improper: unknown
   Scalar previous_depth_m{};    ///< `depth_m` of the same object's result in the frame before; not positive: unknown
-  DepthNoise depth_noise{0, 0, 0};  ///< of the depths, where it reaches decimetres; the window becomes as much wider
+  DepthNoise depth_noise{0, 0, 0};  ///< of the depths; the window is widened by it where it reaches decimetres
 };
 
 enum class ForegroundRule : std::uint8_t {
