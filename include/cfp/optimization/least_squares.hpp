@@ -80,7 +80,7 @@ inline namespace CFP_ISA {
 /// Runs the loop. The cost never rises; what the problem holds at the end belongs to the last accepted step. A system
 /// that is not positive definite is damped, or, with damping 0, ends as degenerate.
 ///
-/// Only a step that was hardly damped tells of a minimum by how little it promises or brings.
+/// A small predicted or actual decrease indicates a minimum only if the step was hardly damped.
 ///
 /// A step is judged by its gain = (cost before - cost after) / (predicted decrease); NaN is refused. Accepted (gain
 /// above 1e-3): the damping shrinks by max(1/3, 1 - (2 gain - 1)^3), and does not grow for gain >= 1/2; below

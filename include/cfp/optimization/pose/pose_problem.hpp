@@ -22,11 +22,11 @@ namespace cfp {
 /// A third row comes from a depth z, of which the disparity fx b / z has the noise sigma beside that of the pixel, or
 /// from the column of the point in a right image, u_right = u - fx b / z, which has it. ORB-SLAM2's mvuRight of an
 /// RGB-D camera is no such column but made of u and z: its noise is u's as well, and with it the pose seems up to 1.4
-/// times as certain as it is; give the depth. For depths baseline_fx may be of no camera that there is: where they err
-/// by c z^2 it is a pixel for 1 / c, some 500 px m for structured light (examples/slam/RESULTS.md). A third row counts
-/// when z is positive and finite, and u_right positive (as in ORB-SLAM2, which marks "none" with -1), and column or
-/// disparity at most 1e7 px; otherwise the observation is a pixel only. Bundle adjustment takes any finite u_right
-/// above 0.
+/// times as certain as it is; give the depth. For depths baseline_fx may be fictitious: depths with an error of c z^2
+/// have a disparity noise of one pixel for baseline_fx = 1 / c, some 500 px m for structured light
+/// (examples/slam/RESULTS.md). A third row counts when z is positive and finite, and u_right positive (as in ORB-SLAM2,
+/// which marks "none" with -1), and column or disparity at most 1e7 px; otherwise the observation is a pixel only.
+/// Bundle adjustment takes any finite u_right above 0.
 template <typename Scalar>
 struct PoseObservations {
   PointSpan<Scalar, 3> points;  ///< X, world frame, m
@@ -54,8 +54,8 @@ struct PoseOptions {
   double chi2_mono = 5.991;    ///< outlier threshold on s of a pixel, 95 % of chi^2 with 2 degrees of freedom, > 0
   double chi2_stereo = 7.815;  ///< the same with a depth, 3 degrees of freedom, > 0
   /// Unless all observations agree, fewer rows of inliers (two of a pixel, three with a depth) leave the pose as it
-  /// was, >= 6. Three pixels fit some pose whatever they show: of poses from 4 to 60 observations with up to 90 %
-  /// mismatches 6 to 45 % were solved and wrong with 6 rows, at most 1 % with 10 (cfp_pose_loss_study).
+  /// was, >= 6. Any three pixels fit some pose: of poses from 4 to 60 observations with up to 90 % mismatches 6 to 45 %
+  /// were solved and wrong with 6 rows, at most 1 % with 10 (cfp_pose_loss_study).
   int min_inlier_rows = 10;
   /// The rounds, in order. Default: Geman-McClure, so wide that most starts reach the minimum, until pixels move by
   /// half a sigma, then narrow to 0.1 sigma of the pose. Its error is 2 % to 4 % above least squares on the true
@@ -71,7 +71,7 @@ struct PoseOptions {
   double handover_decrease = 0.3;  ///< >= 0, per observation: a round from whose pose the next one goes on ends when a
                                    ///< step promises less; 0.3 moves pixels by 0.5 sigma
   bool from_start = false;         ///< every round begins at the start pose instead of the previous round's
-  bool inliers_only = false;       ///< every round but the first leaves out what the previous one found an outlier
+  bool inliers_only = false;       ///< every round but the first leaves out the outliers of the previous one
 };
 
 inline namespace CFP_ISA {
@@ -117,7 +117,7 @@ struct PoseResult {
   /// Information of xi (1/m^2, 1/(m rad), 1/rad^2) at the returned pose: sum of w rho'(s) J^T J / sigma^2, scaled so
   /// that an inlier counts fully on average. Where sigma is the pixels' noise and weights are 0 or 1, its inverse is
   /// the covariance of the pose, 4 % too small with the default rounds and 18 % with those of ORB-SLAM2, whose hard cut
-  /// costs accuracy. Other weights make it a mere measure. Zero when the pose was not refined.
+  /// costs accuracy. With other weights it is only a relative measure. Zero when the pose was not refined.
   Eigen::Matrix<double, 6, 6, Eigen::DontAlign> information = Eigen::Matrix<double, 6, 6, Eigen::DontAlign>::Zero();
   double cost = 0;       ///< sum of w rho(s) of the last round
   double chi2 = 0;       ///< sum of w s over the inliers
