@@ -1,7 +1,7 @@
 /// @file trajectory.hpp
-/// Stamped poses, their association by time and its coverage: the common ground of the trajectory errors. Trajectories
-/// may come unsorted, with duplicates and with broken poses; nothing has to be cleaned before. A trajectory is any
-/// array of StampedPose with size() and []: a std::vector, a span.
+/// Stamped poses, their association by time and its coverage: shared by the trajectory errors. Trajectories may come
+/// unsorted, with duplicates and with broken poses; nothing has to be cleaned before. A trajectory is any array of
+/// StampedPose with size() and []: a std::vector, a span.
 #pragma once
 
 #include <algorithm>
