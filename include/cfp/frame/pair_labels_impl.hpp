@@ -1,6 +1,6 @@
 /// @file pair_labels_impl.hpp
-/// How the flow pairs of a frame stand to the objects of its boxes, and which lie on none, for estimate_objects.hpp.
-/// Not an interface.
+/// Where the flow pairs of a frame lie relative to the objects of its boxes, and which lie on none, for
+/// estimate_objects.hpp. Not an interface.
 #pragma once
 
 #include "cfp/frame/frame_options.hpp"
@@ -31,11 +31,11 @@ void label_margin(const Box<Scalar>& box, const ForegroundResult& separated, con
   }
 }
 
-/// Sets scratch.pair_label: per box and flow pair, how the pair stands to the object of that box. Where the object is
-/// told from its background by depth, so are the pairs; those before it, and those just outside of the box, may be
-/// somebody else, too, and are undecided. Where it has a mask, so are those that are farther than it, as masks spill
-/// over the silhouette, where depth and flow are of two surfaces, and those in its box beside the mask but for what is
-/// behind the object, as masks leave some of it out.
+/// Sets scratch.pair_label: per box and flow pair, where the pair lies relative to the box's object. If the object is
+/// separated from its background by depth, so are the pairs; those in front of it, and those just outside the box, may
+/// belong to somebody else and are undecided. If it has a mask, two more kinds are undecided: pairs in the mask but
+/// farther than the object, as masks spill over the silhouette, where depth and flow may belong to two surfaces; and
+/// pairs in the box but outside the mask unless they are behind the object, as masks miss parts of it.
 template <typename Scalar>
 void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameState<Scalar>& state) {
   FrameScratch<Scalar>& scratch = state.scratch;
@@ -63,7 +63,8 @@ void label_pairs(const Frame<Scalar>& frame, const FrameOptions& options, FrameS
 }
 
 /// Marks in scratch.outside the flow pairs that lie on no object: outside all boxes, and behind what is in one of them.
-/// Behind what is in two, which depth takes for the nearer one's object, they may be on the other's.
+/// Pairs behind the objects of two boxes do not count: depth takes the nearer object for both, so they may lie on the
+/// other.
 template <typename Scalar>
 [[nodiscard]] FlowSupport mark_outside(std::size_t pairs, const FlowModelOptions& options,
                                        FrameScratch<Scalar>& scratch) {

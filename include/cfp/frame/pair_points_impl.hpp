@@ -43,9 +43,9 @@ template <typename Scalar>
   return quantile(span<Scalar>(depths), share);
 }
 
-/// Takes out of the points, by NaN, those whose depth no neighbours share (CameraMotionOptions::shared_depth_ratio);
-/// 0 takes out none. Returns how many stay. A wrong depth may move a pair by less than its noise, so that no distance
-/// tells it, and yet bend the motion: what seems far and moves makes a turn of a translation.
+/// Sets points of isolated depth (CameraMotionOptions::shared_depth_ratio) to NaN; 0: none. Returns how many remain. A
+/// wrong depth may displace a pair by less than its noise, so that it is no outlier by its distance, and yet bias the
+/// motion: a moving point that seems far turns a translation into a rotation.
 template <typename Scalar>
 [[nodiscard]] std::size_t leave_out_lone_depths(const PointSpan<Scalar, 2>& pixels, Scalar ratio,
                                                 span<std::array<Scalar, 3>> points, PointGrid<Scalar>& grid) {

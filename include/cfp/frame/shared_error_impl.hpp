@@ -1,5 +1,5 @@
 /// @file shared_error_impl.hpp
-/// What neighbouring flow pairs err by together, for flow_model.hpp. Not an interface.
+/// The error that neighbouring flow pairs share (correlated error), for flow_model.hpp. Not an interface.
 #pragma once
 
 #include <algorithm>
@@ -16,33 +16,33 @@
 
 namespace cfp::detail {
 
-/// Rolling shutter, a lens or a focal length that is not quite as told, depth that is late or beside its image: no
-/// noise, for the mean of many neighbours has all of it.
+/// Caused by rolling shutter, wrong distortion or focal length, depth that is late or misaligned. It is no noise: it
+/// does not average out over neighbours.
 struct SharedError {
   bool known = false;
-  double error_sq = 0;  // variance of one coordinate, beside the pairs' noise, px^2; below 0 by chance
+  double error_sq = 0;  // variance of one coordinate, besides the pairs' noise, px^2; may be below 0 by chance
   double pairs = 0;     // that share it, in the mean of the parts
 };
 
 inline namespace CFP_ISA {
 
-/// W^-1 r of a pair, W of its noise, the unit, and of what a depth may be: what it says of an error that it shares with
-/// its neighbours, and the share that is left of the coordinate which the depth moves it along, 0 to 1.
+/// W^-1 r of a pair, with W the covariance of its noise (the unit) and of its depth: its measurement of the shared
+/// error, and the share, 0 to 1, that remains of the coordinate along which the depth moves it.
 struct SharedResidual {
   Vector2<double> told = Vector2<double>::Zero();
   double distance_sq = 0;  // r^T W^-1 r
   double along = 0;
 };
 
-/// The pairs in one part of the image: the sum of their residuals, and what it says.
+/// The pairs in one part of the image: the sum of their residuals, and its information.
 struct ResidualPart {
   Vector2<double> sum = Vector2<double>::Zero();
   double across = 0, along = 0;  // so many times an error that all share: in the sum, by coordinate
-  double variance = 0;           // of both coordinates of the sum, if the pairs err alone
+  double variance = 0;           // of both coordinates of the sum, if the pairs' errors are independent
   double agreeing = 0;           // pairs, by the weights of the loss: a part that moves has hardly any
 
   void add(const SharedResidual& pair) noexcept {
-    constexpr double loss_sq = 128;  // 8 sigma per coordinate: what neighbours share may be several
+    constexpr double loss_sq = 128;  // 8 sigma per coordinate: the shared error may be several
     if (!is_finite(pair.distance_sq) || !is_finite(pair.along)) return;
     const double root = 1 / (1 + pair.distance_sq / loss_sq), w = root * root;
     sum += w * pair.told;
@@ -51,7 +51,7 @@ struct ResidualPart {
     variance += w * w * (1 + pair.along);
     agreeing += w;
   }
-  /// How many pairs of two coordinates without errors of depth would say as much.
+  /// The number of pairs with two coordinates and exact depths that would carry the same information.
   [[nodiscard]] double pairs() const noexcept {
     return variance > 0 ? (across * across + along * along) / variance : 0;
   }
@@ -59,11 +59,11 @@ struct ResidualPart {
 
 /// The error that pairs share under what was fitted to them: `tells(i)`, whether pair i was, `residual(i, out)`, its
 /// residual, false without one. In each of 4 x 3 parts of what most of them cover the mean of n residuals has the
-/// variance sigma^2 / n + e^2 per coordinate; e is had from the upper quartile of the parts, as what errs may be a part
-/// of the image, and what moves there may be another. To n parts, each of which tells two coordinates, or one where a
-/// depth may be anything, so many parameters were fitted: e^2 is n / (n - parameters / coordinates) times what is left
-/// of it, and n times at most. Not known of fewer than six parts with five pairs that agree: with six parameters that
-/// is hardly more than chance, three times as large, and whoever gets up behind it looks at rest for some frames.
+/// variance sigma^2 / n + e^2 per coordinate. e is estimated from the upper quartile of the parts, since the error may
+/// be in some parts only, and something may move in others. `parameters` were fitted to n parts of two coordinates each
+/// (one for unknown depths): to correct for it, e^2 is multiplied by n / (n - parameters / coordinates), at most by n.
+/// Unknown with fewer than six parts that have five inliers: from four, e^2 was chance times four, which made the
+/// motion so uncertain that somebody getting up looked static for some frames.
 template <typename Scalar, typename Tells, typename Residual>
 [[nodiscard]] SharedError shared_error(const FlowPairs<Scalar>& flow, Scalar sigma_px, int parameters, Tells&& tells,
                                        Residual&& residual) noexcept {

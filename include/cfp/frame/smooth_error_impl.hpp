@@ -1,5 +1,5 @@
 /// @file smooth_error_impl.hpp
-/// What flow pairs err by as a smooth function of their place in the image, for frame_flow_model_impl.hpp. Not an
+/// The error of flow pairs that is a smooth function of the image position, for frame_flow_model_impl.hpp. Not an
 /// interface.
 #pragma once
 
@@ -17,9 +17,9 @@
 namespace cfp::detail {
 inline namespace CFP_ISA {
 
-/// What a smooth error adds to the current pixel of a pair, by its coefficients: along both axes from the middle of the
-/// image, along one of them more than the other, along a diagonal, px; and what a lens bends more than it is told to,
-/// k1, here more than in the frame before. What shifts or turns the image is the camera's motion.
+/// Derivative of the smooth error of a pair's current pixel with respect to its coefficients: scale, difference of
+/// scale between the axes, shear (px), and the error of the lens's k1, which displaces the current pixel unlike the
+/// previous one. Shift and rotation of the image belong to the camera's motion.
 template <typename Scalar>
 [[nodiscard]] Eigen::Matrix<double, 2, 4> smooth_error_of(const Vector2<Scalar>& previous,
                                                           const Vector2<Scalar>& current,
@@ -36,8 +36,8 @@ template <typename Scalar>
   return terms;
 }
 
-/// The camera's motion and the smooth error of the pairs with a point, fitted together: apart, what moves the camera
-/// forward would be an error, and what errs a motion.
+/// The camera's motion and the smooth error of the pairs with a point, fitted together: one after the other, forward
+/// motion would be taken for an error, and an error for motion.
 template <typename Scalar>
 struct SmoothErrorFit {
   const PairsWithDepth<Scalar>& pairs;
@@ -47,7 +47,7 @@ struct SmoothErrorFit {
   Vector4<double> coefficients = Vector4<double>::Zero();
   Eigen::Matrix<double, 10, 10> covariance = Eigen::Matrix<double, 10, 10>::Identity();  // of the motion and of them
 
-  /// A Gauss-Newton step of a robust fit at a noise; false where the pairs do not tell all of it.
+  /// A Gauss-Newton step of a robust fit at a noise; false if the pairs do not determine all unknowns.
   [[nodiscard]] bool step(Scalar sigma_px) noexcept {
     const SE3<Scalar> T = T_cur_prev.cast<Scalar>();
     NormalEquations<10> sums;
@@ -81,8 +81,8 @@ struct SmoothErrorFit {
       return k1 * k1 < 10.8 * covariance(9, 9);
     };
     lens = lens && solves() && !lens_is_chance();
-    // Before a bare wall, or where all depths count as one, what errs from the middle of the image is the way forward:
-    // there is no such error then.
+    // Before a bare wall, or with one depth for all, a radial error cannot be distinguished from forward motion: the
+    // error is then fitted without it.
     if (!lens && !solves_without(9) && !solves_without(6)) return false;
     T_cur_prev = se3_exp(Vector6<double>(change.template head<6>())) * T_cur_prev;
     coefficients += change.template tail<4>();
@@ -99,8 +99,8 @@ struct SmoothErrorFit {
     }
   }
 
-  /// Whether the error is more than chance, of pairs that err alone: that of the lens is, or chi-squared of three, one
-  /// in a thousand.
+  /// Whether the error is significant, for independent pair errors: the lens term is, or the other three by
+  /// chi-squared, one in a thousand.
   [[nodiscard]] bool stands_out() const noexcept {
     Vector3<double> weighed;
     const Vector3<double> others = coefficients.template head<3>();
@@ -110,11 +110,11 @@ struct SmoothErrorFit {
   }
 };
 
-/// Takes the smooth error of the pairs out of their current pixels, which then are in `straight`, and of their motion:
-/// after estimate_camera_motion. The rows of a rolling shutter see turns that differ, a lens or a focal length that is
-/// not quite as told bends what moves: no rigid motion explains that, and whatever it displaces rests. Returns how many
-/// parameters were fitted to the pairs; 6, those of the motion, and nothing changed, where they show none. Not by the
-/// lens where no depths are known: what it bends is hardly told from a room that is no plane.
+/// Removes the smooth error from the pairs' current pixels, which are then in `straight`, and from their motion; call
+/// after estimate_camera_motion. The rows of a rolling shutter see different rotations, and a wrong lens model or focal
+/// length distorts the flow: no rigid motion explains that, though the points are static. Returns how many parameters
+/// were fitted to the pairs; 6, those of the motion, and nothing changed, if there is no significant error. Without
+/// depths the lens term is left out: it can hardly be distinguished from a room that is not flat.
 template <typename Scalar>
 [[nodiscard]] int straighten(const PinholeCamera<Scalar>& camera, const CameraMotionOptions& options,
                              CameraMotionWorkspace<Scalar>& workspace, bool by_lens,

@@ -31,8 +31,8 @@ template <typename Scalar>
   return known / (std::max)(all, 1.0);
 }
 
-/// Sets scratch.room_distances of a motion up to scale: those of pairs that may be anywhere in the room, and none where
-/// the room shifts too much, see UnreportedOptions::max_parallax.
+/// Sets scratch.room_distances of a motion up to scale: for pairs at any depth of the room; no distances if the room's
+/// parallax is too large, see UnreportedOptions::max_parallax.
 template <typename Scalar>
 void measure_room(const FlowModel<Scalar>& model, const FlowPairs<Scalar>& flow, const PinholeCamera<Scalar>& camera,
                   const CoarseOptions& coarse, std::vector<Scalar>& room_distances) {
@@ -53,10 +53,9 @@ struct UnreportedSearch {
   const UnreportedOptions& unreported = options.coarse.unreported;
   FrameScratch<Scalar>& scratch = state.scratch;
 
-  /// Scores the pairs on no object and, where depths tell what moves, those with one, in scratch.samples; -1 of all
-  /// others. Puts those that move into scratch.grid and those that do not into scratch.resting. False unless some move,
-  /// but so few of those on no object that it is not the camera, whose motion must rest on more than a few of them,
-  /// too.
+  /// Scores the pairs on no object and, where depths tell what moves, those with one, in scratch.samples; -1 for all
+  /// others. Moving pairs go to scratch.grid, the others to scratch.resting. False if too few pairs move, if so many of
+  /// those on no object move that the camera's motion may be wrong, or if too few of them have a depth.
   [[nodiscard]] bool gather_pairs() {
     const FlowModelKind kind = state.report.flow_model;
     const bool by_depth = kind == FlowModelKind::motion && !flow.previous_depths.empty();
@@ -90,8 +89,8 @@ struct UnreportedSearch {
   }
 
   /// Of the pairs near keypoint i, at its depth where both have one, and on no object where not: the median score of
-  /// the nearest `pairs` that move, if these are nearer than as many that rest; -1 if not. Boxes seldom hold all of a
-  /// person: what sticks out of one is told by the pairs in it.
+  /// the nearest `pairs` that move, if these are nearer than as many that rest; -1 if not. Boxes seldom contain all of
+  /// a person: parts outside are found by the pairs inside.
   [[nodiscard]] Scalar score_moving_near(std::size_t i) {
     const Scalar x = state.current.keypoints[i][0], y = state.current.keypoints[i][1];
     const Scalar depth = state.current.depths.empty() ? Scalar(0) : state.current.depths[i];
@@ -138,9 +137,8 @@ struct UnreportedSearch {
     return 4 * depths.size() < all ? std::numeric_limits<Scalar>::infinity() : quantile(span<Scalar>(depths), 0.5);
   }
 
-  /// Whether what would count as moving may be something that nobody reported: not where it holds too many of the
-  /// keypoints, nor where it holds half as many and is what lies farther, as a room behind a board that carries the
-  /// motion with it.
+  /// Whether the keypoints that seem to move may be on an unreported object: not if they are too many, nor if they are
+  /// half as many and lie farther than the rest, like a room behind a board that biased the motion.
   [[nodiscard]] bool is_credible(std::size_t moving, std::size_t all) {
     const double most = unreported.max_share * static_cast<double>(all);
     if (static_cast<double>(2 * moving) <= most) return true;
