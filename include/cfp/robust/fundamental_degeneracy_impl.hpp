@@ -1,6 +1,6 @@
 /// @file fundamental_degeneracy_impl.hpp
-/// Whether a homography explains the pairs of fundamental_ransac.hpp, so that there is no F, and what motion it stands
-/// for. Not an interface.
+/// Whether a homography explains the pairs of fundamental_ransac.hpp, so that there is no F, and which motion it is.
+/// Not an interface.
 #pragma once
 
 #include <algorithm>

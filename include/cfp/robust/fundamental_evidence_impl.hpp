@@ -1,5 +1,5 @@
 /// @file fundamental_evidence_impl.hpp
-/// What the pairs of fundamental_ransac.hpp say for an F against a homography. Not an interface.
+/// The evidence of the pairs of fundamental_ransac.hpp for an F against a homography. Not an interface.
 #pragma once
 
 #include <algorithm>
@@ -25,7 +25,7 @@ inline namespace CFP_ISA {
 // pairs obeys F. By Markov's inequality the product over all pairs then exceeds e^t with a probability of at most e^-t.
 // So does the mean of such products for several shares: its logarithm is the evidence. Mismatches lie far from H,
 // parallax mostly near it: each range of d has a share of its own. Of n pairs that share their weight each has the n-th
-// root of its ratio: together they say no more than one, however much that is. T is double.
+// root of its ratio: together they have the evidence of one. T is double.
 template <typename T>
 struct FundamentalEvidence {
   static constexpr std::size_t cells = PairArrays::window_cells;

@@ -1,6 +1,6 @@
 /// @file fundamental_noise_impl.hpp
-/// The noise that the pairs of fundamental_ransac.hpp show under an F, how little chance explains of them, and how well
-/// F is known by them. Not an interface.
+/// The noise of the pairs of fundamental_ransac.hpp under an F, the significance of their support, and the covariance
+/// of F. Not an interface.
 #pragma once
 
 #include <algorithm>
@@ -99,7 +99,7 @@ template <typename T>
 }
 
 // The covariance of F in pixels, of unit norm: F, of scaled pixels, was fitted to pairs of this variance under a loss
-// of this many variances. Zero where they do not tell it.
+// of this many variances. Zero if they do not determine it.
 template <typename T>
 [[nodiscard]] FundamentalCovariance covariance_in_pixels(const PairArrays& pairs, const Matrix3<T>& F, T variance,
                                                          T loss) noexcept {

@@ -1,6 +1,5 @@
 /// @file homography_impl.hpp
-/// Homographies as far as the degeneracy check of fundamental_ransac.hpp needs them. Scaled pixels throughout. Not an
-/// interface.
+/// Homographies for the degeneracy check of fundamental_ransac.hpp. Scaled pixels throughout. Not an interface.
 #pragma once
 
 #include <algorithm>
@@ -152,8 +151,8 @@ template <typename T, typename Draw, typename WeightOf>
   return best;
 }
 
-// Whether the inliers listed, but for a few, lie on one line of the previous image, which leaves the homography of a
-// plane open: two pairs beside it make one that only chance confirms.
+// Whether the inliers listed, but for a few, lie on one line of the previous image, which does not determine the
+// homography of a plane: two pairs beside the line give one without further support.
 [[nodiscard]] inline bool lie_on_a_line(const PairArrays& pairs, const std::vector<std::uint32_t>& inliers,
                                         double width) noexcept {
   if (inliers.empty()) return false;

@@ -1,6 +1,6 @@
 /// @file pnp_crowd_impl.hpp
-/// Observations of pnp_ransac.hpp that crowd in a part of the image: whether a pose is more than they make of being
-/// close to each other, and what shares their weight. Not an interface.
+/// Observations of pnp_ransac.hpp that crowd in a part of the image: whether the support of a pose exceeds what
+/// crowding alone gives, and how crowded observations share their weight. Not an interface.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 /// @file pnp_ransac_impl.hpp
-/// Score and refinement of pnp_ransac.hpp, and whether its pose is more than chance. Not an interface.
+/// Score and refinement of pnp_ransac.hpp, and whether the support of its pose exceeds chance. Not an interface.
 #pragma once
 
 #include <algorithm>
@@ -110,9 +110,9 @@ struct PnpProblem {
     if (refined.cost < candidate.cost) candidate = refined;
   }
 
-  // Whether the pose is more than the best that chance makes of mismatches, and than they make of being close to each
-  // other; be it by number or by weight: the weights may know nothing, and then leave fewer data, or tell all
-  // mismatches. Mostly some of the observations tell clearly enough.
+  // Whether the support of the pose exceeds the best that mismatches give by chance, and what their crowding gives,
+  // either by number or by weight: uninformative weights only reduce the data, informative ones mark all mismatches.
+  // Usually a part of the observations is enough to decide.
   [[nodiscard]] bool stands_out(const Model& pose, std::size_t samples, bool few, std::vector<double>& scratch) const {
     constexpr std::size_t some = 32;
     const double bar = std::log(12 * static_cast<double>(samples));
