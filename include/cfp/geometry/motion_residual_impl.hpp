@@ -1,5 +1,5 @@
 /// @file motion_residual_impl.hpp
-/// A flow pair against the camera's motion, linearised, for the distances and sums that are made of it. Not an
+/// The linearised residual of a flow pair under the camera's motion, for distances and normal equations. Not an
 /// interface.
 #pragma once
 
@@ -19,7 +19,7 @@ namespace cfp::detail {
 struct PairTerm {
   double weight = 0;       // of a Geman-McClure loss; 0 of what is not finite
   double distance_sq = 0;  // Mahalanobis, of the noise and of the depth's error
-  double coordinates = 0;  // of the pixel that tell: 2, and down to 1 where the depth may be anything
+  double coordinates = 0;  // effective measurements of the pixel: 2, down to 1 for an unknown depth
 };
 
 inline namespace CFP_ISA {
