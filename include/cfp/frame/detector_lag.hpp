@@ -43,12 +43,12 @@ class DetectorLag {
     CFP_ASSERT(!invalid_field(options));
   }
 
-  /// Once per frame, after its coarse stage; the lag in seconds, 0: none, or not known. In steps of a ninth of
-  /// max_lag_s and up to one too short, as a box is wider than what moves in it; one step alone is hardly ever told.
-  /// Detected boxes that move are laid at where the image will have them after each of ten lags; a pair in them scores
-  /// 1 when it moves (distance above 6 sigma) and -1 when it rests (below 3), and the lag is that of the best mean
-  /// score, if most pairs there move. Frames whose flow has no depths, no camera motion or no noise count for nothing.
-  /// O(boxes that move x pairs).
+  /// Once per frame, after its coarse stage; the lag in seconds, 0: none, or not known. Resolution: a ninth of
+  /// max_lag_s. The result may be one step too short, as a box is wider than what moves in it, and a lag of one step is
+  /// hardly ever detected. Detected boxes that move are shifted to where they should be after each of ten lags; a pair
+  /// in them scores 1 if it moves (distance above 6 sigma) and -1 if it rests (below 3). The result is the lag of the
+  /// best mean score, if most pairs there move. Frames whose flow has no depths, no camera motion or no measured noise
+  /// are ignored. O(boxes that move x pairs).
   double update(const Frame<Scalar>& frame, const FrameState<Scalar>& state) noexcept {
     const double dt = detail::elapsed_s(state);
     const double kept = is_finite(dt) ? kept_share(dt, options_.memory_s) : 1;

@@ -52,7 +52,7 @@ struct Frame {
   /// The camera's motion since frame k-1, if the host knows it by now, and its standard deviations in metres and
   /// radians: {T, 0.003, 0.001}. Flow with depths is fused with it; flow without depths refines it
   /// (refine_camera_motion). Either rejects it (FrameReport::motion_refused) if the two differ by more than their
-  /// covariances allow. The host's F takes precedence over it unless it is exact. {T, 0, 0} means exact: an error of a
+  /// covariances allow. The host's F takes precedence unless this motion is exact. {T, 0, 0} means exact: an error of a
   /// millimetre then looks like motion of whoever stands nearby. Not set: the motion of the previous frame is
   /// extrapolated, see FlowModelOptions::camera_acceleration_m_s2.
   std::optional<UncertainMotion<double>> T_cur_prev;

@@ -10,15 +10,15 @@
 namespace cfp {
 inline namespace CFP_ISA {
 
-/// Where frames are missing the camera may be anywhere, and a motion model finds nothing but chance matches.
+/// After missing frames the camera may be anywhere, and a motion model finds only chance matches.
 class FrameInterval {
  public:
-  /// Once per frame, with its time. True: there is a gap before it, longer than thrice the usual interval, and than
-  /// 0.2 s: over less, a velocity may be believed. A time that does not grow is no gap, and is not learnt, but for
-  /// the second of two in a row that grow: the one before them was wrong, or the clock was set. The usual interval
-  /// follows, by a fifth a frame: within some ten frames of a change by a few times, so that a recording that
-  /// becomes slower has no gap after each of its frames. It begins at the first interval, or at 0.2 s if that is
-  /// longer: a recording of one frame a second has four gaps, then none.
+  /// Once per frame, with its time. True: the interval before it is longer than three times the usual one and longer
+  /// than 0.2 s (over less, a constant velocity is a good prediction). A time that does not increase is no gap and is
+  /// ignored. But if two such times in a row increase, the second is accepted: the time before them was wrong, or the
+  /// clock was set. The usual interval is a running mean that moves by a fifth per frame: it adapts within some ten
+  /// frames to a change by a few times, so that a recording that becomes slower does not have a gap at every frame. It
+  /// starts at the first interval, but at most at 0.2 s: a recording of one frame a second has four gaps, then none.
   bool is_gap(double time_s) noexcept {
     const double dt = time_s - last_s_;
     const bool known = is_finite(last_s_);

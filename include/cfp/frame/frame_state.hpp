@@ -130,9 +130,9 @@ struct FrameState {
   std::vector<std::int32_t> match;                    ///< per keypoint: index in the frame before, or no_match
   std::vector<SecondStageKeypoint<Scalar>> evidence;  ///< per keypoint in a box: what the fine stage knew of it
   std::vector<Scalar> flow_depths;                    ///< per flow pair: in the frame before, m; empty: none
-  std::vector<Scalar> flow_distances;      ///< per flow pair, px, as the flow's model has them; empty: there is none
-  std::vector<Scalar> flow_probability;    ///< per keypoint: score of the flow at its place, of its object's pairs
-                                           ///< together if less, negative: none; outside of boxes where it moves alone
+  std::vector<Scalar> flow_distances;                 ///< per flow pair, px, under the flow's model; empty: no model
+  std::vector<Scalar> flow_probability;  ///< per keypoint: flow score at its place, at most ObjectProbability::together
+                                         ///< of its object; negative: none. Outside boxes only where the flow moves
   std::vector<Scalar> static_probability;  ///< per keypoint: K
   std::vector<Scalar> weight;              ///< per keypoint: what the pose is to use
   bool all_observe = false;                ///< they were asked for without M: each counts as an observation

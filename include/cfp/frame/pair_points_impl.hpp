@@ -45,7 +45,7 @@ template <typename Scalar>
 
 /// Sets points of isolated depth (CameraMotionOptions::shared_depth_ratio) to NaN; 0: none. Returns how many remain. A
 /// wrong depth may displace a pair by less than its noise, so that it is no outlier by its distance, and yet bias the
-/// motion: a moving point that seems far turns a translation into a rotation.
+/// motion: a near point whose depth is taken for far makes a translation look like a rotation.
 template <typename Scalar>
 [[nodiscard]] std::size_t leave_out_lone_depths(const PointSpan<Scalar, 2>& pixels, Scalar ratio,
                                                 span<std::array<Scalar, 3>> points, PointGrid<Scalar>& grid) {
