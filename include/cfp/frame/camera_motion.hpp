@@ -1,7 +1,7 @@
 /// @file camera_motion.hpp
 /// The camera's motion between two frames from optical-flow pairs whose depth is known, and the noise of the flow. Not
-/// in the paper, which judges objects by a fundamental matrix: which does not exist for planes, rotations and cameras
-/// at rest, and cannot see motion along its lines.
+/// in the paper, which judges objects by a fundamental matrix: planes, rotations and cameras at rest have none, and it
+/// cannot see motion along its lines.
 #pragma once
 
 #include <algorithm>

@@ -24,8 +24,8 @@ struct CameraMotionOptions {
   /// pnp_ransac, which is seldom misled by a third of such pairs (cfp_camera_motion_study); px, > 0.
   double search_above_px = 0.25;
   /// Rejects isolated depths: a depth counts only if at least two of about seven neighbours in the image agree with it
-  /// within this ratio (no unit, >= 0), unless that would reject more than three eighths of the pairs. 0: all are used
-  /// (cfp_object_motion_study).
+  /// within this ratio (no unit, >= 0), or if it has fewer than two. If more than three eighths of the pairs would be
+  /// rejected, none is. 0: all are used (cfp_object_motion_study).
   double shared_depth_ratio = 0.12;
   /// Limits the influence of near pairs on the translation, where one wrong depth has much leverage: a pair nearer than
   /// this quantile of the depths, in [0, 1], counts as if it were at that depth. 0: no limit (cfp_object_motion_study).

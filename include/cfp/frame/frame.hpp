@@ -50,11 +50,12 @@ struct Frame {
   DescriptorSpan descriptors;  ///< binary, one per keypoint: `fine` then matches what lies in boxes by itself
   span<const Scalar> map_point_probability;  ///< M per keypoint if matches are known by now, negative: no map point
   /// The camera's motion since frame k-1, if the host knows it by now, and its standard deviations in metres and
-  /// radians: {T, 0.003, 0.001}. Flow with depths is fused with it; flow without depths refines it
-  /// (refine_camera_motion). Either rejects it (FrameReport::motion_refused) if the two differ by more than their
-  /// covariances allow. The host's F takes precedence unless this motion is exact. {T, 0, 0} means exact: an error of a
-  /// millimetre then looks like motion of whoever stands nearby. Not set: the motion of the previous frame is
-  /// extrapolated, see FlowModelOptions::camera_acceleration_m_s2.
+  /// radians: {T, 0.003, 0.001}. Flow with depths is fused with it; where the two differ by more than their covariances
+  /// allow, this motion is dropped (FrameReport::motion_refused), or that of the flow if this one explains most of its
+  /// outliers. Flow without depths refines it, with a larger covariance where the flow contradicts it (motion_refused,
+  /// too; refine_camera_motion). The host's F takes precedence unless this motion is exact. {T, 0, 0} means exact: an
+  /// error of a millimetre then looks like motion of whoever stands nearby. Not set: the motion of the previous frame
+  /// is extrapolated, see FlowModelOptions::camera_acceleration_m_s2.
   std::optional<UncertainMotion<double>> T_cur_prev;
   std::optional<Matrix3<Scalar>> fundamental;  ///< F of the undistorted flow pairs, if the host has an exact one
   /// Homography from the previous image to this one, applied to the predicted boxes (rotation_homography). Not set:

@@ -40,9 +40,9 @@ struct UnreportedOptions {
   /// seen behind something large. In [0, 1].
   double max_share = 0.4;
   /// If the room is beyond the depth camera's range, a person nearby may hold all valid depths and be taken for the
-  /// room. If a smaller share of the pairs on no object have a depth, a frame without boxes does not estimate the
-  /// camera's motion from depths; below half of this share, a frame with boxes reports nothing. In [0, 1]; 0: depths
-  /// are always used (cfp_unreported_study).
+  /// room. If a smaller share of the pairs on no object have a depth, a frame with neither boxes nor a motion of the
+  /// host does not estimate the camera's motion from depths; below half of this share, other frames report nothing. In
+  /// [0, 1]; 0: depths count as in other frames, where a tenth of the pairs has one (cfp_unreported_study).
   double min_known_depths = 0.5;
   /// If the motion is known only up to scale: how much nearer than the room static points outside boxes may be.
   /// FlowModelOptions::nearer_than_room is the same for points in boxes.

@@ -42,7 +42,7 @@ struct FrameReport {
   FlowModelKind flow_model = FlowModelKind::none;            ///< what the flow pairs were judged by,
   FlowSupport flow_support = FlowSupport::none;              ///< what that rests on,
   RansacStatus flow_status = RansacStatus::not_enough_data;  ///< and how its estimation ended
-  bool motion_refused = false;      ///< T_cur_prev: not finite, no covariance, or the flow contradicts it
+  bool motion_refused = false;      ///< T_cur_prev: not finite, or the flow contradicts it or its covariance
   double flow_sigma_px = 0;         ///< noise of the flow as measured; 0: not
   double flow_shared_px = 0;        ///< error shared by neighbouring pairs, besides the noise; 0: unknown
   int flow_coordinates = 2;         ///< degrees of freedom of most distances: 1 across lines
