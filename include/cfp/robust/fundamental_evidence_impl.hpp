@@ -110,7 +110,7 @@ struct FundamentalEvidence {
       const T a2 = 1 + 2 * search.distances_sq[i] * per_s2;
       const T ratio = (1 + d2) * std::sqrt(1 + d2) / ((1 + d2 / 2) * a2 * a2);
       x[count] = pairs.row(prev_x)[i], y[count] = pairs.row(prev_y)[i];
-      const T w = pairs.weights()[i], told = pairs.row(evidence_weight)[i] / w;
+      const T w = pairs.weights()[i], told = distinct_share(pairs, i);
       gain[count] = w * (ratio >= 0 ? (told < 1 ? std::pow(ratio, told) : ratio) - 1 : T(-1));
       range[count] = 0;
       T edge = 6;

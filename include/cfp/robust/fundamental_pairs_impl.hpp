@@ -62,6 +62,11 @@ template <typename T>
   return pairs.size > PairArrays::enough ? k * pairs.size / PairArrays::enough : k;
 }
 
+// What pair i is of a distinct one: an n-th, of n pairs that share their weight.
+[[nodiscard]] inline double distinct_share(const PairArrays& pairs, std::size_t i) noexcept {
+  return pairs.row(evidence_weight)[i] / pairs.weights()[i];
+}
+
 template <typename T>
 [[nodiscard]] Vector3<T> previous_point(const PairArrays& pairs, std::size_t i) noexcept {
   return {pairs.row(prev_x)[i], pairs.row(prev_y)[i], T(1)};

@@ -195,9 +195,8 @@ template <typename T>
   for (std::size_t i = 0; i < pairs.size; ++i) {
     const T weight = pairs.row(evidence_weight)[i];
     n += weight, squares += weight * weight;
-    near += distances_sq[i] <= limit ? weight : T(0);
-    distinct += distances_sq[i] <= limit ? weight / pairs.weights()[i] : T(0);
-    all += distances_sq[i] <= 9 * limit ? weight : T(0);
+    if (distances_sq[i] <= limit) near += weight, distinct += distinct_share(pairs, i);
+    if (distances_sq[i] <= 9 * limit) all += weight;
   }
   const T per_weight = n / squares;
   near *= per_weight, all *= per_weight, n *= per_weight;
