@@ -62,7 +62,7 @@ struct FlowModel {
   FundamentalCovariance F_covariance = FundamentalCovariance::Zero();  ///< zero: exact, as the caller's
   UncertainMotion<Scalar> motion;  ///< of both kinds of motion; up to scale: in units of the room's depth
   Scalar sigma_px = Scalar(0);     ///< noise of one coordinate, measured on the pairs on no object; 0: not measured
-  int coordinates = 2;             ///< degrees of freedom of most distances: 2 pixel, 1 across lines
+  int coordinates = 2;             ///< degrees of freedom of most distances: 1 across lines
   double shared_error_px = 0;      ///< error that neighbouring pairs share, besides the noise
   double shared_factor = 1;        ///< covariance over that for independent pair errors
 

@@ -62,8 +62,8 @@ struct ResidualPart {
 /// variance sigma^2 / n + e^2 per coordinate. e is estimated from the upper quartile of the parts, since the error may
 /// be in some parts only, and something may move in others. `parameters` were fitted to n parts of two coordinates each
 /// (one for unknown depths): to correct for it, e^2 is multiplied by n / (n - parameters / coordinates), at most by n.
-/// Unknown with fewer than six parts that have five inliers: from four, e^2 was chance times four, which made the
-/// motion so uncertain that somebody getting up looked static for some frames.
+/// Unknown with fewer than six parts that have five inliers: from fewer, e^2 is chance times that factor, which makes
+/// the motion so uncertain that somebody getting up looks static for some frames.
 template <typename Scalar, typename Tells, typename Residual>
 [[nodiscard]] SharedError shared_error(const FlowPairs<Scalar>& flow, Scalar sigma_px, int parameters, Tells&& tells,
                                        Residual&& residual) noexcept {

@@ -141,8 +141,8 @@ inline namespace CFP_ISA {
 ///
 /// The homography with most inliers is searched first; if other pairs show parallax, F is completed from both. There is
 /// no F, and `status` says why, unless
-///  - more pairs lie near its lines than the best of all samples would gather by chance (30 true pairs among 300 cannot
-///  be distinguished from that),
+///  - more pairs lie near its lines than the best of all samples would gather by chance (from which 30 true pairs among
+///    300 are not distinguished),
 ///  - its lines explain the pairs better than that homography and than no motion do, by more than chance,
 ///  - this holds also without any one part of the image that a mover nearby may fill,
 ///  - and without any two lines of points (`degenerate`).
